@@ -37,8 +37,8 @@ tests_with() { # tests_with MODULE CRATE
     fi
     echo "$found"
 }
-tests=$(tests_with multiplies faceoff-sandbox)
-runner_tests=$(tests_with head_start faceoff-runner)
+tests=$(tests_with process_limits faceoff-sandbox)
+runner_tests=$(tests_with early_cpu_time faceoff-runner)
 work=$(mkdir -p "$TARGET_DIR/cgroup2" && realpath "$TARGET_DIR/cgroup2")
 
 # The kernel is unpacked, not installed: nothing of it reaches this host's /boot.
@@ -111,12 +111,12 @@ expect() { # expect NAME COMMAND…
 }
 # The sandbox's own tests that meet a cgroup: limits, ends, CPUs, and what a killed service leaves.
 limits() {
-    "$tests" --test-threads 1 hoards:: multiplies:: moves_cpu:: counts_cpus:: clings:: killed_service:: ends:: probe:: well_behaved:: \
-        holds::
+    "$tests" --test-threads 1 resource_limits:: process_limits:: cpu_limits:: cpu_count:: process_cleanup:: \
+        killed_service:: exit_causes:: probe:: normal_operation:: channel_blocking::
 }
 # The evaluator's, attacked by agents that hold it, or that compute while nobody waits for them.
 attacks() {
-    "$runner_tests" --test-threads 1 head_start:: supervision:: free_time:: waits_of_helpers
+    "$runner_tests" --test-threads 1 early_cpu_time:: supervision:: unread_questions:: waits_of_helpers
 }
 # All of doctor's layers, with version 2 in three of them. The exit status alone would leave out by which version.
 doctor() {
@@ -139,7 +139,7 @@ echo "controllers: $(cat $top/cgroup.controllers)"
 # An agent that asks for more than this machine has is to meet its limit, not a kernel that gives nothing out at all.
 echo 1 >/proc/sys/vm/overcommit_memory
 # An ordinary user has no way into a home folder; here it does, in memory.
-for path in "$tests" "$runner_tests" "$program" "$repository/tests/agents/hoards.py"; do
+for path in "$tests" "$runner_tests" "$program" "$repository/tests/agents/exceeds_limits.py"; do
     while path=$(dirname "$path") && [ "$path" != / ]; do chmod a+x "$path"; done
 done
 

@@ -1,6 +1,6 @@
 #!/bin/sh
-# Makes the runtime python3-ml for tests, and prints the folder that it is in: TARGET_DIR/runtimes. Below /tmp and the like agents would
-# not see it, and it is in the user's cache, or else below /var/tmp.
+# Creates the runtime python3-ml for tests, and prints its folder: TARGET_DIR/runtimes. If agents cannot see that folder (as below /tmp),
+# it uses the user's cache, or else a folder below /var/tmp.
 #
 #   tests/runtimes.sh TARGET_DIR
 set -eu
@@ -11,12 +11,12 @@ fail() {
 }
 [ $# -eq 1 ] || fail "expected the target folder: tests/runtimes.sh TARGET_DIR"
 
-# In place of these folders agents see their own, so a server refuses a runtime there (COVERED in crates/faceoff/src/config/runtime.rs).
+# Agents have folders of their own at these paths, so a server refuses a runtime there (COVERED in crates/faceoff/src/config/runtime.rs).
 is_covered() {
     case $1/ in
     /tmp/* | /dev/* | /proc/* | /agent/*) true ;;
     /*) false ;;
-    # The cache folder is to be absolute; another one does not count.
+    # A relative cache folder is ignored.
     *) true ;;
     esac
 }
@@ -28,12 +28,12 @@ if is_covered "$folder"; then
     if is_covered "$cache" || ! mkdir -p "$cache/faceoff" 2>/dev/null || [ ! -w "$cache/faceoff" ]; then
         cache=/var/tmp/faceoff-$(id -u)
         mkdir -p -m 700 "$cache"
-        # Everybody may make folders there, and what is in this one is started.
+        # All users can create folders there, and programs in this one are executed, so it must be the user's own.
         [ ! -L "$cache" ] && [ -O "$cache" ] || fail "$cache is another user's; remove it"
     fi
-    # By what it is made of: clones with the same runtime share it, and none makes another's anew while that one's tests run.
-    made_of=$(cd "$repository/docker" && cat runtime.sh python3-ml/requirements.txt python3-ml/faceoff_threads.py | sha256sum)
-    folder=$cache/faceoff/runtimes-$(printf '%.16s' "$made_of")
+    # The name is a hash of the sources. So clones with the same sources share a runtime, and other clones do not replace it while tests run.
+    hash=$(cd "$repository/docker" && cat runtime.sh python3-ml/requirements.txt python3-ml/faceoff_threads.py | sha256sum)
+    folder=$cache/faceoff/runtimes-$(printf '%.16s' "$hash")
 fi
 "$repository/docker/runtime.sh" "$folder/python3-ml" >&2
 echo "$folder"

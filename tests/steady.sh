@@ -1,14 +1,14 @@
 #!/bin/sh
-# Do the verdicts hold, round after round, on an idle machine and on a busy one?
+# Checks that tests pass reliably, on an idle and on a busy machine.
 #
 #   tests/steady.sh        or `make steady`, which installs what it needs
 #
-# Builds the tests once and runs them IDLE times (10) by themselves and BUSY times (3) beside
+# Builds the tests once. Runs them IDLE times (10) alone, and BUSY times (3) beside
 #     stress-ng --cpu 4 --vm 2 --vm-bytes 25%
-# without building again. Each finished round is a line of steady/VERSION/rounds.tsv below the target
-# folder, its whole output a file beside it; a run that was interrupted goes on after the last line.
-# For another set of rounds of the same version, remove that folder. Ends with a table of all rounds,
-# and with status 1 if a test failed in any of them.
+# without building again. Each finished round adds a line to steady/VERSION/rounds.tsv in the target
+# folder, and a file with its output. An interrupted run continues after the last line. To repeat all
+# rounds of the same version, remove that folder. Prints a table of all rounds at the end. The status is
+# 1 if a test failed in any round.
 set -eu
 
 cd "$(dirname "$0")/.."
@@ -27,23 +27,23 @@ for tool in cargo-nextest stress-ng python3; do
     }
 done
 
-# All programs first, as in `make test`; then what nextest needs to run them without cargo.
+# Builds all programs first, as `make test` does, and then the metadata with which nextest runs them without cargo.
 cargo build --locked --workspace --bins --tests
 cargo metadata --locked --format-version 1 >"$log/metadata.json"
 cargo nextest list --locked --workspace --list-type binaries-only --message-format json >"$log/binaries.json"
 
 load=''
-unload() {
+stop_load() {
     [ -z "$load" ] || kill "$load" 2>/dev/null || true
     [ -z "$load" ] || wait "$load" 2>/dev/null || true
     load=''
 }
-trap unload EXIT
+trap stop_load EXIT
 trap 'exit 130' INT TERM
 
-play() { # play ROUND LOAD
+run_round() { # run_round ROUND LOAD
     out="$log/round-$1.log"
-    begun=$(date +%s)
+    started=$(date +%s)
     python3 agents/test_agents.py >"$out" 2>&1 && failed='' || failed=' agents/test_agents.py'
     cargo nextest run --cargo-metadata "$log/metadata.json" --binaries-metadata "$log/binaries.json" \
         --no-fail-fast --color never --status-level fail --final-status-level fail >>"$out" 2>&1 || {
@@ -52,7 +52,7 @@ play() { # play ROUND LOAD
         failed="$failed ${names:-nextest}"
     }
     passed=$(sed -nE 's/^ *Summary .* ([0-9]+) passed.*/\1/p' "$out" | tail -n 1)
-    printf '%s\t%s\t%s\t%s\t%s\n' "$1" "$2" "${passed:-0}" "$(($(date +%s) - begun))" "${failed:- -}" >>"$rounds"
+    printf '%s\t%s\t%s\t%s\t%s\n' "$1" "$2" "${passed:-0}" "$(($(date +%s) - started))" "${failed:- -}" >>"$rounds"
     tail -n 1 "$rounds"
 }
 
@@ -63,12 +63,12 @@ while [ "$round" -lt $((idle + busy)) ]; do
         continue
     fi
     if [ "$round" -le "$idle" ]; then
-        play "$round" idle
+        run_round "$round" idle
     else
         stress-ng --cpu 4 --vm 2 --vm-bytes 25% --quiet &
         load=$!
-        play "$round" busy
-        unload
+        run_round "$round" busy
+        stop_load
     fi
 done
 

@@ -1,4 +1,5 @@
-//! Packs the texts that the program carries: documents, styles and scripts, drawings. A release program has 0.9 MB of 40 less for it.
+//! Compresses the text files that the program embeds: documents, styles, scripts and drawings. It makes a release program of
+//! 40 MB smaller by 0.9 MB.
 
 use flate2::{Compression, write::GzEncoder};
 use std::{
@@ -9,7 +10,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-/// Folders of the repository, and what ends the names of the texts in them.
+/// Folders of the repository with the file extensions of the texts in them.
 const TEXTS: [(&str, &[&str]); 3] = [
     ("docs", &["md", "svg"]),
     ("web/static", &["css", "js", "svg"]),
@@ -17,33 +18,33 @@ const TEXTS: [(&str, &[&str]); 3] = [
 ];
 
 fn main() -> Result<(), Box<dyn Error>> {
-    // Build scripts run in their package's folder.
+    // Build scripts run in the folder of their package.
     let repository = Path::new("../..");
-    let out = PathBuf::from(env::var("OUT_DIR")?).join("packed");
-    for (folder, endings) in TEXTS {
+    let out = PathBuf::from(env::var("OUT_DIR")?).join("compressed");
+    for (folder, extensions) in TEXTS {
         println!("cargo:rerun-if-changed=../../{folder}");
-        pack(&repository.join(folder), &out.join(folder), endings)?;
+        compress_folder(&repository.join(folder), &out.join(folder), extensions)?;
     }
     Ok(())
 }
 
-/// Packs each text in `from`, and in the folders within, to the same name and `.gz` in `to`.
-fn pack(from: &Path, to: &Path, endings: &[&str]) -> Result<(), Box<dyn Error>> {
+/// Compresses each text below `from` to the same path with the suffix `.gz` below `to`.
+fn compress_folder(from: &Path, to: &Path, extensions: &[&str]) -> Result<(), Box<dyn Error>> {
     fs::create_dir_all(to)?;
     for entry in fs::read_dir(from)? {
         let path = entry?.path();
-        let name = path.file_name().ok_or("an entry has a name")?;
+        let name = path.file_name().ok_or("directory entry without a name")?;
         if path.is_dir() {
-            pack(&path, &to.join(name), endings)?;
-        } else if endings
+            compress_folder(&path, &to.join(name), extensions)?;
+        } else if extensions
             .iter()
-            .any(|ending| path.extension().is_some_and(|found| found == *ending))
+            .any(|extension| path.extension().is_some_and(|found| found == *extension))
         {
-            let mut packed = GzEncoder::new(Vec::new(), Compression::best());
-            packed.write_all(&fs::read(&path)?)?;
+            let mut encoder = GzEncoder::new(Vec::new(), Compression::best());
+            encoder.write_all(&fs::read(&path)?)?;
             let mut name = name.to_owned();
             name.push(".gz");
-            fs::write(to.join(name), packed.finish()?)?;
+            fs::write(to.join(name), encoder.finish()?)?;
         }
     }
     Ok(())

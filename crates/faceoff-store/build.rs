@@ -1,5 +1,5 @@
-//! Migrations and offline query data are embedded by macros, which notice a changed file but not a
-//! new one.
+//! Rebuilds the crate when a migration or offline query data is added: the macros that embed them only
+//! notice changed files.
 
 fn main() {
     println!("cargo:rerun-if-changed=../../migrations");

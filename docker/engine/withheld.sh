@@ -35,7 +35,7 @@ told 'by default' 1 "$no_groups" 'MISSING +namespaces .*namespace' 'in Docker: .
 # shellcheck disable=SC2086 # words on purpose
 doctor_in $confined
 told 'with our seccomp profile and a masked /proc' 1 "$no_groups" "MISSING +namespaces .*mount proc" \
-    '-> have a /proc without masked files, .*systempaths=unconfined'
+    '-> provide a /proc without masked files, .*systempaths=unconfined'
 # shellcheck disable=SC2086
 doctor_in $confined --security-opt systempaths=unconfined
 told 'with our seccomp profile and a whole /proc' 1 "$no_groups" 'ok +namespaces' 'ok +seccomp' 'MISSING +cgroup-memory' \

@@ -1,4 +1,4 @@
-"""Reports in how many ways an agent may count its CPUs, and what each says."""
+"""Reports the number of CPUs by each way in which an agent can count them."""
 import json
 import os
 

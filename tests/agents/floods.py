@@ -1,4 +1,4 @@
-"""Writes without end: `stdout` or `stderr` lines, an `endless` line, or `both` at once."""
+"""Writes endlessly: lines to `stdout` or `stderr`, an `endless` line, or to `both` at once."""
 import os
 import sys
 import threading

@@ -1,4 +1,4 @@
-"""Makes timers that expire at one instant until no more are given, and reports how many."""
+"""Makes timers that expire at one instant until the limit is reached, and reports their number."""
 import ctypes
 import errno
 import json

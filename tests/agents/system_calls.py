@@ -73,13 +73,13 @@ def call(number, *arguments):
     return "ok" if result != -1 else errno.errorcode[ctypes.get_errno()]
 
 
-def untie():
-    """Asks not to be ended with its parent, and returns the signal that would still come."""
-    left = ctypes.c_int(-1)
+def reset_parent_death_signal():
+    """Resets the signal at the parent's death, and returns the signal that is still set."""
+    signal_left = ctypes.c_int(-1)
     libc.prctl(1, 0)
-    libc.prctl(2, ctypes.byref(left))
-    return str(left.value)
+    libc.prctl(2, ctypes.byref(signal_left))
+    return str(signal_left.value)
 
 
 answers = {name: call(*arguments) for name, arguments in calls.items()}
-print(json.dumps({**answers, "parent_death_signal": untie()}), flush=True)
+print(json.dumps({**answers, "parent_death_signal": reset_parent_death_signal()}), flush=True)

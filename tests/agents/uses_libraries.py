@@ -1,4 +1,4 @@
-"""Uses Python's libraries as ordinary agents do, and reports `ok` for each, or what went wrong."""
+"""Uses Python's libraries as ordinary agents do, and reports `ok` or the error for each."""
 import asyncio
 import concurrent.futures
 import ctypes
@@ -58,8 +58,8 @@ def in_another_process():
         write = "import sqlite3, sys\nc = sqlite3.connect(sys.argv[1], timeout=60)\nwith c: c.execute('insert into t values (1)')"
         command = [sys.executable, "-c", write, path]
         writers = [subprocess.Popen(command, stderr=subprocess.PIPE, text=True) for _ in range(3)]
-        told = [writer.communicate()[1] for writer in writers]
-        assert [writer.returncode for writer in writers] == [0, 0, 0], told
+        errors = [writer.communicate()[1] for writer in writers]
+        assert [writer.returncode for writer in writers] == [0, 0, 0], errors
         with sqlite3.connect(path) as one:
             assert one.execute("select count(*) from t").fetchone() == (3,)
         one.close()
@@ -86,9 +86,9 @@ def spawned():
 def shared():
     block = multiprocessing.shared_memory.SharedMemory(create=True, size=1 << 20)
     block.buf[5] = 42
-    again = multiprocessing.shared_memory.SharedMemory(block.name)
-    assert again.buf[5] == 42
-    again.close(), block.close(), block.unlink()
+    second = multiprocessing.shared_memory.SharedMemory(block.name)
+    assert second.buf[5] == 42
+    second.close(), block.close(), block.unlink()
     with multiprocessing.Manager() as manager:
         numbers = manager.list([1, 2])
         numbers.append(3)
@@ -201,7 +201,7 @@ if __name__ == "__main__":
         try:
             task()
             found[task.__name__] = "ok"
-        except Exception as error:  # noqa: BLE001, whatever it is is to be told
+        except Exception as error:  # noqa: BLE001, each error is reported
             found[task.__name__] = f"{type(error).__name__}: {error}"
     completed = subprocess.run(["/bin/sh", "-c", "echo hello"], capture_output=True, text=True, check=True)
     found["subprocess"] = "ok" if completed.stdout == "hello\n" else completed.stdout

@@ -8,15 +8,15 @@ from server import Server
 
 @pytest.fixture(scope="session")
 def server(tmp_path_factory):
-    """For what changes nothing that another test looks at."""
+    """A server that tests share: they do not change what other tests check."""
     running = Server(tmp_path_factory.mktemp("server"))
     yield running
-    running.end()
+    running.stop()
 
 
 @pytest.fixture(scope="session")
 def document(server, tmp_path_factory) -> Path:
-    """The document as the server tells it."""
+    """The OpenAPI document that the server returns."""
     file = tmp_path_factory.mktemp("document") / "openapi.json"
     file.write_text(json.dumps(httpx.get(f"{server.api}/openapi.json").json()))
     return file

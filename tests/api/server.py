@@ -1,4 +1,4 @@
-"""A real `faceoff serve`, and a season on it with one of everything that a path can name."""
+"""A real `faceoff serve`, and a season with one resource of every kind that a path can name."""
 
 import io
 import json
@@ -13,7 +13,7 @@ import httpx
 
 HOLD = Path(__file__).resolve().parents[2] / "agents" / "hold"
 
-# Two episodes are a dataset. A debug build is slow, so no agent is held to its time.
+# Two episodes are enough for a dataset. A debug build is slow, so time limits are long.
 CONFIG = """
 [rates]
 token_per_s = 0
@@ -38,24 +38,24 @@ resets_extra_s = 3600.0
 """
 
 
-def packed(folder: Path = HOLD) -> bytes:
-    """A bundle's folder as `.tar.gz`."""
-    made = io.BytesIO()
-    with tarfile.open(fileobj=made, mode="w:gz") as archive:
+def pack_bundle(folder: Path = HOLD) -> bytes:
+    """The folder of a bundle as `.tar.gz`."""
+    buffer = io.BytesIO()
+    with tarfile.open(fileobj=buffer, mode="w:gz") as archive:
         for file in sorted(folder.iterdir()):
             archive.add(file, file.name)
-    return made.getvalue()
+    return buffer.getvalue()
 
 
-def poll(look, is_reached):
-    """Looks until what must come has come; whatever is waited for ends by itself, however slow the machine."""
-    while not is_reached(seen := look()):
+def poll(read, is_reached):
+    """Reads until the condition is met. There is no time limit, since the machine may be slow."""
+    while not is_reached(value := read()):
         time.sleep(0.1)
-    return seen
+    return value
 
 
 class Server:
-    """The server as a child process, and who it knows."""
+    """The server as a child process, with the organiser's token."""
 
     def __init__(self, folder: Path):
         config = folder / "faceoff.toml"
@@ -64,28 +64,28 @@ class Server:
         data = folder / "data"
         command = [os.environ["FACEOFF_BIN"], "serve", "--config", str(config), "--data-dir", str(data)]
         self._process = subprocess.Popen(command, cwd=folder, stdout=subprocess.PIPE, stderr=self._log, text=True)
-        # The only line on its standard output is its address; none comes if it ends before.
+        # The only line on its standard output is its address. It is missing if the server ends before.
         self.url = self._process.stdout.readline().strip()
         if not self.url:
             raise RuntimeError((folder / "server.log").read_text())
         self.api = f"{self.url}/api/v1"
         self.organiser = (data / "admin-token").read_text().strip()
 
-    def ask(self, method: str, path: str, token: str | None = None, **request) -> httpx.Response:
-        """A request that is as it should be."""
+    def request(self, method: str, path: str, token: str | None = None, **options) -> httpx.Response:
+        """A request that must succeed."""
         headers = {"Authorization": f"Bearer {token}"} if token else {}
-        headers.update(request.pop("headers", {}))
-        answer = httpx.request(method, self.api + path, headers=headers, timeout=None, **request)
-        assert answer.is_success, f"{method} {path}: {answer.status_code} {answer.text}"
-        return answer
+        headers.update(options.pop("headers", {}))
+        response = httpx.request(method, self.api + path, headers=headers, timeout=None, **options)
+        assert response.is_success, f"{method} {path}: {response.status_code} {response.text}"
+        return response
 
     def create_team(self, name: str) -> tuple[str, str]:
-        """A team's id and token."""
-        made = self.ask("POST", "/teams", self.organiser, json={"name": name}).json()
-        return made["id"], made["token"]
+        """Creates a team. Returns its id and token."""
+        team = self.request("POST", "/teams", self.organiser, json={"name": name}).json()
+        return team["id"], team["token"]
 
-    def end(self) -> None:
-        """Kills it: what it holds is thrown away."""
+    def stop(self) -> None:
+        """Kills the server; its data is not needed any more."""
         self._process.kill()
         self._process.wait()
         self._process.stdout.close()
@@ -94,52 +94,52 @@ class Server:
 
 @dataclass
 class Season:
-    """Who may ask, and what there is to ask for."""
+    """Tokens by role, and ids of resources."""
 
     server: Server
-    # What `{id}` may be, by the resource that the path begins with.
+    # Values of `{id}` in paths, by the first part of the path.
     ids: dict[str, list[str]] = field(default_factory=dict)
     tokens: dict[str, str | None] = field(default_factory=dict)
 
 
-def play(server: Server) -> Season:
-    """A season in which a team has uploaded, a day was played, and a tournament has a game in the queue."""
+def create_season(server: Server) -> Season:
+    """A season with submissions, a finished day, and a tournament with a queued game."""
     alpha, alpha_token = server.create_team("Alpha")
     beta, beta_token = server.create_team("Beta")
     organiser = server.organiser
 
     def upload(token: str) -> dict:
         archive = {"Content-Type": "application/octet-stream"}
-        sent = server.ask("POST", "/submissions", token, content=packed(), headers=archive).json()
-        path = f"/submissions/{sent['id']}"
-        seen = poll(lambda: server.ask("GET", path, token).json(), lambda seen: seen["state"] != "validating")
-        assert seen["state"] == "valid", json.dumps(seen, indent=2)
-        return seen
+        submission = server.request("POST", "/submissions", token, content=pack_bundle(), headers=archive).json()
+        path = f"/submissions/{submission['id']}"
+        submission = poll(lambda: server.request("GET", path, token).json(), lambda view: view["state"] != "validating")
+        assert submission["state"] == "valid", json.dumps(submission, indent=2)
+        return submission
 
     submissions = [upload(alpha_token), upload(beta_token)]
-    server.ask("POST", "/days", organiser)
+    server.request("POST", "/days", organiser)
     evaluations = poll(
-        lambda: server.ask("GET", "/evaluations", organiser).json(),
-        lambda seen: len(seen) == 2 and all("finished_at" in one for one in seen),
+        lambda: server.request("GET", "/evaluations", organiser).json(),
+        lambda views: len(views) == 2 and all("finished_at" in one for one in views),
     )
     assert all(one["state"] == "finished" for one in evaluations), json.dumps(evaluations, indent=2)
-    # What is ordered from now on stays as it is, so that no answer depends on how far the slot has come.
-    server.ask("POST", "/queue/pause", organiser, json={"reason": "Everything is tried."})
-    server.ask("PATCH", "/season", organiser, json={"takes_registrations": True, "divisions": ["Open"]})
-    registered = {"team": {"name": "Gamma"}, "contact": "gamma@example.org"}
-    registration = server.ask("POST", "/registrations", json=registered).json()
-    invited = {"role": "member", "team": alpha, "note": "Ada"}
-    invitations = [server.ask("POST", "/invitations", organiser, json=invited).json() for _ in range(2)]
-    joins = {"code": invitations[0]["code"], "name": "Ada"}
-    ada = server.ask("POST", "/invitations/accept", json=joins).json()
+    # Jobs that are created from now on stay queued, so that no response depends on the progress of the slot.
+    server.request("POST", "/queue/pause", organiser, json={"reason": "All operations are tested."})
+    server.request("PATCH", "/season", organiser, json={"takes_registrations": True, "divisions": ["Open"]})
+    registration = {"team": {"name": "Gamma"}, "contact": "gamma@example.org"}
+    registration = server.request("POST", "/registrations", json=registration).json()
+    invitation = {"role": "member", "team": alpha, "note": "Ada"}
+    invitations = [server.request("POST", "/invitations", organiser, json=invitation).json() for _ in range(2)]
+    acceptance = {"code": invitations[0]["code"], "name": "Ada"}
+    ada = server.request("POST", "/invitations/accept", json=acceptance).json()
     cup = {"name": "Cup", "teams": ["Alpha", "Beta"], "rules": {"steps": 500}}
-    tournament = server.ask("POST", "/tournaments", organiser, json=cup).json()
+    tournament = server.request("POST", "/tournaments", organiser, json=cup).json()
     path = f"/tournaments/{tournament['id']}/friendly-games"
-    game = server.ask("POST", path, alpha_token, json={"opponent": "Beta"}).json()
-    question = server.ask("POST", "/questions", alpha_token, json={"text": "When is the final?"}).json()
-    own = server.ask("POST", "/tokens", organiser, json={"name": "spare"}).json()
-    stages = server.ask("GET", "/stages").json()
-    found = {
+    game = server.request("POST", path, alpha_token, json={"opponent": "Beta"}).json()
+    question = server.request("POST", "/questions", alpha_token, json={"text": "When is the final?"}).json()
+    spare_token = server.request("POST", "/tokens", organiser, json={"name": "spare"}).json()
+    stages = server.request("GET", "/stages").json()
+    ids = {
         "teams": [alpha, beta],
         "submissions": [one["id"] for one in submissions],
         "evaluations": [one["id"] for one in evaluations],
@@ -149,8 +149,8 @@ def play(server: Server) -> Season:
         "tournaments": [tournament["id"]],
         "games": [game["id"]],
         "questions": [question["id"]],
-        "tokens": [own["id"]],
+        "tokens": [spare_token["id"]],
         "people": [ada["person"]["id"]],
     }
     tokens = {"visitor": None, "team": ada["secret"], "organiser": organiser}
-    return Season(server, found, tokens)
+    return Season(server, ids, tokens)

@@ -1,7 +1,7 @@
-"""Every operation, asked as visitor, team and organiser for what the document says and for what it does not.
+"""Every operation as visitor, team and organiser, with valid and invalid input.
 
-No answer is a server's failure, has a status or a body that the document does not tell, or takes what it says is wrong.
-Event streams have no end, so they are tried by the tests of the crate. Inputs follow from a fixed seed.
+Fails on server errors, on statuses and bodies that are not documented, and on invalid input that is accepted. Event streams
+have no end, so the crate's own tests cover them. Inputs are generated from a fixed seed.
 """
 
 import json
@@ -11,18 +11,17 @@ import sys
 from pathlib import Path
 
 import pytest
-from server import Server, play
+from server import Server, create_season
 
 HERE = Path(__file__).resolve().parent
-# As many inputs as fit into a minute, the same ones each time. For an answer it waits so long that only a dead machine
-# takes it.
+# As many inputs as fit into a minute, the same ones each time. The time limit is so long that no working machine reaches it.
 OPTIONS = (
     "--phases examples,coverage,fuzzing --max-examples 10 --seed 1 --generation-database none --workers 1 "
     "--request-timeout 1800 --continue-on-failure --suppress-health-check all --no-color"
 )
-# What can end the token that it is asked with.
-LOSING = ["end_session", "rotate_token", "revoke_token"]
-# Streams of events have no end.
+# Operations that can end the token of the request.
+TOKEN_ENDING = ["end_session", "rotate_token", "revoke_token"]
+# Event streams have no end.
 ENDLESS = ["watch_game", "follow_events"]
 CHECKS = [
     "not_a_server_error",
@@ -37,11 +36,11 @@ CHECKS = [
 
 
 @pytest.mark.parametrize("role", ["visitor", "team", "organiser"])
-def test_every_operation_answers_as_the_document_says(role, tmp_path, document):
+def test_operations_conform_to_the_document(role, tmp_path, document):
     server = Server(tmp_path)
     try:
-        season = play(server)
-        told = json.loads(document.read_text())
+        season = create_season(server)
+        content = json.loads(document.read_text())
         token = season.tokens[role]
         environment = {
             **os.environ,
@@ -49,26 +48,26 @@ def test_every_operation_answers_as_the_document_says(role, tmp_path, document):
             "PYTHONPATH": str(HERE),
             "API_URL": server.api,
             "API_IDS": json.dumps(season.ids),
-            "API_LOSING": json.dumps(LOSING),
+            "API_TOKEN_ENDING": json.dumps(TOKEN_ENDING),
             "API_ARCHIVE_TYPES": json.dumps(
-                list(told["paths"]["/api/v1/submissions"]["post"]["requestBody"]["content"])
+                list(content["paths"]["/api/v1/submissions"]["post"]["requestBody"]["content"])
             ),
         }
         if token is not None:
             environment["API_TOKEN"] = token
-        # Each case of those that end tokens needs one of its own, which others could have used up.
-        of_all = [
-            [f"--include-operation-id={name}" for name in LOSING],
-            [f"--exclude-operation-id={name}" for name in LOSING + ENDLESS],
+        # Each case of an operation that ends tokens needs a new token, so these run separately.
+        selections = [
+            [f"--include-operation-id={name}" for name in TOKEN_ENDING],
+            [f"--exclude-operation-id={name}" for name in TOKEN_ENDING + ENDLESS],
         ]
-        for which in of_all:
+        for selection in selections:
             command = [sys.executable, "-m", "schemathesis.cli", "run", f"{server.api}/openapi.json"]
-            command += [*OPTIONS.split(), "--checks", ",".join(CHECKS), *which]
+            command += [*OPTIONS.split(), "--checks", ",".join(CHECKS), *selection]
             ran = subprocess.run(command, check=False, cwd=tmp_path, env=environment, capture_output=True, text=True)
             assert ran.returncode == 0, ran.stdout + ran.stderr
             print(ran.stdout)
         if token is not None:
-            # None of it was asked with a token that had meanwhile become worth nothing.
-            server.ask("GET", "/whoami", token)
+            # The token must still be valid, so all requests were authenticated.
+            server.request("GET", "/whoami", token)
     finally:
-        server.end()
+        server.stop()

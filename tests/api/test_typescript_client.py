@@ -1,4 +1,4 @@
-"""openapi-typescript and openapi-fetch make a client that type-checks, uploads, follows and downloads."""
+"""The client of openapi-typescript and openapi-fetch type-checks, and can upload, poll and download."""
 
 import json
 import os
@@ -6,20 +6,20 @@ import shutil
 import subprocess
 from pathlib import Path
 
-from server import packed
+from server import pack_bundle
 
 HERE = Path(__file__).resolve().parent
-# Where the packages are installed: sources and what is made of them go beside these.
+# The folder with the installed packages: sources and compiled files go there, too.
 FOLDER = Path(os.environ["API_TYPESCRIPT"])
 
 
 def run(*command: object) -> str:
-    ran = subprocess.run([str(part) for part in command], check=False, cwd=FOLDER, capture_output=True, text=True)
-    assert ran.returncode == 0, ran.stdout + ran.stderr
-    return ran.stdout
+    result = subprocess.run([str(part) for part in command], check=False, cwd=FOLDER, capture_output=True, text=True)
+    assert result.returncode == 0, result.stdout + result.stderr
+    return result.stdout
 
 
-def test_a_generated_client_uploads_follows_and_downloads(server, document, tmp_path):
+def test_generated_client_uploads_polls_and_downloads(server, document, tmp_path):
     for name in ["follow.ts", "tsconfig.json"]:
         shutil.copy(HERE / "typescript" / name, FOLDER / name)
     programs = FOLDER / "node_modules" / ".bin"
@@ -29,8 +29,8 @@ def test_a_generated_client_uploads_follows_and_downloads(server, document, tmp_
 
     _, token = server.create_team("TypeScript")
     sent, downloaded = tmp_path / "hold.tar.gz", tmp_path / "downloaded"
-    sent.write_bytes(packed())
-    seen = json.loads(run("node", "out/follow.js", server.url, token, sent, downloaded))
-    assert seen["state"] == "valid", seen
-    assert seen["file_name"] == "hold.tar.gz"
+    sent.write_bytes(pack_bundle())
+    submission = json.loads(run("node", "out/follow.js", server.url, token, sent, downloaded))
+    assert submission["state"] == "valid", submission
+    assert submission["file_name"] == "hold.tar.gz"
     assert downloaded.read_bytes() == sent.read_bytes()

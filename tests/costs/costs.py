@@ -1,17 +1,17 @@
-"""What building and testing cost: `make costs` measures it from fresh clones of HEAD and prints a table in Markdown.
+"""Measures the time and size of builds and tests: `make costs` uses fresh clones of HEAD and prints a Markdown table.
 
     python3 tests/costs/costs.py [--only demo,test,page,store,release,crates,lines] [--rounds N] [--json FILE]
 
-demo     make demo, until its board is there
-test     make test, and its steps
-page     a changed line in a page, and one in a page's template, until their test has run
-store    the same of the store
-release  the release program: its build, its size and its sections
-crates   what each crate takes in the compiler, in whatever of demo, page, store and release is measured (otherwise in release)
+demo     make demo, until the board is available
+test     make test, with its steps
+page     from a changed line in a page, or in a page's template, until its test has run
+store    the same for a line in the store
+release  the release program: build time, size and sections
+crates   compile time of each crate, in the measured builds of demo, page, store and release (of release if there are none)
 lines    lines of Rust by crate, profile overrides, dependencies
 
-Nothing else should run: the figures are the machine's. Nothing is asserted here; docker/check-program.sh checks the release's bounds.
-Progress and errors go to standard error; the status is 1 if something could not be measured, or `make test` has failed.
+Run nothing else meanwhile. The program checks no limits; docker/check-program.sh checks those of the release. Progress and errors go
+to standard error. The status is 1 if a measurement or `make test` failed.
 """
 
 import argparse
@@ -35,13 +35,13 @@ PARTS = ("demo", "test", "page", "store", "release", "crates", "lines")
 def arguments() -> argparse.Namespace:
     head, _, rest = (__doc__ or "").partition("\n\n")
     parser = argparse.ArgumentParser(description=head, epilog=rest, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--only", default="", metavar="PARTS", help=f"of {','.join(PARTS)}; all if left out")
-    parser.add_argument("--rounds", type=int, default=1, help="how often demo, test and release are measured, each in a fresh clone")
-    parser.add_argument("--commit", default="HEAD", help="what is measured: a commit of this repository")
-    parser.add_argument("--json", type=Path, metavar="FILE", help="write the numbers there, too")
-    parser.add_argument("--folder", type=Path, help="where clones and targets are made; TMPDIR or the target folder if left out")
-    parser.add_argument("--downloads", action="store_true", help="with an empty CARGO_HOME each time, so that downloads count")
-    parser.add_argument("--keep", action="store_true", help="leave clones and targets where they are")
+    parser.add_argument("--only", default="", metavar="PARTS", help=f"parts to measure, of {','.join(PARTS)}; default: all")
+    parser.add_argument("--rounds", type=int, default=1, help="number of measurements of demo, test and release, each in a fresh clone")
+    parser.add_argument("--commit", default="HEAD", help="commit of this repository to measure")
+    parser.add_argument("--json", type=Path, metavar="FILE", help="also write the numbers to this file")
+    parser.add_argument("--folder", type=Path, help="folder for clones and targets; default: TMPDIR or the target folder")
+    parser.add_argument("--downloads", action="store_true", help="use an empty CARGO_HOME, so that downloads are included")
+    parser.add_argument("--keep", action="store_true", help="do not remove clones and targets")
     return parser.parse_args()
 
 
@@ -53,7 +53,7 @@ def parse_parts(only: str) -> set[str]:
 
 
 def field_of(file: str, name: str) -> str:
-    """The first value of a file in /proc."""
+    """The first value with this name in a file of /proc."""
     values = (line.split(":", 1)[1] for line in Path(file).read_text().splitlines() if line.startswith(name) and ":" in line)
     return next(values, "unknown").strip()
 
@@ -63,7 +63,7 @@ def describe_machine(commit: str) -> str:
     memory = int(field_of("/proc/meminfo", "MemTotal").split()[0]) * 1024 / 1e9
     load = os.getloadavg()[0]
     if load > cpus / 4:
-        say(f"this machine is not idle: its load is {load:.1f}, and what else it does is measured, too")
+        say(f"this machine is not idle: its load is {load:.1f}, which affects the measurements")
     compiler = capture(["rustc", "--version"], REPOSITORY).split(" (")[0]
     return (
         f"{cpus} CPUs ({field_of('/proc/cpuinfo', 'model name')}), {memory:.0f} GB of memory, "
@@ -73,32 +73,32 @@ def describe_machine(commit: str) -> str:
 
 def resolve_commit(revision: str) -> str:
     if revision == "HEAD" and capture(["git", "status", "--porcelain", "--untracked-files=no"], REPOSITORY):
-        say("what is not committed is not measured")
+        say("uncommitted changes are not measured")
     return capture(["git", "rev-parse", "--verify", f"{revision}^{{commit}}"], REPOSITORY).strip()
 
 
 def plan(wanted: set[str]) -> list[Callable[[Measurement], None]]:
-    """The measurements that these parts need."""
-    found: list[Callable[[Measurement], None]] = []
+    """The measurements needed for these parts."""
+    steps: list[Callable[[Measurement], None]] = []
     if "lines" in wanted:
-        found.append(parts.lines)
+        steps.append(parts.lines)
     if "demo" in wanted:
-        found.append(parts.demo)
+        steps.append(parts.demo)
     if "release" in wanted or wanted & {"crates", "demo", "page", "store"} == {"crates"}:
-        found.append(parts.release)
+        steps.append(parts.release)
     if wanted & {"page", "store"}:
-        found.append(parts.changed_lines)
+        steps.append(parts.changed_lines)
     if "test" in wanted:
-        found.append(parts.test)
-    return found
+        steps.append(parts.test)
+    return steps
 
 
-def say(words: str) -> None:
-    print(f"costs: {words}", file=sys.stderr, flush=True)
+def say(text: str) -> None:
+    print(f"costs: {text}", file=sys.stderr, flush=True)
 
 
 def measure(measurement: Measurement) -> None:
-    """A measurement that fails leaves the others their figures."""
+    """Runs all measurements. If one fails, the others are still reported."""
     for step in plan(measurement.wanted):
         try:
             step(measurement)
@@ -119,9 +119,9 @@ def prepare(options: argparse.Namespace, folder: Path) -> Measurement:
 
 def main() -> int:
     options = arguments()
-    above = options.folder or default_folder()
-    above.mkdir(parents=True, exist_ok=True)
-    folder = Path(tempfile.mkdtemp(prefix="costs-", dir=above.resolve()))
+    parent = options.folder or default_folder()
+    parent.mkdir(parents=True, exist_ok=True)
+    folder = Path(tempfile.mkdtemp(prefix="costs-", dir=parent.resolve()))
     failures: list[str] = []
     try:
         measurement = prepare(options, folder)
@@ -134,7 +134,7 @@ def main() -> int:
         say(f"error: {failed}")
         return 1
     finally:
-        # The logs stay if they are needed.
+        # Keep the logs if there are failures.
         if not failures and not options.keep:
             shutil.rmtree(folder, ignore_errors=True)
     for failure in failures:

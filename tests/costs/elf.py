@@ -1,4 +1,4 @@
-"""The sections of a program: what its bytes are."""
+"""The sections of a program and their sizes."""
 
 import struct
 from dataclasses import dataclass
@@ -16,15 +16,15 @@ class Section:
 
 
 def sections(program: Path) -> list[Section]:
-    """The sections that take space in the file, the largest first. ELF of 64 bits, little-endian."""
+    """The sections with content in the file, the largest first. For 64-bit little-endian ELF."""
     data = program.read_bytes()
     if data[:6] != b"\x7fELF\x02\x01":
-        raise Failed(f"{program} is no ELF program of 64 bits, little-endian: its sections cannot be read here")
+        raise Failed(f"{program} is no ELF program of 64 bits, little-endian: its sections cannot be read")
     (table,) = struct.unpack_from("<Q", data, 0x28)
-    size, count, of_names = struct.unpack_from("<HHH", data, 0x3A)
+    size, count, name_index = struct.unpack_from("<HHH", data, 0x3A)
     # name, type, flags, address, offset, size
     headers = [struct.unpack_from("<IIQQQQ", data, table + k * size) for k in range(count)]
-    names_at = headers[of_names][4] if headers else 0
+    names_at = headers[name_index][4] if headers else 0
     found = []
     for name, kind, _, _, _, bytes_ in headers:
         start = names_at + name
@@ -34,6 +34,6 @@ def sections(program: Path) -> list[Section]:
     return sorted(found, key=lambda section: -section.bytes)
 
 
-def for_debuggers(found: list[Section]) -> list[str]:
-    """What a stripped program does not have."""
+def debug_sections(found: list[Section]) -> list[str]:
+    """The names of sections that a stripped program does not have."""
     return sorted(section.name for section in found if section.name.startswith((".symtab", ".debug_", ".zdebug_")))

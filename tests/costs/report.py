@@ -1,15 +1,15 @@
-"""What was measured, as Markdown for docs/contributing/building.md and as JSON."""
+"""The measurements, as Markdown for docs/contributing/building.md and as JSON."""
 
 import statistics
 from dataclasses import asdict, dataclass, field
 
 from runs import Step
 from sources import Lines
-from units import Crate, Unit, by_crate, others
+from units import Crate, Unit, by_crate, total
 
-DEAREST = 25
-# Steps that take less are not worth a line.
-LEAST_STEP_S = 1.0
+MAX_CRATES = 25
+# Shorter steps are not listed.
+MIN_STEP_S = 1.0
 
 
 @dataclass(frozen=True)
@@ -21,7 +21,7 @@ class Row:
     how: str
 
     def text(self) -> str:
-        """The median, and all of them if there are several."""
+        """The median, followed by all values if there are several."""
         text = number(statistics.median(self.values), self.unit)
         if len(self.values) > 1:
             text += " (" + ", ".join(number(value, self.unit).removesuffix(f" {self.unit}") for value in self.values) + ")"
@@ -32,9 +32,9 @@ class Row:
 class Report:
     machine: str
     rows: list[Row] = field(default_factory=list)
-    # By what was made: the steps of its recipes.
+    # The steps of the recipes, by make target.
     steps: dict[str, list[Step]] = field(default_factory=dict)
-    # By what was built: the units of cargo's report.
+    # The units of cargo's report, by build.
     units: dict[str, list[Unit]] = field(default_factory=dict)
     lines: list[Lines] = field(default_factory=list)
 
@@ -46,7 +46,7 @@ class Report:
         if self.rows:
             rows = [[row.what, row.text(), row.how] for row in self.rows]
             parts.append(table(["what", "measured", "how"], rows))
-        parts += [f"Steps of `{what}` of {LEAST_STEP_S:.0f} s and more:\n\n" + steps_table(steps) for what, steps in self.steps.items()]
+        parts += [f"Steps of `{what}` of {MIN_STEP_S:.0f} s and more:\n\n" + steps_table(steps) for what, steps in self.steps.items()]
         parts += [crates_section(what, by_crate(units)) for what, units in self.units.items()]
         if self.lines:
             parts.append("Lines of Rust:\n\n" + lines_table(self.lines))
@@ -63,7 +63,7 @@ class Report:
 
 
 def number(value: float, unit: str) -> str:
-    """Seconds to the tenth below ten, whole above; all else whole, with commas."""
+    """Seconds below ten with one decimal, all other numbers without; thousands are separated by commas."""
     if "s" in unit.split() and value < 10:
         return f"{value:.1f} {unit}"
     return f"{value:,.0f} {unit}".rstrip()
@@ -78,14 +78,14 @@ def table(head: list[str], rows: list[list[str]]) -> str:
 
 
 def steps_table(steps: list[Step]) -> str:
-    """Without the makes that a recipe calls: their steps are here themselves."""
-    shown = [step for step in steps if step.wall_s >= LEAST_STEP_S and "--no-print-directory" not in step.line]
-    began = min((step.began for step in steps), default=0.0)
+    """A table of all steps, without nested makes, whose own steps are listed."""
+    shown = [step for step in steps if step.wall_s >= MIN_STEP_S and "--no-print-directory" not in step.line]
+    start = min((step.began for step in steps), default=0.0)
     rows = [
         [
             f"`{step.target}`",
-            f"`{short(step.line)}`",
-            number(step.began - began, "s"),
+            f"`{shorten(step.line)}`",
+            number(step.began - start, "s"),
             number(step.wall_s, "s"),
             number(step.cpu_s, "s"),
             str(step.status),
@@ -95,21 +95,21 @@ def steps_table(steps: list[Step]) -> str:
     return table(["target", "command", "from", "time", "CPU", "status"], rows)
 
 
-def short(line: str, most: int = 60) -> str:
-    words = " ".join(line.replace("\\\n", " ").replace("`", "'").split())
-    return words if len(words) <= most else words[: most - 1] + "…"
+def shorten(line: str, max_length: int = 60) -> str:
+    text = " ".join(line.replace("\\\n", " ").replace("`", "'").split())
+    return text if len(text) <= max_length else text[: max_length - 1] + "…"
 
 
 def crates_section(what: str, crates: list[Crate]) -> str:
-    total = others(crates)
-    shown, rest = crates[:DEAREST], crates[DEAREST:]
+    all_crates = total(crates)
+    shown, rest = crates[:MAX_CRATES], crates[MAX_CRATES:]
     rows = [
         [crate.name, number(crate.total_s, "s"), number(crate.frontend_s, "s"), str(crate.units)]
-        for crate in shown + ([others(rest)] if rest else [])
+        for crate in shown + ([total(rest)] if rest else [])
     ]
     return (
-        f"`{what}`: {total.units} units, {total.total_s:,.0f} s in the compiler, {total.frontend_s:,.0f} s of them "
-        "before machine code is made (cargo does not say it of programs). Seconds by the clock, while other units run:\n\n"
+        f"`{what}`: {all_crates.units} units, {all_crates.total_s:,.0f} s in the compiler, {all_crates.frontend_s:,.0f} s of them "
+        "before code generation (cargo does not report it for programs). Wall-clock seconds, while other units run:\n\n"
         + table(["crate", "seconds", "of them front end", "units"], rows)
     )
 

@@ -1,4 +1,4 @@
-"""Lines, profile overrides and dependencies: counted without a compiler."""
+"""Counts lines, profile overrides and dependencies, without compiling."""
 
 import json
 import tomllib
@@ -12,13 +12,13 @@ from clone import capture
 @dataclass(frozen=True)
 class Lines:
     crate: str
-    # Of the library or program, with the tests inside of its files.
+    # Lines in `src`, including unit tests.
     source: int
-    # Of tests, benchmarks and examples beside it.
+    # Lines of tests, benchmarks and examples.
     tests: int
 
 
-def lines_of(files: list[Path]) -> int:
+def count_lines(files: list[Path]) -> int:
     return sum(len(file.read_text().splitlines()) for file in files)
 
 
@@ -30,18 +30,18 @@ def lines_by_crate(source: Path) -> list[Lines]:
         inner = [other for other in folders.values() if other != folder and folder in other.parents]
         own = [file for file in folder.rglob("*.rs") if not any(other in file.parents for other in inner)]
         in_source = [file for file in own if folder / "src" in file.parents]
-        found.append(Lines(name, lines_of(in_source), lines_of(own) - lines_of(in_source)))
+        found.append(Lines(name, count_lines(in_source), count_lines(own) - count_lines(in_source)))
     return found
 
 
 def overrides(manifest: Path) -> list[str]:
-    """Each table `profile.P.package.C` of a Cargo.toml."""
+    """All tables `profile.P.package.C` of a Cargo.toml."""
     profiles = tomllib.loads(manifest.read_text()).get("profile", {})
     return [f"profile.{name}.package.{package}" for name, profile in profiles.items() for package in profile.get("package", {})]
 
 
 def versions(tree: str) -> dict[str, set[str]]:
-    """Of the lines `name v1.2.3 …` of `cargo tree --prefix none`: which versions there are of each crate."""
+    """The versions of each crate, from the lines `name v1.2.3 …` of `cargo tree --prefix none`."""
     found: dict[str, set[str]] = defaultdict(set)
     for line in tree.splitlines():
         name, version, *_ = line.split() + ["", ""]
@@ -52,9 +52,9 @@ def versions(tree: str) -> dict[str, set[str]]:
 
 def graph(source: Path) -> dict[str, set[str]]:
     """All crates that are compiled on a machine like this one, for programs, tests and build scripts."""
-    words = ["cargo", "tree", "--locked", "--workspace", "--edges", "normal,build,dev", "--prefix", "none", "--format", "{p}"]
-    return versions(capture(words, source))
+    command = ["cargo", "tree", "--locked", "--workspace", "--edges", "normal,build,dev", "--prefix", "none", "--format", "{p}"]
+    return versions(capture(command, source))
 
 
-def in_several_versions(crates: dict[str, set[str]]) -> dict[str, set[str]]:
+def with_several_versions(crates: dict[str, set[str]]) -> dict[str, set[str]]:
     return {name: found for name, found in crates.items() if len(found) > 1}

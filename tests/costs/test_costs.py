@@ -1,4 +1,4 @@
-"""Measures a small project with a cargo and a rustc that compile nothing: python3 -m unittest."""
+"""Measures a small project with a fake cargo and rustc: python3 -m unittest."""
 
 import json
 import os
@@ -25,7 +25,7 @@ CARGO = """#!/bin/sh
 case $1 in
 build)
     mkdir -p "$CARGO_TARGET_DIR/cargo-timings" "$CARGO_TARGET_DIR/release"
-    cp "$PRETENDED/timings.html" "$CARGO_TARGET_DIR/cargo-timings/cargo-timing.html"
+    cp "$FAKES/timings.html" "$CARGO_TARGET_DIR/cargo-timings/cargo-timing.html"
     cp /bin/true "$CARGO_TARGET_DIR/release/faceoff" ;;
 nextest)
     echo "   Compiling faceoff-http v0.1.0"
@@ -59,18 +59,18 @@ UNITS = [
 ]
 
 
-def words(rows: list[dict]) -> dict[str, list[float]]:
+def values(rows: list[dict]) -> dict[str, list[float]]:
     return {row["what"]: row["values"] for row in rows}
 
 
 class Project(unittest.TestCase):
-    """A repository with these scripts, and what they look for in it."""
+    """A repository with these scripts, and with the files that they change."""
 
     def setUp(self) -> None:
         folder = tempfile.TemporaryDirectory(prefix="a folder with spaces ")
         self.addCleanup(folder.cleanup)
         self.folder = Path(folder.name)
-        self.repository, self.pretended = self.folder / "repository", self.folder / "pretended"
+        self.repository, self.fakes = self.folder / "repository", self.folder / "fakes"
         shutil.copytree(COSTS, self.repository / "tests/costs", ignore=shutil.ignore_patterns("__pycache__"))
         for change in (changes.PAGE, changes.TEMPLATE, changes.STORE):
             self.write(change.file, f"first\n{change.line}\nlast\n")
@@ -78,10 +78,10 @@ class Project(unittest.TestCase):
         self.write("Cargo.toml", '[profile.dev]\nopt-level = 1\n[profile.dev.package."*"]\ndebug = false\n')
         self.write("src/lib.rs", "one\ntwo\n")
         self.write("tests/it.rs", "one\n")
-        self.pretended.mkdir()
+        self.fakes.mkdir()
         self.script("cargo", CARGO)
         self.script("rustc", "#!/bin/sh\necho 'rustc 1.0.0 (an example)'\n")
-        (self.pretended / "timings.html").write_text(f"<script>\nconst UNIT_DATA = {json.dumps(UNITS)};\nconst OTHER = [];\n</script>")
+        (self.fakes / "timings.html").write_text(f"<script>\nconst UNIT_DATA = {json.dumps(UNITS)};\nconst OTHER = [];\n</script>")
         self.git("init", "--quiet")
         self.commit()
 
@@ -91,25 +91,25 @@ class Project(unittest.TestCase):
         file.write_text(text)
 
     def script(self, name: str, text: str) -> None:
-        (self.pretended / name).write_text(text)
-        (self.pretended / name).chmod(0o755)
+        (self.fakes / name).write_text(text)
+        (self.fakes / name).chmod(0o755)
 
-    def git(self, *words: str) -> None:
+    def git(self, *arguments: str) -> None:
         identity = ["-c", "user.name=test", "-c", "user.email=test@example.org", "-c", "commit.gpgsign=false"]
-        subprocess.run(["git", *identity, *words], cwd=self.repository, check=True)
+        subprocess.run(["git", *identity, *arguments], cwd=self.repository, check=True)
 
     def commit(self) -> None:
         self.git("add", "--all")
         self.git("commit", "--quiet", "--message", "test")
 
     def costs(self, *options: str) -> subprocess.CompletedProcess:
-        path = f"{self.pretended}{os.pathsep}{os.environ['PATH']}"
-        env = os.environ | {"PATH": path, "PRETENDED": str(self.pretended), "MAKEFLAGS": "-k --no-such-option", "CARGO_TARGET_DIR": ""}
+        path = f"{self.fakes}{os.pathsep}{os.environ['PATH']}"
+        env = os.environ | {"PATH": path, "FAKES": str(self.fakes), "MAKEFLAGS": "-k --no-such-option", "CARGO_TARGET_DIR": ""}
         command = [sys.executable, "-B", self.repository / "tests/costs/costs.py", "--folder", self.folder / "work", *options]
         return subprocess.run(command, env=env, capture_output=True, text=True, timeout=600)
 
     def measure(self, *options: str) -> dict:
-        """Of a run that succeeds: what it writes as JSON."""
+        """The JSON of a run, which must succeed."""
         done = self.costs("--json", str(self.folder / "costs.json"), *options)
         self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
         self.assertEqual(list((self.folder / "work").iterdir()), [], "clones, targets and logs are removed")
@@ -117,8 +117,8 @@ class Project(unittest.TestCase):
 
     def test_all_parts_are_measured(self) -> None:
         found = self.measure()
-        rows = words(found["rows"])
-        board, end = rows["`make demo`, until the board is there"][0], rows["`make demo`, to its end"][0]
+        rows = values(found["rows"])
+        board, end = rows["`make demo`, until the board is available"][0], rows["`make demo`, to its end"][0]
         self.assertGreaterEqual(board, 0.1)
         self.assertGreaterEqual(end, board)
         self.assertEqual(rows["`make test`, exit status"], [0])
@@ -134,12 +134,12 @@ class Project(unittest.TestCase):
         self.assertEqual(sorted(steps), ["first", "second", "test", "third"])
         self.assertGreaterEqual(steps["first"]["wall_s"], 0.1)
 
-    def test_crates_alone_are_those_of_the_release(self) -> None:
+    def test_crates_only_measures_the_release(self) -> None:
         found = self.measure("--only", "crates")
         self.assertEqual((found["rows"], list(found["crates"])), ([], ["cargo build --release --package faceoff"]))
 
     def test_each_round_is_reported(self) -> None:
-        rows = words(self.measure("--only", "demo", "--rounds", "2")["rows"])
+        rows = values(self.measure("--only", "demo", "--rounds", "2")["rows"])
         self.assertEqual(len(rows["`make demo`, to its end"]), 2)
 
     def test_failed_make_test_is_reported_with_its_log(self) -> None:
@@ -152,7 +152,7 @@ class Project(unittest.TestCase):
         (log,) = (self.folder / "work").glob("*/logs/test-1-1.log")
         self.assertIn(str(log), done.stderr)
 
-    def test_failed_part_leaves_others_their_figures(self) -> None:
+    def test_failed_part_does_not_affect_others(self) -> None:
         self.script("cargo", CARGO.replace("build)", "build) echo no compiler; exit 5;;\nnever)"))
         done = self.costs("--only", "demo,lines")
         self.assertEqual(done.returncode, 1)
@@ -181,7 +181,7 @@ class Project(unittest.TestCase):
 
 
 def lines_of_changes_not_in_src() -> int:
-    """The pretended files of pages and store are Rust outside of the only crate's src; so is no test in Python."""
+    """The Rust files that are changed are outside of the only crate's `src`, so they count as tests."""
     return sum(3 for change in (changes.PAGE, changes.STORE) if change.file.endswith(".rs"))
 
 
@@ -191,7 +191,7 @@ class Runs(unittest.TestCase):
         self.addCleanup(folder.cleanup)
         self.folder = Path(folder.name)
         self.log = self.folder / "log"
-        # Seconds that no other process sleeps.
+        # A duration that no other process uses for its sleep.
         self.long = f"1000.{os.getpid()}"
 
     def run_shell(self, line: str, **options) -> runs.Run:
@@ -217,15 +217,15 @@ class Runs(unittest.TestCase):
         self.assert_gone()
 
     def assert_gone(self) -> None:
-        """No such sleep is there; one that is killed may take a moment to go."""
+        """Asserts that the sleep is gone. A killed process may need a moment to disappear."""
         deadline = time.monotonic() + 600
         while any(f"sleep\0{self.long}\0".encode() == command for command in commands()):
-            self.assertLess(time.monotonic(), deadline, "it sleeps still")
+            self.assertLess(time.monotonic(), deadline, "it is still running")
             time.sleep(0.01)
 
 
 def commands() -> list[bytes]:
-    """Of all processes; those that have just ended have none."""
+    """The command lines of all processes."""
     found = []
     for file in Path("/proc").glob("[0-9]*/cmdline"):
         try:
@@ -255,10 +255,10 @@ class Readers(unittest.TestCase):
             self.assertEqual(found[0].name, ".rodata")
             self.assertGreaterEqual(found[0].bytes, 100_000)
             self.assertNotIn(".bss", [section.name for section in found])
-            self.assertIn(".symtab", elf.for_debuggers(found))
-            self.assertIn(".debug_info", elf.for_debuggers(found))
+            self.assertIn(".symtab", elf.debug_sections(found))
+            self.assertIn(".debug_info", elf.debug_sections(found))
             subprocess.run(["strip", program], check=True)
-            self.assertEqual(elf.for_debuggers(elf.sections(program)), [])
+            self.assertEqual(elf.debug_sections(elf.sections(program)), [])
 
     def test_script_has_no_sections(self) -> None:
         with self.assertRaisesRegex(runs.Failed, "no ELF program"):

@@ -1,4 +1,4 @@
-"""The compiler's time by crate, from the report that `cargo build --timings` writes."""
+"""Compile time by crate, from the report of `cargo build --timings`."""
 
 import json
 from dataclasses import dataclass
@@ -15,9 +15,9 @@ class Unit:
     """One call of the compiler, or one run of a build script."""
 
     crate: str
-    # Seconds by the clock, while other units run beside it.
+    # Wall-clock seconds, while other units run, too.
     total_s: float
-    # Of these, before machine code is made: parsing, macros, types.
+    # The part before code generation: parsing, macros, types.
     frontend_s: float
 
 
@@ -32,9 +32,9 @@ class Crate:
 
 
 def read(report: Path) -> list[Unit]:
-    """The units of a report; an error if cargo has written another form of it."""
+    """The units of a report. Fails if the report has an unknown format."""
     if not report.is_file():
-        raise Failed(f"{report} is not there: cargo has built nothing, or writes the report of --timings elsewhere")
+        raise Failed(f"{report} does not exist: cargo has built nothing, or writes the report of --timings to another file")
     return parse(report.read_text(), report)
 
 
@@ -44,7 +44,7 @@ def parse(text: str, report: Path) -> list[Unit]:
         units, _ = json.JSONDecoder().raw_decode(text, start)
         return [Unit(unit["name"], unit["duration"], frontend_s(unit.get("sections"))) for unit in units]
     except (ValueError, KeyError, TypeError) as error:
-        raise Failed(f"{report} is not as {__file__} expects it, so this cargo writes another report ({error!r})") from error
+        raise Failed(f"{report} has an unknown format: this cargo writes another report than {__file__} expects ({error!r})") from error
 
 
 def frontend_s(sections: list[tuple[str, dict[str, float]]] | None) -> float:
@@ -53,7 +53,7 @@ def frontend_s(sections: list[tuple[str, dict[str, float]]] | None) -> float:
 
 
 def by_crate(units: list[Unit]) -> list[Crate]:
-    """The dearest first. Versions of one crate count together."""
+    """The total of each crate, the slowest first. Versions of a crate are added up."""
     crates: dict[str, Crate] = {}
     for unit in units:
         crate = crates.setdefault(unit.crate, Crate(unit.crate))
@@ -63,8 +63,8 @@ def by_crate(units: list[Unit]) -> list[Crate]:
     return sorted(crates.values(), key=lambda crate: (-crate.total_s, crate.name))
 
 
-def others(crates: list[Crate]) -> Crate:
-    """All of these as one."""
+def total(crates: list[Crate]) -> Crate:
+    """The sum of these crates."""
     return Crate(
         f"all others ({len(crates)} crates)",
         sum(crate.units for crate in crates),

@@ -1,5 +1,4 @@
-//! What is wrong with a page in a real browser: the rules that axe knows, what is wider than the window, what the browser
-//! complains of.
+//! Faults of a page in a real browser: violations that axe reports, overflowing elements, errors on the console.
 
 use faceoff_tests::{
     browser::{Page, View},
@@ -13,14 +12,14 @@ const RUN: &str = "axe.run(document, {
     resultTypes: ['violations'],
 }).then(found => found.violations.map(one => one.id + ': ' + one.nodes.map(node => node.html).join(' … ').slice(0, 400)))";
 
-/// What reaches beyond the window's edge, and not in a table that scrolls by itself.
+/// Elements beyond the window's edge, without those in tables that scroll separately.
 const WIDEST: &str = "[...document.querySelectorAll('body *')]
     .filter(one => one.getBoundingClientRect().right > innerWidth + 1 && !one.closest('.wide'))
     .map(one => one.outerHTML.slice(0, 120)).slice(-3)";
 
-/// How wide pages are looked at.
+/// The windows and colour schemes in which pages are checked.
 const VIEWS: [View; 4] = [
-    View::DESK,
+    View::DESKTOP,
     View::PHONE.dark(),
     View {
         width: 400,
@@ -39,25 +38,25 @@ pub fn axe() -> String {
     })
 }
 
-/// What is wrong with a page that is open, wherever it is looked at.
+/// The faults of an open page in all views.
 pub fn faults(page: &Page, axe: &str, path: &str) -> Vec<String> {
     let mut faults = Vec::new();
     let _ = page.evaluate(&format!("{axe};1"));
     for view in VIEWS {
-        page.look_through(view);
+        page.set_view(view);
         if page.overflow() != 0 {
             let widest = page.evaluate(WIDEST);
             let width = view.width;
             faults.push(format!("{path} is wider than {width} pixels: {widest}"));
         }
-        // Rules do not depend on more than light and narrowness.
-        if view == View::DESK || view.dark {
+        // The rules depend only on the colour scheme and on narrow windows.
+        if view == View::DESKTOP || view.dark {
             let found = page.evaluate(RUN);
-            let found = found.as_array().expect("axe tells what it found");
-            let told = found
+            let found = found.as_array().expect("axe returns a list");
+            let violations = found
                 .iter()
                 .map(|one| format!("{path} {}: {one}", view.width));
-            faults.extend(told);
+            faults.extend(violations);
         }
     }
     faults.extend(page.console_errors());

@@ -1,5 +1,5 @@
-//! Other load on the host, ours or strangers': it becomes neither a penalty point nor a fault nor another
-//! score. Reference agents play under the rules' own limits, beside each kind of load.
+//! Other load on the host: it causes no penalty point, no fault and no other score. Reference agents are evaluated with
+//! the limits of the rules, beside each kind of load.
 
 use crate::{Team, kills::copy_folder, start_day, without_times};
 use faceoff_tests::{bundle, server::Server};
@@ -17,29 +17,29 @@ use std::{
     thread::{self, JoinHandle},
 };
 
-/// The rules' own limits.
+/// Keeps the time limits of the rules, unlike the other tests.
 const CONFIG: &str =
     "[workers]\nslots = 1\n[evaluation]\nepisodes_per_task = 6\nepisodes_per_shard = 3\n";
 const AGENTS: [&str; 2] = ["hold", "striker"];
 
-/// Begins to run beside a server.
-type Beside = fn(&mut Load, &Server);
+/// Starts a load beside a server.
+type StartLoad = fn(&mut Load, &Server);
 
-/// What runs beside; all of it ends with this.
+/// Processes and threads that load the host; dropping it ends them.
 #[derive(Default)]
 struct Load {
     processes: Vec<Child>,
     threads: Vec<JoinHandle<()>>,
-    over: Arc<AtomicBool>,
-    /// Pages fetched, processes of a burst that ended.
-    done: Arc<AtomicU64>,
+    stop: Arc<AtomicBool>,
+    /// Pages fetched and processes of a burst that ended.
+    completed: Arc<AtomicU64>,
 }
 
 impl Drop for Load {
     fn drop(&mut self) {
-        self.over.store(true, Ordering::Relaxed);
+        self.stop.store(true, Ordering::Relaxed);
         for child in &mut self.processes {
-            // Already ended is fine.
+            // The process may have ended already.
             let _ = child.kill();
             let _ = child.wait();
         }
@@ -60,13 +60,13 @@ impl Load {
             .push(child.expect("a program can be started"));
     }
 
-    /// Runs `body` again and again on a thread.
-    fn again(&mut self, mut body: impl FnMut() + Send + 'static) {
-        let (over, done) = (Arc::clone(&self.over), Arc::clone(&self.done));
+    /// Runs `body` repeatedly on a thread.
+    fn repeat(&mut self, mut body: impl FnMut() + Send + 'static) {
+        let (stop, completed) = (Arc::clone(&self.stop), Arc::clone(&self.completed));
         self.threads.push(thread::spawn(move || {
-            while !over.load(Ordering::Relaxed) {
+            while !stop.load(Ordering::Relaxed) {
                 body();
-                done.fetch_add(1, Ordering::Relaxed);
+                completed.fetch_add(1, Ordering::Relaxed);
             }
         }));
     }
@@ -79,11 +79,11 @@ impl Load {
         }
     }
 
-    /// A quarter of the memory, written again and again, from end to end.
+    /// Writes a quarter of the memory repeatedly, from end to end.
     fn memory(&mut self) {
-        let told = fs::read_to_string("/proc/meminfo").expect("Linux tells of its memory");
-        let of = |key: &str| {
-            let line = told.lines().find_map(|line| line.strip_prefix(key));
+        let meminfo = fs::read_to_string("/proc/meminfo").expect("Linux reports its memory");
+        let bytes_of = |key: &str| {
+            let line = meminfo.lines().find_map(|line| line.strip_prefix(key));
             let kib: u64 = line
                 .expect(key)
                 .trim_end_matches("kB")
@@ -92,36 +92,36 @@ impl Load {
                 .expect(key);
             kib << 10
         };
-        let bytes = (of("MemTotal:") / 4).min(of("MemAvailable:") / 2);
+        let bytes = (bytes_of("MemTotal:") / 4).min(bytes_of("MemAvailable:") / 2);
         let source = "import sys\nheld = bytearray(int(sys.argv[1]))\nn = 0\n\
                       while True:\n    n += 1\n    held[::4096] = bytes([n % 256]) * len(held[::4096])";
         self.program("python3", &["-c", source, &bytes.to_string()]);
     }
 
-    /// Visitors without a token, each on a connection of its own, fetching pages as fast as they come.
+    /// Visitors without a token that fetch pages without a pause, each on its own connection.
     fn flood(&mut self, server: &Server) {
         let address = server.url.trim_start_matches("http://").to_owned();
         for visitor in 0..48 {
             let address = address.clone();
-            self.again(move || {
+            self.repeat(move || {
                 let page = ["/", "/season", "/api/v1/board"][visitor % 3];
-                // A visitor that is turned away comes again.
+                // A refused visitor tries again.
                 let Ok(mut stream) = TcpStream::connect(&address) else {
                     return;
                 };
-                let asked =
+                let request =
                     format!("GET {page} HTTP/1.1\r\nHost: {address}\r\nConnection: close\r\n\r\n");
-                if stream.write_all(asked.as_bytes()).is_ok() {
+                if stream.write_all(request.as_bytes()).is_ok() {
                     let _ = stream.read_to_end(&mut Vec::new());
                 }
             });
         }
     }
 
-    /// Many processes at a time, each as long as one of a compiler, of which some start others.
+    /// Many concurrent processes as short as a compiler's, some of which start further ones.
     fn burst(&mut self) {
         for _ in 0..12 {
-            self.again(|| {
+            self.repeat(|| {
                 let source = "import subprocess\nsum(i * i for i in range(300_000))\n\
                               subprocess.run(['sh', '-c', ':'])\nbytearray(1 << 24)";
                 let _ = Command::new("python3").args(["-c", source]).status();
@@ -130,11 +130,11 @@ impl Load {
     }
 }
 
-/// Plays a day of the season in `data` from uploads to results, beside the load.
-fn day_beside(data: &Path, scratch: &Path, load: impl FnOnce(&mut Load, &Server)) -> Vec<Value> {
+/// Evaluates a day of the season in `data`, from uploads to results, beside a load.
+fn evaluate_day(data: &Path, scratch: &Path, start_load: impl FnOnce(&mut Load, &Server)) -> Vec<Value> {
     let server = Server::start(data, CONFIG);
-    let mut beside = Load::default();
-    load(&mut beside, &server);
+    let mut load = Load::default();
+    start_load(&mut load, &server);
     let teams: Vec<(Team, Value)> = AGENTS
         .iter()
         .map(|name| {
@@ -148,15 +148,15 @@ fn day_beside(data: &Path, scratch: &Path, load: impl FnOnce(&mut Load, &Server)
     let results = teams
         .iter()
         .map(|(team, submission)| {
-            let path = crate::path_of(&day, submission);
-            // Until the whole day is over a team is told its score alone.
+            let path = crate::evaluation_path(&day, submission);
+            // Before the release of the day a team sees its score alone.
             let finished = server.poll(&path, &team.token, |answer| {
                 !answer["released_at"].is_null()
             });
             assert_eq!(finished["state"], "finished", "{finished:#}");
-            for (task, played) in finished["result"]["tasks"].as_object().expect("tasks") {
+            for (task, result) in finished["result"]["tasks"].as_object().expect("tasks") {
                 assert_eq!(
-                    played["violations"]["computation_time"],
+                    result["violations"]["computation_time"],
                     0,
                     "{task}: {finished:#}\n{}",
                     server.log()
@@ -165,23 +165,23 @@ fn day_beside(data: &Path, scratch: &Path, load: impl FnOnce(&mut Load, &Server)
             finished["result"].clone()
         })
         .collect();
-    drop(beside);
+    drop(load);
     results
 }
 
-/// The same day of the same season, undisturbed and beside each of the loads: the same scores, and no point.
-fn costs_nothing(loads: &[(&str, Beside)]) {
+/// Evaluates the same day of the same season without load and beside each load: scores and penalty points are equal.
+fn assert_no_effect(loads: &[(&str, StartLoad)]) {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
-    // One season, so that all days draw the same episodes: the secret is in the folder.
+    // Copies of one data folder have the same secret, so all days have the same episodes.
     let season = scratch.path().join("season");
     Server::start(&season, CONFIG).kill();
     let undisturbed = scratch.path().join("undisturbed");
     copy_folder(&season, &undisturbed);
-    let expected = day_beside(&undisturbed, scratch.path(), |_, _| {});
+    let expected = evaluate_day(&undisturbed, scratch.path(), |_, _| {});
     for (name, load) in loads {
         let data = scratch.path().join(name);
         copy_folder(&season, &data);
-        let found = day_beside(&data, scratch.path(), load);
+        let found = evaluate_day(&data, scratch.path(), load);
         for (expected, found) in expected.iter().zip(&found) {
             assert_eq!(
                 without_times(found),
@@ -197,8 +197,8 @@ fn costs_nothing(loads: &[(&str, Beside)]) {
 }
 
 #[test]
-fn hogs_and_a_flood_cost_no_point_no_fault_and_no_success() {
-    costs_nothing(&[("hogs, memory and flood", |load, server| {
+fn cpu_hogs_and_flood_change_no_result() {
+    assert_no_effect(&[("hogs, memory and flood", |load, server| {
         load.hogs();
         load.memory();
         load.flood(server);
@@ -206,9 +206,9 @@ fn hogs_and_a_flood_cost_no_point_no_fault_and_no_success() {
 }
 
 #[test]
-#[ignore = "for minutes it leaves the other tests nothing of the machine; `make busy` runs it alone"]
-fn a_busy_host_costs_no_point_no_fault_and_no_success() {
-    costs_nothing(&[
+#[ignore = "it uses all of the machine for minutes; `make busy` runs it alone"]
+fn separate_and_combined_loads_change_no_result() {
+    assert_no_effect(&[
         ("hogs", |load, _| load.hogs()),
         ("memory", |load, _| load.memory()),
         ("flood", Load::flood),
@@ -223,16 +223,16 @@ fn a_busy_host_costs_no_point_no_fault_and_no_success() {
 }
 
 /// A thread's name and its CPUs.
-type Named = (String, String);
+type ThreadCpus = (String, String);
 
-/// The server's threads with their CPUs: those of ordinary priority, and those that give way.
-fn threads_of(server: &Server) -> (Vec<Named>, Vec<Named>) {
+/// The server's threads with their CPUs: those of ordinary priority, and those of lower priority.
+fn threads_of(server: &Server) -> (Vec<ThreadCpus>, Vec<ThreadCpus>) {
     let tasks = fs::read_dir(format!("/proc/{}/task", server.process_id())).expect("it runs");
-    let (mut ordinary, mut giving_way) = (Vec::new(), Vec::new());
+    let (mut ordinary, mut low_priority) = (Vec::new(), Vec::new());
     for task in tasks.flatten() {
         // A thread that has just ended has no files.
-        let of = |file: &str| fs::read_to_string(task.path().join(file)).ok();
-        let (Some(name), Some(stat), Some(status)) = (of("comm"), of("stat"), of("status")) else {
+        let read = |file: &str| fs::read_to_string(task.path().join(file)).ok();
+        let (Some(name), Some(stat), Some(status)) = (read("comm"), read("stat"), read("status")) else {
             continue;
         };
         let after_name = stat.rsplit_once(") ").expect("a name in brackets").1;
@@ -250,64 +250,64 @@ fn threads_of(server: &Server) -> (Vec<Named>, Vec<Named>) {
             cpus.expect("its CPUs").trim().to_owned(),
         );
         if nice > 0 {
-            giving_way.push(thread)
+            low_priority.push(thread)
         } else {
             ordinary.push(thread)
         }
     }
-    (ordinary, giving_way)
+    (ordinary, low_priority)
 }
 
 #[test]
-fn what_answers_strangers_gives_way_and_keeps_off_the_agents_cpus() {
+fn http_threads_yield_and_avoid_agent_cpus() {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
     let server = Server::start(&scratch.path().join("data"), CONFIG);
-    let mut beside = Load::default();
-    beside.flood(&server);
+    let mut load = Load::default();
+    load.flood(&server);
     let team = Team::create(&server, "Held");
     let id = team.upload(
         &server,
-        bundle::packed(&bundle::reference("hold", scratch.path())),
+        bundle::pack(&bundle::reference("hold", scratch.path())),
     );
     let verdict = team.verdict(&server, &id);
     assert_eq!(verdict["state"], "valid", "{verdict:#}");
-    let (ordinary, giving_way) = threads_of(&server);
-    let of = |threads: &[Named], begins: &str| -> Vec<String> {
-        let named = threads.iter().filter(|one| one.0.starts_with(begins));
-        named.map(|one| one.1.clone()).collect()
+    let (ordinary, low_priority) = threads_of(&server);
+    let cpus_of = |threads: &[ThreadCpus], prefix: &str| -> Vec<String> {
+        let matching = threads.iter().filter(|thread| thread.0.starts_with(prefix));
+        matching.map(|thread| thread.1.clone()).collect()
     };
-    let slot = of(&ordinary, "faceoff-slot");
+    let slot = cpus_of(&ordinary, "faceoff-slot");
     assert_eq!(slot.len(), 1, "{ordinary:?}");
     for name in ["http", "sqlx-sqlite", "service"] {
-        assert!(!of(&giving_way, name).is_empty(), "{name}: {giving_way:?}");
+        assert!(!cpus_of(&low_priority, name).is_empty(), "{name}: {low_priority:?}");
     }
-    // One that is being started for a slot's request gives way as its first deed.
-    let started = |threads: &[Named]| {
+    // A thread that was just started for a slot's request lowers its priority first of all.
+    let has_service_thread = |threads: &[ThreadCpus]| {
         let names = ["http", "service"];
-        names.iter().any(|name| !of(threads, name).is_empty())
+        names.iter().any(|name| !cpus_of(threads, name).is_empty())
     };
-    let mut seen = ordinary;
+    let mut threads = ordinary;
     for _ in 0..1000 {
-        if !started(&seen) {
+        if !has_service_thread(&threads) {
             break;
         }
         thread::yield_now();
-        seen = threads_of(&server).0;
+        threads = threads_of(&server).0;
     }
-    assert!(!started(&seen), "{seen:?}");
-    // Two CPUs at least: the agent's is none of these.
+    assert!(!has_service_thread(&threads), "{threads:?}");
+    // With more than two CPUs, these threads avoid the agent's and the simulator's.
     let cpus = thread::available_parallelism().map_or(1, std::num::NonZero::get);
-    let theirs = of(&giving_way, "http");
+    let http_cpus = cpus_of(&low_priority, "http");
     assert!(
-        theirs.iter().all(|list| *list == theirs[0]),
-        "{giving_way:?}"
+        http_cpus.iter().all(|list| *list == http_cpus[0]),
+        "{low_priority:?}"
     );
     match cpus {
         1 => {}
         2 => assert_eq!(
-            theirs[0], slot[0],
-            "they share the simulator's, and give way there"
+            http_cpus[0], slot[0],
+            "they share the simulator's CPU at a lower priority"
         ),
-        _ => assert_ne!(theirs[0], slot[0]),
+        _ => assert_ne!(http_cpus[0], slot[0]),
     }
 }

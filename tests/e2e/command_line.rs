@@ -1,8 +1,8 @@
-//! A day of a team that has nothing but the program: it signs in, submits, follows, and gets what is its own.
+//! A team's day with nothing but the program: sign in, submit, watch progress, download results.
 
 use crate::{
     CONFIG, Team,
-    commands::{FAILED, MISUSED, NOT_ALLOWED, REFUSED, UNREACHABLE, admin, faceoff_of},
+    commands::{FAILED, USAGE_ERROR, NOT_ALLOWED, REFUSED, UNREACHABLE, admin, faceoff_with_home},
     start_day,
 };
 use faceoff_tests::{
@@ -20,8 +20,8 @@ use std::{
 
 const PASSWORD: &str = "a dozen characters, and more\n";
 
-/// A link by which a team is founded.
-fn founders_link(server: &Server) -> String {
+/// An invitation link for a new team.
+fn team_invitation_link(server: &Server) -> String {
     let invited = admin(server, &["people", "invite-team", "Ada", "--json"]).json();
     invited["link"]
         .as_str()
@@ -30,23 +30,23 @@ fn founders_link(server: &Server) -> String {
 }
 
 #[test]
-fn a_team_signs_in_and_out_and_its_token_is_never_shown() {
+fn sign_in_and_sign_out_never_print_the_token() {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
     let server = Server::start(&scratch.path().join("data"), CONFIG);
     let home = scratch.path().join("config");
-    let ada = |args: &[&str], input: &str| faceoff_of(&home, args, input);
+    let ada = |args: &[&str], input: &str| faceoff_with_home(&home, args, input);
     let file = home.join("faceoff/credentials.toml");
 
-    ada(&["whoami"], "").not_done(NOT_ALLOWED, &["faceoff login", "FACEOFF_TOKEN"]);
+    ada(&["whoami"], "").expect_refusal(NOT_ALLOWED, &["faceoff login", "FACEOFF_TOKEN"]);
     ada(
         &["login", "http://127.0.0.1:1", "--token-stdin"],
         "fo_person_x\n",
     )
-    .not_done(UNREACHABLE, &["talking to http://127.0.0.1:1"]);
-    assert!(!file.exists(), "what cannot be tried is not kept");
+    .expect_refusal(UNREACHABLE, &["talking to http://127.0.0.1:1"]);
+    assert!(!file.exists(), "a token that cannot be verified is not stored");
 
-    // An invitation, kept at once.
-    let link = founders_link(&server);
+    // Joining with --sign-in stores the token.
+    let link = team_invitation_link(&server);
     let join = [
         "join",
         &link,
@@ -59,63 +59,63 @@ fn a_team_signs_in_and_out_and_its_token_is_never_shown() {
         "--password-stdin",
         "--sign-in",
     ];
-    let told = ada(&join, PASSWORD).done();
+    let output = ada(&join, PASSWORD).expect_success();
     assert!(
-        told.contains("signed in to") && !told.contains("fo_person"),
-        "{told}"
+        output.contains("signed in to") && !output.contains("fo_person"),
+        "{output}"
     );
     let mode = fs::metadata(&file)
-        .expect("it is kept")
+        .expect("the login is stored")
         .permissions()
         .mode();
     assert_eq!(mode & 0o777, 0o600);
-    let told = ada(&["whoami"], "").done();
+    let output = ada(&["whoami"], "").expect_success();
     assert!(
-        told.contains("Ada") && told.contains("(faceoff login), token by faceoff login"),
-        "{told}"
+        output.contains("Ada") && output.contains("(faceoff login), token from faceoff login"),
+        "{output}"
     );
-    let told = ada(&["whoami", "--json"], "").json();
-    assert_eq!(told["server_from"], "login", "{told:#}");
+    let account = ada(&["whoami", "--json"], "").json();
+    assert_eq!(account["server_from"], "login", "{account:#}");
 
-    // The command line is stronger.
-    ada(&["whoami", "--token", "fo_person_nobody"], "").not_done(NOT_ALLOWED, &["401"]);
+    // Options of the command line override the stored login.
+    ada(&["whoami", "--token", "fo_person_unknown"], "").expect_refusal(NOT_ALLOWED, &["401"]);
     ada(&["whoami", "--server", "http://127.0.0.1:1"], "")
-        .not_done(NOT_ALLOWED, &["nobody is signed in to"]);
-    ada(&["login", "--surely"], "").not_done(MISUSED, &["--surely"]);
+        .expect_refusal(NOT_ALLOWED, &["not signed in to"]);
+    ada(&["login", "--surely"], "").expect_refusal(USAGE_ERROR, &["--surely"]);
 
-    // Out, but for the token.
-    let kept = fs::read_to_string(&file).expect("it can be read");
-    let kept = kept.split('"').find(|word| word.starts_with("fo_person_"));
-    let token = kept.expect("the token is in the file").to_owned();
-    let told = ada(&["logout", "--keep-token"], "").done();
-    assert!(told.contains("still good"), "{told}");
-    ada(&["logout"], "").not_done(FAILED, &["nobody is signed in"]);
-    ada(&["status"], "").not_done(NOT_ALLOWED, &["nobody is signed in to"]);
-    let told = ada(
+    // Sign out without revoking the token.
+    let credentials = fs::read_to_string(&file).expect("the file can be read");
+    let stored = credentials.split('"').find(|word| word.starts_with("fo_person_"));
+    let token = stored.expect("the token is in the file").to_owned();
+    let output = ada(&["logout", "--keep-token"], "").expect_success();
+    assert!(output.contains("still valid"), "{output}");
+    ada(&["logout"], "").expect_refusal(FAILED, &["not signed in"]);
+    ada(&["status"], "").expect_refusal(NOT_ALLOWED, &["not signed in to"]);
+    let output = ada(
         &["login", &server.url, "--token-stdin"],
         &format!("{token}\n"),
     )
-    .done();
+    .expect_success();
     assert!(
-        told.contains("member of the team Alpha") && !told.contains(&token),
-        "{told}"
+        output.contains("member of the team Alpha") && !output.contains(&token),
+        "{output}"
     );
 
-    // By name and password: a token of its own, which ends with the login.
+    // Signing in by name and password creates a separate token, which signing out revokes.
     let by_password = ["login", &server.url, "--name", "Ada", "--password-stdin"];
-    ada(&by_password, "something else entirely\n").not_done(NOT_ALLOWED, &["401"]);
-    let told = ada(&by_password, PASSWORD).done();
-    assert!(told.contains("by the token faceoff login"), "{told}");
+    ada(&by_password, "something else entirely\n").expect_refusal(NOT_ALLOWED, &["401"]);
+    let output = ada(&by_password, PASSWORD).expect_success();
+    assert!(output.contains("with the token faceoff login"), "{output}");
     let tokens = ada(&["token", "list", "--json"], "").json();
-    let of_sessions = tokens
+    let sessions = tokens
         .as_array()
         .expect("a list")
         .iter()
         .filter(|token| token["kind"] == "session" && token["revoked_at"].is_null());
-    assert_eq!(of_sessions.count(), 0, "{tokens:#}");
-    let told = ada(&["logout"], "").done();
-    assert!(told.contains("its token is revoked"), "{told}");
-    ada(&["whoami", "--server", &server.url, "--token", &token], "").done();
+    assert_eq!(sessions.count(), 0, "{tokens:#}");
+    let output = ada(&["logout"], "").expect_success();
+    assert!(output.contains("the token is revoked"), "{output}");
+    ada(&["whoami", "--server", &server.url, "--token", &token], "").expect_success();
     assert!(
         !fs::read_to_string(&file)
             .expect("it can be read")
@@ -124,12 +124,12 @@ fn a_team_signs_in_and_out_and_its_token_is_never_shown() {
 }
 
 #[test]
-fn an_organiser_signs_in_and_needs_no_data_folder() {
+fn organiser_sign_in_needs_no_data_folder() {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
     let server = Server::start(&scratch.path().join("data"), CONFIG);
     let home = scratch.path().join("config");
-    let grace = |args: &[&str], input: &str| faceoff_of(&home, args, input);
-    grace(&["admin", "teams", "--server", &server.url], "").not_done(
+    let grace = |args: &[&str], input: &str| faceoff_with_home(&home, args, input);
+    grace(&["admin", "teams", "--server", &server.url], "").expect_refusal(
         NOT_ALLOWED,
         &[
             "reading the organiser's token from",
@@ -148,18 +148,18 @@ fn an_organiser_signs_in_and_needs_no_data_folder() {
         "Grace",
         "--sign-in",
     ];
-    grace(&join, "").done();
-    let told = grace(&["admin", "teams"], "").done();
-    assert!(told.contains("no team"), "{told}");
+    grace(&join, "").expect_success();
+    let output = grace(&["admin", "teams"], "").expect_success();
+    assert!(output.contains("no team"), "{output}");
 }
 
 #[test]
-fn a_team_submits_a_folder_follows_it_and_gets_its_dataset_back() {
+fn submitted_folder_is_evaluated_and_dataset_downloaded() {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
     let server = Server::start(&scratch.path().join("data"), CONFIG);
     let home = scratch.path().join("config");
-    let ada = |args: &[&str]| faceoff_of(&home, args, "");
-    let link = founders_link(&server);
+    let ada = |args: &[&str]| faceoff_with_home(&home, args, "");
+    let link = team_invitation_link(&server);
     let join = [
         "join",
         &link,
@@ -171,7 +171,7 @@ fn a_team_submits_a_folder_follows_it_and_gets_its_dataset_back() {
         "Alpha",
         "--sign-in",
     ];
-    ada(&join).done();
+    ada(&join).expect_success();
 
     let bundle = scratch.path().join("my-agent");
     fs::create_dir_all(bundle.join("__pycache__")).expect("a folder can be made");
@@ -182,12 +182,12 @@ fn a_team_submits_a_folder_follows_it_and_gets_its_dataset_back() {
     fs::write(bundle.join("__pycache__/agent.pyc"), "x").expect("a file can be written");
     fs::write(bundle.join("notes.md"), "plans").expect("a file can be written");
     fs::write(bundle.join(".faceoffignore"), "notes.md\n").expect("a file can be written");
-    let at = |path: &Path| path.to_str().expect("a path of ours is text").to_owned();
+    let at = |path: &Path| path.to_str().expect("scratch paths are text").to_owned();
 
     let dry = ada(&["submit", &at(&bundle), "--dry-run", "--json"]).json();
     let files: Vec<_> = dry["files"]
         .as_array()
-        .expect("of a folder all are listed")
+        .expect("a dry run lists the files")
         .iter()
         .map(|file| file["path"].clone())
         .collect();
@@ -197,11 +197,11 @@ fn a_team_submits_a_folder_follows_it_and_gets_its_dataset_back() {
         serde_json::json!([".faceoffignore", "__pycache__", "notes.md"])
     );
     let submitted = ada(&["submit", &at(&bundle)]);
-    let said = submitted.done();
-    assert!(said.contains("valid: hold starts"), "{said}");
-    let again = ada(&["submit", &at(&bundle), "--json"]).json();
-    assert_eq!(again["state"], "valid", "{again:#}");
-    let first = again["same_as"]
+    let output = submitted.expect_success();
+    assert!(output.contains("valid: hold starts"), "{output}");
+    let repeated = ada(&["submit", &at(&bundle), "--json"]).json();
+    assert_eq!(repeated["state"], "valid", "{repeated:#}");
+    let first = repeated["same_as"]
         .as_str()
         .expect("the same folder is the same archive")
         .to_owned();
@@ -213,53 +213,53 @@ fn a_team_submits_a_folder_follows_it_and_gets_its_dataset_back() {
         "{log:#}"
     );
     ada(&["log", "00000000-0000-7000-8000-000000000000"])
-        .not_done(FAILED, &["no submission, evaluation or game"]);
-    let second = again["id"]
+        .expect_refusal(FAILED, &["no submission, evaluation or game"]);
+    let second = repeated["id"]
         .as_str()
         .expect("a submission has an id")
         .to_owned();
-    let told = ada(&["withdraw", &second]).done();
-    assert!(told.contains("withdrawn"), "{told}");
-    ada(&["activate", &second]).done();
+    let output = ada(&["withdraw", &second]).expect_success();
+    assert!(output.contains("withdrawn"), "{output}");
+    ada(&["activate", &second]).expect_success();
     let board = ada(&["board", "--json"]).json();
     assert_eq!(board["rows"], serde_json::json!([]));
-    assert!(ada(&["board", "hit"]).done().contains("no results yet"));
+    assert!(ada(&["board", "hit"]).expect_success().contains("no results yet"));
     let offered = ada(&["runtimes", "--json"]).json();
     assert_eq!(offered["network"], "none", "{offered:#}");
-    let told = ada(&["runtimes"]).done();
-    assert!(told.contains("python3") && told.contains("glibc"), "{told}");
+    let output = ada(&["runtimes"]).expect_success();
+    assert!(output.contains("python3") && output.contains("glibc"), "{output}");
     let season = ada(&["season", "--json"]).json();
     assert_eq!(season["closed_at"], Value::Null, "{season:#}");
-    assert!(ada(&["season"]).done().contains("commitment "));
+    assert!(ada(&["season"]).expect_success().contains("commitment "));
     assert_eq!(ada(&["health", "--json"]).json()["status"], "ok");
-    assert!(ada(&["health"]).done().starts_with("ok, version "));
-    ada(&["board", "--division", "Open"]).not_done(REFUSED, &["404"]);
-    ada(&["board", "--stage", "Final"]).not_done(FAILED, &["no stage is named"]);
+    assert!(ada(&["health"]).expect_success().starts_with("ok, version "));
+    ada(&["board", "--division", "Open"]).expect_refusal(REFUSED, &["404"]);
+    ada(&["board", "--stage", "Final"]).expect_refusal(FAILED, &["there is no stage"]);
 
     let day = start_day(&server);
     let evaluation = day["created"][0]["id"]
         .as_str()
-        .expect("it plays")
+        .expect("the active submission is evaluated")
         .to_owned();
-    let token = fs::read_to_string(home.join("faceoff/credentials.toml")).expect("it is kept");
+    let token = fs::read_to_string(home.join("faceoff/credentials.toml")).expect("the login is stored");
     let token = token
         .split('"')
         .find(|word| word.starts_with("fo_person_"))
-        .expect("the token is there")
+        .expect("the token is in the file")
         .to_owned();
     let path = format!("/api/v1/evaluations/{evaluation}");
     let ended = server.poll(&path, &token, |answer: &Value| {
         !answer["released_at"].is_null()
     });
     assert_eq!(ended["state"], "finished", "{ended:#}");
-    let told = ada(&["status"]).done();
+    let output = ada(&["status"]).expect_success();
     assert!(
-        told.contains("last evaluations:")
-            && told.contains(&evaluation)
-            && told.contains("finished: score"),
-        "{told}"
+        output.contains("last evaluations:")
+            && output.contains(&evaluation)
+            && output.contains("finished: score"),
+        "{output}"
     );
-    let board = ada(&["board", "--csv"]).done();
+    let board = ada(&["board", "--csv"]).expect_success();
     assert!(
         board
             .lines()
@@ -267,7 +267,7 @@ fn a_team_submits_a_folder_follows_it_and_gets_its_dataset_back() {
             .is_some_and(|row| row.starts_with("1,") && row.contains(",Alpha,")),
         "{board}"
     );
-    assert!(ada(&["board"]).done().contains("Alpha"));
+    assert!(ada(&["board"]).expect_success().contains("Alpha"));
 
     let file = scratch.path().join("dataset.zip");
     let download = [
@@ -287,8 +287,8 @@ fn a_team_submits_a_folder_follows_it_and_gets_its_dataset_back() {
         "--blake3",
         done["blake3"].as_str().expect("a hash is text"),
     ])
-    .done();
-    // Of an agent and itself all that it solved was solved by both.
+    .expect_success();
+    // An agent compared with itself: the lists match the counts.
     let itself = [
         "compare",
         &evaluation,
@@ -300,55 +300,55 @@ fn a_team_submits_a_folder_follows_it_and_gets_its_dataset_back() {
     ];
     let compared = ada(&itself).json();
     for (task, counts) in compared["tasks"].as_object().expect("it has tasks") {
-        let of = &compared["episodes"][task];
-        for whom in ["both", "only_a", "only_b", "neither"] {
-            let listed = of[whom].as_array().expect("each has a list");
-            assert_eq!(counts[whom], listed.len(), "{task}, {whom}: {compared:#}");
+        let lists = &compared["episodes"][task];
+        for group in ["both", "only_a", "only_b", "neither"] {
+            let listed = lists[group].as_array().expect("each group has a list");
+            assert_eq!(counts[group], listed.len(), "{task}, {group}: {compared:#}");
         }
     }
     let link = ada(&["link", "dataset", &evaluation, "--json"]).json();
     let url = link["url"].as_str().expect("a link has an address");
-    let anybodys = http()
+    let public_download = http()
         .build()
         .expect("a client needs nothing")
         .get(url)
         .send();
-    let anybodys = anybodys
+    let public_download = public_download
         .expect("the server answers")
         .bytes()
         .expect("all of it comes");
-    assert_eq!(anybodys, fs::read(&file).expect("it is there"));
-    // What is not of this dataset is not kept.
+    assert_eq!(public_download, fs::read(&file).expect("it is there"));
+    // A partial file with other contents is replaced.
     fs::write(scratch.path().join("dataset.zip.part"), "something else")
         .expect("a file can be written");
     assert_eq!(ada(&download).json()["blake3"], done["blake3"]);
 }
 
 #[test]
-fn a_team_watches_how_it_stands() {
+fn status_watch_prints_each_change() {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
     let server = Server::start(&scratch.path().join("data"), CONFIG);
     let team = Team::create(&server, "Alpha");
     let submission = team.submit(&server, &repository().join("agents/hold"));
     let id = submission["id"].as_str().expect("a submission has an id");
-    let who = ["--server", &server.url, "--token", &team.token];
+    let options = ["--server", &server.url, "--token", &team.token];
     let mut watching = Command::new(program("faceoff"))
         .args(["status", "--watch", "--json"])
-        .args(who)
+        .args(options)
         .env("XDG_CONFIG_HOME", scratch.path())
         .stdout(Stdio::piped())
         .spawn()
         .expect("the program can be started");
-    let told = BufReader::new(watching.stdout.take().expect("standard output is piped"));
-    let mut told = told.lines().map(|line| -> Value {
-        let line = line.expect("it goes on until it is ended");
+    let output = BufReader::new(watching.stdout.take().expect("standard output is piped"));
+    let mut views = output.lines().map(|line| -> Value {
+        let line = line.expect("it runs until it is killed");
         serde_json::from_str(&line).expect("each line is JSON")
     });
-    let first = told.next().expect("it tells how the team stands");
+    let first = views.next().expect("it prints the team's state first");
     assert_eq!(first["me"]["active_submission"], id, "{first:#}");
-    faceoff_of(scratch.path(), &[&["withdraw", id][..], &who].concat(), "").done();
-    let changed = told.find(|told| told["me"]["active_submission"].is_null());
-    assert!(changed.is_some(), "a change is told");
+    faceoff_with_home(scratch.path(), &[&["withdraw", id][..], &options].concat(), "").expect_success();
+    let changed = views.find(|view| view["me"]["active_submission"].is_null());
+    assert!(changed.is_some(), "a change is printed");
     watching.kill().expect("a child can be killed");
     watching.wait().expect("a child can be reaped");
 }

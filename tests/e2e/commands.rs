@@ -1,4 +1,4 @@
-//! The program's commands, as people give them: what they print, and the status that they end with.
+//! The program's commands, run as users run them: output and exit status.
 
 use faceoff_tests::{program, server::Server};
 use serde_json::Value;
@@ -8,66 +8,66 @@ use std::{
     process::{Command, Stdio},
 };
 
-/// A refusal by what a command finds.
+/// The command failed.
 pub const FAILED: i32 = 1;
-/// What the command line itself does not understand.
-pub const MISUSED: i32 = 2;
-/// A refusal by the server.
+/// The command line is invalid.
+pub const USAGE_ERROR: i32 = 2;
+/// The server refused the request.
 pub const REFUSED: i32 = 3;
 /// The server does not answer.
 pub const UNREACHABLE: i32 = 4;
-/// The server knows no such token, or it is not enough.
+/// The token is missing, unknown or insufficient.
 pub const NOT_ALLOWED: i32 = 5;
 
-/// A folder that there is not: nobody's logins, and not those of whoever runs the tests.
-const NOWHERE: &str = "/nonexistent";
+/// No folder with stored logins: those of the user options runs the tests must not be used.
+const NO_CONFIG_HOME: &str = "/nonexistent";
 
-/// What a command has left.
-pub struct Told {
+/// Exit status, standard output and standard error of a command.
+pub struct CommandOutput {
     pub code: Option<i32>,
     out: String,
     err: String,
 }
 
-impl Told {
-    /// Of one that did what was asked.
+impl CommandOutput {
+    /// Standard output of a command that must succeed.
     #[track_caller]
-    pub fn done(self) -> String {
+    pub fn expect_success(self) -> String {
         assert_eq!(self.code, Some(0), "{}{}", self.out, self.err);
         self.out
     }
 
-    /// Of one that failed with this status, and may have printed before: standard error.
+    /// Standard error of a command that must fail with this status. It may have printed output before.
     #[track_caller]
-    pub fn failed(self, code: i32) -> String {
+    pub fn expect_failure(self, code: i32) -> String {
         assert_eq!(self.code, Some(code), "{}{}", self.out, self.err);
         self.err
     }
 
-    /// Of one that did, asked for JSON.
+    /// Standard output, as JSON, of a command that must succeed.
     #[track_caller]
     pub fn json(self) -> Value {
-        serde_json::from_str(&self.done()).expect("--json prints JSON")
+        serde_json::from_str(&self.expect_success()).expect("--json prints JSON")
     }
 
-    /// Of one that did nothing, with this status and these words on standard error.
+    /// The command must fail with this status, print nothing to standard output, and these words to standard error.
     #[track_caller]
-    pub fn not_done(self, code: i32, words: &[&str]) {
+    pub fn expect_refusal(self, code: i32, words: &[&str]) {
         assert_eq!(self.code, Some(code), "{}{}", self.out, self.err);
-        assert_eq!(self.out, "", "what is not done prints nothing");
+        assert_eq!(self.out, "", "a refused command prints no output");
         for word in words {
             assert!(self.err.contains(word), "{word:?} is not in {:?}", self.err);
         }
     }
 }
 
-/// The program with these arguments, which reads `input`.
-pub fn faceoff(args: &[&str], input: &str) -> Told {
-    faceoff_of(Path::new(NOWHERE), args, input)
+/// Runs the program with these arguments and this standard input.
+pub fn faceoff(args: &[&str], input: &str) -> CommandOutput {
+    faceoff_with_home(Path::new(NO_CONFIG_HOME), args, input)
 }
 
-/// The same, of somebody whose logins are kept in this folder.
-pub fn faceoff_of(config_home: &Path, args: &[&str], input: &str) -> Told {
+/// Runs the program with logins stored in this folder.
+pub fn faceoff_with_home(config_home: &Path, args: &[&str], input: &str) -> CommandOutput {
     let mut child = Command::new(program("faceoff"))
         .args(args)
         .env_remove("FACEOFF_TOKEN")
@@ -81,12 +81,12 @@ pub fn faceoff_of(config_home: &Path, args: &[&str], input: &str) -> Told {
         .spawn()
         .expect("the program can be started");
     let mut stdin = child.stdin.take().expect("standard input is piped");
-    // Who reads nothing has gone already.
+    // A command that reads no input may have ended already.
     let _ = stdin.write_all(input.as_bytes());
     drop(stdin);
     let output = child.wait_with_output().expect("a child can be reaped");
     let text = |bytes: Vec<u8>| String::from_utf8(bytes).expect("a command prints text");
-    Told {
+    CommandOutput {
         code: output.status.code(),
         out: text(output.stdout),
         err: text(output.stderr),
@@ -94,18 +94,18 @@ pub fn faceoff_of(config_home: &Path, args: &[&str], input: &str) -> Told {
 }
 
 /// `faceoff admin` with a token.
-pub fn admin_as(server: &Server, token: &str, args: &[&str]) -> Told {
-    let who = ["admin", "--server", &server.url, "--token", token];
-    faceoff(&[&who[..], args].concat(), "")
+pub fn admin_as(server: &Server, token: &str, args: &[&str]) -> CommandOutput {
+    let options = ["admin", "--server", &server.url, "--token", token];
+    faceoff(&[&options[..], args].concat(), "")
 }
 
 /// `faceoff admin` with the host's token.
-pub fn admin(server: &Server, args: &[&str]) -> Told {
+pub fn admin(server: &Server, args: &[&str]) -> CommandOutput {
     admin_as(server, &server.admin_token, args)
 }
 
-/// A command of teams and their people, with a token.
-pub fn member(server: &Server, token: &str, command: &str, args: &[&str]) -> Told {
-    let who = [command, "--server", &server.url, "--token", token];
-    faceoff(&[&who[..], args].concat(), "")
+/// A command of teams and their members, with a token.
+pub fn member(server: &Server, token: &str, command: &str, args: &[&str]) -> CommandOutput {
+    let options = [command, "--server", &server.url, "--token", token];
+    faceoff(&[&options[..], args].concat(), "")
 }

@@ -1,4 +1,4 @@
-//! `make demo` without make: the command it runs.
+//! The command that `make demo` runs.
 
 use faceoff_tests::{
     browser::{Browser, View},
@@ -9,7 +9,7 @@ use serde_json::Value;
 use std::{fs::File, process::Command};
 
 #[test]
-fn the_demo_plays_a_day_and_its_board_is_served() {
+fn demo_evaluates_a_day_and_serves_its_board() {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
     let data_dir = scratch.path().join("data");
     let output = Command::new(program("faceoff"))
@@ -34,14 +34,14 @@ fn the_demo_plays_a_day_and_its_board_is_served() {
         "the demo failed\n{stdout}\n{stderr}"
     );
 
-    let place = |text: &str| {
+    let position = |text: &str| {
         stdout
             .find(text)
             .unwrap_or_else(|| panic!("{text:?} is not in the output:\n{stdout}"))
     };
 
     // The dataset is a complete archive, and verified.
-    assert!(place("dataset of hold") < place("   verified "));
+    assert!(position("dataset of hold") < position("   verified "));
     let dataset = std::fs::read_dir(&data_dir)
         .expect("the demo made its folder")
         .filter_map(Result::ok)
@@ -72,7 +72,7 @@ fn the_demo_plays_a_day_and_its_board_is_served() {
     assert_eq!(rows.len(), 3);
     let mut printed = Vec::new();
     for row in rows {
-        let [heading, team] = team_in_its_tier(row);
+        let [heading, team] = tier_heading_and_team(row);
         if !printed.contains(&heading) {
             printed.push(heading);
         }
@@ -86,21 +86,21 @@ fn the_demo_plays_a_day_and_its_board_is_served() {
     };
     let browser = Browser::start(scratch.path());
     let url = format!("{}/", server.url);
-    for view in [View::DESK, View::PHONE.dark().without_scripts()] {
+    for view in [View::DESKTOP, View::PHONE.dark().without_scripts()] {
         let page = browser.open_in(view, &url);
         assert_in_order(&table(&page.html()), &teams);
         assert_eq!(page.console_errors(), [""; 0]);
     }
-    // What a visitor without JavaScript gets.
+    // The page without a browser.
     assert_in_order(
         &table(&server.get("/", None).text().expect("a page is text")),
         &teams,
     );
 }
 
-/// A row's tier, as the printed board heads it, and its team, which must belong there by what it did.
-/// A busy machine may have cost any agent points for its computation time, and with them its tier.
-fn team_in_its_tier(row: &Value) -> [&str; 2] {
+/// The printed heading of a row's tier, and the row's team. Asserts that the tier fits the violations.
+/// On a busy machine any agent may get points for computation time, which can lower its tier.
+fn tier_heading_and_team(row: &Value) -> [&str; 2] {
     let text = |field: &str| row[field].as_str().expect("a row has its texts");
     let (team, tier) = (text("team"), text("tier"));
     let episodes_with = |violations: &[&str]| -> u64 {
@@ -138,7 +138,7 @@ fn assert_in_order(text: &str, parts: &[&str]) {
     for part in parts {
         rest = rest
             .split_once(part)
-            .unwrap_or_else(|| panic!("{part:?} is not in its place:\n{text}"))
+            .unwrap_or_else(|| panic!("{part:?} is missing or out of order:\n{text}"))
             .1;
     }
 }

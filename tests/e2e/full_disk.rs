@@ -1,14 +1,14 @@
-//! A disk that fills up while the server works, and has room again some time later: nothing is lost,
-//! nobody is blamed, and every result is that of an undisturbed run.
+//! A disk that fills up while the server runs, and has free space again later: no data are lost, no agent gets a fault,
+//! and each result equals that of an undisturbed run.
 //!
-//! The agent of these tests waits wherever a file in its folder tells it to. So a test knows in the
-//! middle of what the disk is full.
+//! The agent of these tests waits before the episode that a file in its folder names. So a test controls when the disk
+//! fills up.
 
-use crate::{Team, dataset, entry, scored_locally, upgrade, without_times};
+use crate::{Team, dataset, entry, score_locally, upgrade, without_times};
 use faceoff_tests::{
-    bundle::{packed, python_bundle},
-    server::{PATIENCE, Server, http},
-    small_disk::{Full, LogTo, SmallDisk},
+    bundle::{pack, python_bundle},
+    server::{TIMEOUT, Server, http},
+    small_disk::{FilledDisk, LogTo, SmallDisk},
 };
 use reqwest::blocking::Body;
 use serde_json::{Value, json};
@@ -32,7 +32,7 @@ def say(answer):
     sys.stdout.write(json.dumps(answer) + "\n")
     sys.stdout.flush()
 
-def wait_if_told(task, episode):
+def wait_while_held(task, episode):
     while os.path.exists(HOLD):
         try:
             named = open(HOLD).read().split()
@@ -51,7 +51,7 @@ for line in sys.stdin:
         say({"type": "ready", "protocol": 1, "interpolation": 3})
     elif kind == "reset":
         held = None
-        wait_if_told(task, message["episode"])
+        wait_while_held(task, message["episode"])
         say({"type": "ready", "episode": message["episode"]})
     elif kind == "step":
         held = held or message["obs"][6:13]
@@ -60,7 +60,7 @@ for line in sys.stdin:
         break
 "#;
 
-/// As in the other tests, with so many bytes to be kept free, and more of the section `[workers]`.
+/// The configuration with this minimum of free bytes, and more lines for the section `[workers]`.
 fn config(min_free_bytes: u64, workers: &str) -> String {
     format!(
         "{}\n[server]\nmin_free_bytes = {min_free_bytes}\n[evaluation]\nepisodes_per_task = 4\n\
@@ -69,26 +69,26 @@ fn config(min_free_bytes: u64, workers: &str) -> String {
     )
 }
 
-/// Scratch files on another disk: of the small one only database and artifacts remain.
-fn scratch_beside(folder: &Path) -> String {
+/// Puts scratch files on another disk, so that the small one holds only database and artifacts.
+fn scratch_on_other_disk(folder: &Path) -> String {
     format!("scratch_dir = {:?}", folder.join("scratch"))
 }
 
-/// Where the unpacked agent reads what to wait for.
-struct Hold(PathBuf);
+/// The file in which the unpacked agent reads before which episode to wait.
+struct HoldFile(PathBuf);
 
-impl Hold {
+impl HoldFile {
     fn in_scratch(scratch: &Path) -> Self {
         Self(scratch.join("slot-0/bundle-1/unpacked/hold"))
     }
 
-    fn at(&self, episode: &str) {
+    fn hold_before(&self, episode: &str) {
         let beside = self.0.with_extension("new");
         fs::write(&beside, episode).expect("the agent is unpacked");
         fs::rename(&beside, &self.0).expect("the agent is unpacked");
     }
 
-    fn go_on(&self) {
+    fn release(&self) {
         fs::remove_file(&self.0).expect("the agent is held");
     }
 }
@@ -108,25 +108,25 @@ fn wait_for_health(server: &Server, status: u16) -> Value {
         if found == status {
             return answer;
         }
-        assert!(started.elapsed() < PATIENCE, "still {found}: {answer:#}");
+        assert!(started.elapsed() < TIMEOUT, "still {found}: {answer:#}");
         thread::sleep(Duration::from_millis(50));
     }
 }
 
-/// A new team, if the database can be written.
-fn try_team(server: &Server, name: &str) -> u16 {
+/// Tries to create a team, which needs a write to the database; returns the status.
+fn try_create_team(server: &Server, name: &str) -> u16 {
     let path = "/api/v1/teams";
     let answer = server.post(path, &server.admin_token, &json!({ "name": name }));
     answer.status().as_u16()
 }
 
-/// Writes until not a page of the database can be written: its log may have pages to spare that are on
-/// the disk already. How often that was refused.
-fn use_up(server: &Server) -> u32 {
+/// Writes until the database is not writable: its log may still have allocated pages. Returns the number of refused
+/// writes.
+fn exhaust_database(server: &Server) -> u32 {
     let started = Instant::now();
     let (mut number, mut refused) = (0, 0);
     loop {
-        match try_team(server, &format!("Team {number}")) {
+        match try_create_team(server, &format!("Team {number}")) {
             201 => number += 1,
             507 => refused += 1,
             other => panic!("creating a team on a full disk: {other}"),
@@ -135,21 +135,21 @@ fn use_up(server: &Server) -> u32 {
             return refused;
         }
         assert!(
-            started.elapsed() < PATIENCE,
+            started.elapsed() < TIMEOUT,
             "{number} teams on a full disk"
         );
     }
 }
 
-/// Waits until an evaluation is so far, and stays there: its agent was told to wait.
-fn played(disk: &SmallDisk, team: &Team, evaluation: &str, episodes: u64) {
+/// Waits until an evaluation has this many episodes; its agent waits before the next.
+fn wait_for_episodes(disk: &SmallDisk, team: &Team, evaluation: &str, episodes: u64) {
     let _ = disk.server.poll(evaluation, &team.token, |answer| {
         answer["progress"]["episodes_done"].as_u64() >= Some(episodes)
     });
 }
 
-/// The evaluation ends as if nothing had been: the result of anyone's undisturbed run of the same seeds, a
-/// dataset that stands up to verification, and no fault or retry in it.
+/// Asserts that the evaluation ends like an undisturbed run: same result as a local evaluation with the same seeds, a
+/// dataset that passes verification, no fault and no retry.
 fn assert_undisturbed(
     disk: &SmallDisk,
     team: &Team,
@@ -157,7 +157,7 @@ fn assert_undisturbed(
     agent: &Path,
     scratch: &Path,
 ) {
-    let finished = team.finished(&disk.server, evaluation);
+    let finished = team.wait_until_finished(&disk.server, evaluation);
     assert_eq!(finished["state"], "finished", "{finished:#}");
     upgrade::verify(&disk.server, evaluation, &team.token, scratch);
     let mut dataset = dataset(&disk.server, evaluation, &team.token);
@@ -167,21 +167,21 @@ fn assert_undisturbed(
         assert_eq!(shard.get("platform_retries"), None, "{shards:#}");
     }
     let manifest = entry(&mut dataset, "manifest.json");
-    let local = scored_locally(agent, &manifest, 4, &scratch.join("local"));
+    let local = score_locally(agent, &manifest, 4, &scratch.join("local"));
     // the dataset released the seed
-    let finished = team.finished(&disk.server, evaluation);
+    let finished = team.wait_until_finished(&disk.server, evaluation);
     assert_eq!(without_times(&finished["result"]), without_times(&local));
 }
 
 /// A team with a valid agent on a small disk.
-struct Contest {
+struct SmallDiskSetup {
     disk: SmallDisk,
     team: Team,
     submission: Value,
     agent: PathBuf,
 }
 
-impl Contest {
+impl SmallDiskSetup {
     fn prepare(folder: &Path, config: &str, log: LogTo) -> Self {
         let disk = SmallDisk::start(folder, DISK_BYTES, config, log);
         let agent = python_bundle(folder, "waits", WAITING_AGENT);
@@ -202,16 +202,16 @@ impl Contest {
 }
 
 #[test]
-fn uploads_are_refused_below_the_watermark_and_the_queue_goes_on_by_itself() {
+fn low_space_refuses_uploads_and_queue_resumes_automatically() {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
-    let contest = Contest::prepare(scratch.path(), &config(8 << 20, ""), LogTo::Test);
-    let Contest { disk, team, .. } = &contest;
+    let setup = SmallDiskSetup::prepare(scratch.path(), &config(8 << 20, ""), LogTo::Test);
+    let SmallDiskSetup { disk, team, .. } = &setup;
     let server = &disk.server;
     assert_eq!(wait_for_health(server, 200)["status"], "ok");
     let before = disk.files("artifacts");
 
-    let short = disk.all_but(6 << 20);
-    let refused = server.upload(&team.token, packed(&contest.agent));
+    let short = disk.fill_except(6 << 20);
+    let refused = server.upload(&team.token, pack(&setup.agent));
     assert_eq!(refused.status(), 507);
     assert!(refused.headers().contains_key("retry-after"));
     let problem: Value = refused.json().expect("a problem is JSON");
@@ -226,42 +226,42 @@ fn uploads_are_refused_below_the_watermark_and_the_queue_goes_on_by_itself() {
     assert_eq!(server.get("/api/v1/health/live", None).status(), 200);
     for page in ["/", "/season", "/tasks/hit"] {
         let page = server.get(page, None).text().expect("a page is text");
-        assert!(page.contains("too little room"), "{page}");
+        assert!(page.contains("almost full"), "{page}");
     }
-    // A day can be started: it is queued, and waits.
-    let evaluation = contest.evaluate();
-    // many looks at the disk, by all who ask
+    // A day can be started; its evaluations stay queued.
+    let evaluation = setup.evaluate();
+    // repeated health requests do not resume the queue
     for _ in 0..20 {
         assert_eq!(health(server).0, 503);
     }
-    let waiting = server.poll(&evaluation, &team.token, |_| true);
-    assert_eq!(waiting["state"], "queued", "{waiting:#}");
+    let queued = server.poll(&evaluation, &team.token, |_| true);
+    assert_eq!(queued["state"], "queued", "{queued:#}");
     drop(short);
 
-    assert_undisturbed(disk, team, &evaluation, &contest.agent, scratch.path());
+    assert_undisturbed(disk, team, &evaluation, &setup.agent, scratch.path());
     assert_eq!(health(server).0, 200);
     let page = server.get("/", None).text().expect("a page is text");
-    assert!(!page.contains("too little room"), "{page}");
-    let again = team.submit(server, &contest.agent);
-    assert_eq!(again["state"], "valid", "{again:#}");
+    assert!(!page.contains("almost full"), "{page}");
+    let next = team.submit(server, &setup.agent);
+    assert_eq!(next["state"], "valid", "{next:#}");
     let log = server.log();
-    for change in ["the queue pauses", "the queue goes on"] {
+    for change in ["disk space: the queue pauses", "again: the queue resumes"] {
         assert_eq!(log.matches(change).count(), 1, "{change}: {log}");
     }
 }
 
-/// Does something when half of it has been read.
-struct HalfWay<F> {
+/// A reader that calls `at_half` once half of its bytes are read.
+struct HalfwayReader<F> {
     bytes: io::Cursor<Vec<u8>>,
-    then: Option<F>,
+    at_half: Option<F>,
 }
 
-impl<F: FnOnce()> Read for HalfWay<F> {
+impl<F: FnOnce()> Read for HalfwayReader<F> {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         if self.bytes.position() * 2 >= self.bytes.get_ref().len() as u64
-            && let Some(then) = self.then.take()
+            && let Some(at_half) = self.at_half.take()
         {
-            then();
+            at_half();
         }
         // in small pieces
         let most = buffer.len().min(16 << 10);
@@ -269,7 +269,7 @@ impl<F: FnOnce()> Read for HalfWay<F> {
     }
 }
 
-/// An agent with a file that no archive makes smaller.
+/// An agent with a file that does not compress.
 fn large_agent(folder: &Path, bytes: usize) -> PathBuf {
     let agent = python_bundle(folder, "large", WAITING_AGENT);
     let mut state = 1_u64;
@@ -286,25 +286,25 @@ fn large_agent(folder: &Path, bytes: usize) -> PathBuf {
 }
 
 #[test]
-fn a_disk_that_fills_up_under_an_upload_leaves_nothing_of_it() {
+fn upload_on_disk_that_fills_up_leaves_no_files() {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
     let folder = scratch.path();
     let disk = SmallDisk::start(folder, DISK_BYTES, &config(1 << 20, ""), LogTo::Test);
     let team = Team::create(&disk.server, "Phoenix");
-    let archive = packed(&large_agent(folder, 4 << 20));
+    let archive = pack(&large_agent(folder, 4 << 20));
     let (path, url) = ("/api/v1/submissions", &disk.server.url);
 
     let (sender, filled) = std::sync::mpsc::channel();
     let length = archive.len() as u64;
     let root = disk.data_dir.clone();
-    let body = HalfWay {
+    let body = HalfwayReader {
         bytes: io::Cursor::new(archive.clone()),
-        then: Some(move || {
-            sender.send(Full::of(&root)).expect("the test waits");
+        at_half: Some(move || {
+            sender.send(FilledDisk::fill(&root)).expect("the test waits");
         }),
     };
     let refused = http()
-        .timeout(PATIENCE)
+        .timeout(TIMEOUT)
         .build()
         .expect("a client needs nothing")
         .post(format!("{url}{path}"))
@@ -313,7 +313,7 @@ fn a_disk_that_fills_up_under_an_upload_leaves_nothing_of_it() {
         .send()
         .expect("the server answers");
     assert_eq!(refused.status(), 507);
-    let full = filled.recv().expect("half of it was sent");
+    let full = filled.recv().expect("half of the upload was sent");
     assert_eq!(wait_for_health(&disk.server, 503)["room"], "short");
     drop(full);
     assert!(disk.files("uploads").is_empty());
@@ -323,7 +323,7 @@ fn a_disk_that_fills_up_under_an_upload_leaves_nothing_of_it() {
         .get(path, Some(&team.token))
         .json()
         .expect("the API speaks JSON");
-    assert_eq!(own, json!([]), "no submission came of it");
+    assert_eq!(own, json!([]), "no submission was created");
 
     let id = team.upload(&disk.server, archive);
     assert_eq!(team.verdict(&disk.server, &id)["state"], "valid");
@@ -331,68 +331,68 @@ fn a_disk_that_fills_up_under_an_upload_leaves_nothing_of_it() {
 }
 
 #[test]
-fn a_bundle_that_finds_no_room_to_be_unpacked_is_not_invalid() {
+fn validation_without_space_to_unpack_is_repeated() {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
     let folder = scratch.path();
     let disk = SmallDisk::start(folder, DISK_BYTES, &config(1 << 20, ""), LogTo::Test);
     let team = Team::create(&disk.server, "Phoenix");
     let agent = python_bundle(folder, "swells", WAITING_AGENT);
-    // packed, it is small
+    // its archive is small
     fs::write(agent.join("zeros"), vec![0; 16 << 20]).expect("a scratch file can be written");
-    let archive = packed(&agent);
+    let archive = pack(&agent);
     assert!(archive.len() < 1 << 20);
 
-    // Enough for everything else. What is left of the first try would keep the queue from a second one.
-    let short = disk.all_but(10 << 20);
+    // Enough for everything but the unpacked bundle. Files left by the first try would block the second.
+    let short = disk.fill_except(10 << 20);
     let id = team.upload(&disk.server, archive);
-    disk.server.wait_for_log("no room for the unit", 2);
-    let waiting = team.verdict_so_far(&disk.server, &id);
-    assert_eq!(waiting["state"], "validating", "{waiting:#}");
+    disk.server.wait_for_log("disk full: job released", 2);
+    let pending = team.submission(&disk.server, &id);
+    assert_eq!(pending["state"], "validating", "{pending:#}");
     drop(short);
     let verdict = team.verdict(&disk.server, &id);
     assert_eq!(verdict["state"], "valid", "{verdict:#}");
 }
 
-/// The disk is full when the agent, which waits before `episode` with so many `done`, goes on.
-fn interrupted_shard(episode: &str, done: u64) {
+/// Fills the disk while the agent waits before `episode`, with `done` episodes finished.
+fn fill_disk_during_shard(episode: &str, done: u64) {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
-    let contest = Contest::prepare(scratch.path(), &config(4 << 20, ""), LogTo::Test);
-    let Contest { disk, team, .. } = &contest;
-    let hold = Hold::in_scratch(&disk.data_dir.join("scratch"));
-    hold.at(episode);
-    let evaluation = contest.evaluate();
-    played(disk, team, &evaluation, done);
-    let full = disk.full();
-    hold.go_on();
-    disk.server.wait_for_log("no room for the unit", 1);
+    let setup = SmallDiskSetup::prepare(scratch.path(), &config(4 << 20, ""), LogTo::Test);
+    let SmallDiskSetup { disk, team, .. } = &setup;
+    let hold = HoldFile::in_scratch(&disk.data_dir.join("scratch"));
+    hold.hold_before(episode);
+    let evaluation = setup.evaluate();
+    wait_for_episodes(disk, team, &evaluation, done);
+    let full = disk.fill();
+    hold.release();
+    disk.server.wait_for_log("disk full: job released", 1);
     let not_ready = wait_for_health(&disk.server, 503);
     assert_eq!(not_ready["room"], "short", "{not_ready:#}");
     let running = disk.server.poll(&evaluation, &team.token, |_| true);
     assert_eq!(running["state"], "running", "{running:#}");
     drop(full);
-    assert_undisturbed(disk, team, &evaluation, &contest.agent, scratch.path());
+    assert_undisturbed(disk, team, &evaluation, &setup.agent, scratch.path());
 }
 
 #[test]
-fn a_shard_in_whose_middle_the_disk_fills_up_is_played_as_if_nothing_had_been() {
-    interrupted_shard("hit 1", 1);
+fn shard_interrupted_by_full_disk_is_repeated_without_fault() {
+    fill_disk_during_shard("hit 1", 1);
 }
 
 #[test]
-fn so_is_one_that_has_recorded_nothing_yet() {
-    interrupted_shard("defend 2", 6);
+fn unrecorded_shard_is_repeated_after_full_disk() {
+    fill_disk_during_shard("defend 2", 6);
 }
 
 #[test]
-fn a_dataset_that_finds_no_room_is_joined_when_there_is() {
+fn dataset_is_joined_once_space_is_free() {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
-    // so little to be kept free that the queue does not pause before the dataset is begun
-    let contest = Contest::prepare(scratch.path(), &config(4 << 10, ""), LogTo::Test);
-    let Contest { disk, team, .. } = &contest;
-    let hold = Hold::in_scratch(&disk.data_dir.join("scratch"));
-    hold.at("prepare 3");
-    let evaluation = contest.evaluate();
-    played(disk, team, &evaluation, 11);
+    // a minimum so small that the queue does not pause before the dataset is written
+    let setup = SmallDiskSetup::prepare(scratch.path(), &config(4 << 10, ""), LogTo::Test);
+    let SmallDiskSetup { disk, team, .. } = &setup;
+    let hold = HoldFile::in_scratch(&disk.data_dir.join("scratch"));
+    hold.hold_before("prepare 3");
+    let evaluation = setup.evaluate();
+    wait_for_episodes(disk, team, &evaluation, 11);
     let bytes = |folder| -> u64 {
         let files = disk.files(folder);
         files
@@ -401,116 +401,116 @@ fn a_dataset_that_finds_no_room_is_joined_when_there_is() {
             .map(|found| found.len())
             .sum()
     };
-    // Five of six shards are stored. The sixth needs room for itself twice, here and in the scratch
-    // folder, and some for the database; the dataset for six of them, three times.
+    // Five of six shards are stored. The sixth needs its size twice, in the artifacts and in the scratch folder, and some
+    // space for the database. The dataset needs the size of all six three times.
     let recorded = bytes("artifacts/recordings");
     assert!(recorded > 400 << 10, "{recorded} bytes of five recordings");
-    let short = disk.all_but(recorded + recorded / 4);
-    hold.go_on();
-    disk.server.wait_for_log("no room for the unit", 1);
-    let waiting = disk.server.poll(&evaluation, &team.token, |answer| {
+    let short = disk.fill_except(recorded + recorded / 4);
+    hold.release();
+    disk.server.wait_for_log("disk full: job released", 1);
+    let pending = disk.server.poll(&evaluation, &team.token, |answer| {
         answer["state"] != "running"
     });
-    assert_eq!(waiting["state"], "finalising", "{waiting:#}");
+    assert_eq!(pending["state"], "finalising", "{pending:#}");
     assert!(
         disk.files("artifacts/datasets").is_empty(),
-        "a dataset appears whole or not at all"
+        "a dataset is stored completely or not at all"
     );
     drop(short);
-    assert_undisturbed(disk, team, &evaluation, &contest.agent, scratch.path());
+    assert_undisturbed(disk, team, &evaluation, &setup.agent, scratch.path());
 }
 
-/// The database cannot be written for longer than a lease lasts.
-fn only_the_database(log: LogTo, min_free_bytes: u64) {
+/// Makes the database unwritable for longer than a lease.
+fn block_database_writes(log: LogTo, min_free_bytes: u64) {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
-    let config = config(min_free_bytes, &scratch_beside(scratch.path()));
-    let contest = Contest::prepare(scratch.path(), &config, log);
-    let Contest { disk, team, .. } = &contest;
+    let config = config(min_free_bytes, &scratch_on_other_disk(scratch.path()));
+    let setup = SmallDiskSetup::prepare(scratch.path(), &config, log);
+    let SmallDiskSetup { disk, team, .. } = &setup;
     let server = &disk.server;
-    let hold = Hold::in_scratch(&scratch.path().join("scratch"));
-    hold.at("hit 1");
-    let evaluation = contest.evaluate();
-    played(disk, team, &evaluation, 1);
+    let hold = HoldFile::in_scratch(&scratch.path().join("scratch"));
+    hold.hold_before("hit 1");
+    let evaluation = setup.evaluate();
+    wait_for_episodes(disk, team, &evaluation, 1);
 
-    let full = disk.full();
+    let full = disk.fill();
     let since = Instant::now();
-    let refused = use_up(server);
-    // not to wait for something: a lease is 5 s
+    let refused = exhaust_database(server);
+    // waits longer than a lease of 5 s
     while since.elapsed() < Duration::from_secs(8) {
-        assert_eq!(try_team(server, "Nobody"), 507, "after {refused} refusals");
+        assert_eq!(try_create_team(server, "Refused"), 507, "after {refused} refusals");
     }
     assert_eq!(server.get("/api/v1/health/live", None).status(), 200);
-    // what needs no room is there
+    // requests that need no space are answered
     assert_eq!(server.get("/", None).status(), 200);
     assert_eq!(server.get(&evaluation, Some(&team.token)).status(), 200);
     drop(full);
 
-    // the writer is as good as new
+    // writes succeed again
     let created = loop {
-        match try_team(server, "Successor") {
-            // the filler's last pages may be on their way out
+        match try_create_team(server, "Successor") {
+            // the filler's last pages may not be freed yet
             507 => thread::sleep(Duration::from_millis(20)),
             status => break status,
         }
     };
     assert_eq!(created, 201);
     wait_for_health(server, 200);
-    hold.go_on();
-    assert_undisturbed(disk, team, &evaluation, &contest.agent, scratch.path());
+    hold.release();
+    assert_undisturbed(disk, team, &evaluation, &setup.agent, scratch.path());
     if log == LogTo::Disk {
         let log = fs::read_to_string(disk.log_file()).expect("the log is there");
         assert!(!log.contains("panicked"), "{log}");
-        let told = log.lines().last().unwrap_or_default();
+        let last_line = log.lines().last().unwrap_or_default();
         assert!(
             log.contains("serving"),
-            "it logged before, and after: {told}"
+            "it logged before and after: {last_line}"
         );
     }
 }
 
 #[test]
-fn a_database_that_cannot_be_written_for_a_while_is_written_again_afterwards() {
-    only_the_database(LogTo::Test, 4 << 20);
+fn unwritable_database_recovers_after_full_disk() {
+    block_database_writes(LogTo::Test, 4 << 20);
 }
 
 #[test]
-fn so_it_is_where_nothing_is_to_be_kept_free() {
-    only_the_database(LogTo::Test, 0);
+fn unwritable_database_recovers_without_reserved_space() {
+    block_database_writes(LogTo::Test, 0);
 }
 
 #[test]
-fn a_log_on_the_full_disk_ends_no_part_of_the_server() {
-    only_the_database(LogTo::Disk, 4 << 20);
+fn server_survives_log_file_on_full_disk() {
+    block_database_writes(LogTo::Disk, 4 << 20);
 }
 
 #[test]
-fn a_verdict_waits_for_room_to_be_written_down() {
+fn verdict_is_committed_once_space_is_free() {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
     let folder = scratch.path();
-    let config = config(4 << 20, &scratch_beside(folder));
+    let config = config(4 << 20, &scratch_on_other_disk(folder));
     let disk = SmallDisk::start(folder, DISK_BYTES, &config, LogTo::Test);
     let team = Team::create(&disk.server, "Phoenix");
     let agent = python_bundle(folder, "waits", WAITING_AGENT);
     fs::write(agent.join("hold"), "prepare *").expect("a scratch file can be written");
-    let id = team.upload(&disk.server, packed(&agent));
-    let hold = Hold::in_scratch(&folder.join("scratch"));
-    // its smoke run is under way from then on
+    let id = team.upload(&disk.server, pack(&agent));
+    let hold = HoldFile::in_scratch(&folder.join("scratch"));
+    // the file exists once the validation run has unpacked the bundle
     while !hold.0.exists() {
         thread::sleep(Duration::from_millis(20));
     }
-    let full = disk.full();
-    let _ = use_up(&disk.server);
-    hold.go_on();
-    disk.server.wait_for_log("no room to commit", 1);
-    let waiting = team.verdict_so_far(&disk.server, &id);
-    assert_eq!(waiting["state"], "validating", "{waiting:#}");
+    let full = disk.fill();
+    let _ = exhaust_database(&disk.server);
+    hold.release();
+    disk.server.wait_for_log("disk full: waiting to commit", 1);
+    let pending = team.submission(&disk.server, &id);
+    assert_eq!(pending["state"], "validating", "{pending:#}");
     drop(full);
     let verdict = team.verdict(&disk.server, &id);
     assert_eq!(verdict["state"], "valid", "{verdict:#}");
     assert_eq!(
-        disk.server.log().matches("begun").count(),
+        disk.server.log().matches("started job=").count(),
         1,
-        "it was checked once: {}",
+        "it was validated once: {}",
         disk.server.log()
     );
 }

@@ -1,6 +1,5 @@
-//! `kill -9` again and again, at moments drawn in advance and counted in entries of the server's log, so
-//! that a quick machine and a slow one are killed in the same places: the dataset is the one of a run
-//! that nobody disturbed.
+//! A server that is killed repeatedly with `kill -9`: the dataset equals that of an undisturbed run. The moments are
+//! drawn in advance and counted in entries of the server's log, so they are the same on quick and slow machines.
 
 use crate::{Team, without_times};
 use arrow_array::RecordBatch;
@@ -16,7 +15,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-/// Three tasks of so many are more shards than [`KILLS`], of which each commits one at most.
+/// Episodes per task. The shards of three tasks outnumber [`KILLS`]; each server process commits at most one shard.
 const EPISODES: u32 = 10;
 /// One episode per shard: many commits for the kills to hit.
 const CONFIG: &str = concat!(
@@ -29,10 +28,10 @@ episodes_per_shard = 1
 slots = 1
 "#
 );
-/// A server's lives that end with `kill -9`.
+/// Number of server processes that end with `kill -9`.
 const KILLS: u64 = 28;
-/// What no run can repeat.
-const TIMES: [&str; 8] = [
+/// Columns and fields that no run can reproduce.
+const NON_REPRODUCIBLE: [&str; 8] = [
     "computation_time_ns",
     "host_time_ns",
     "cpu_time_ns",
@@ -40,7 +39,7 @@ const TIMES: [&str; 8] = [
     "computation_time_max_s",
     "times_blake3",
     "host_noise_reruns",
-    // of which computation time is a part; `results.json` has the counts of the others
+    // they include computation time; `results.json` has the counts of the other violations
     "penalty_points",
 ];
 
@@ -65,23 +64,23 @@ pub(crate) fn copy_folder(from: &Path, to: &Path) {
     }
 }
 
-/// When a life ends.
+/// When a server process is killed.
 #[derive(Debug, Clone, Copy)]
-enum Moment {
-    /// So many entries after the server began to start, or after what another moment waits for.
+enum KillMoment {
+    /// This many log entries after the start, or after the event of another variant.
     After(u32),
-    /// So many entries after a shard was claimed: while it is played, handed over, committed.
+    /// This many log entries after a shard was claimed: while it runs or is committed.
     AfterClaim(u32),
     /// Some time after a shard was claimed.
     During,
-    /// So many entries after a shard was committed.
+    /// This many log entries after a shard was committed.
     AfterCommit(u32),
 }
 
-impl Moment {
-    fn of(life: u64) -> Self {
-        // A start tells some 30 entries, a shard 6 until it begins and 8 until it is committed; a page of
-        // log, which the server may be further, holds 7.
+impl KillMoment {
+    fn draw(life: u64) -> Self {
+        // A start logs about 30 entries, a shard 6 until it starts and 8 until it is committed. The server may be one page of
+        // log ahead, which holds 7 entries.
         let entries = |most: u32| (f64::from(most) * draw(life)) as u32;
         match life % 4 {
             0 => Self::AfterCommit(entries(5)),
@@ -91,12 +90,12 @@ impl Moment {
         }
     }
 
-    /// Told of every entry of the log, in order.
-    fn has_come(&mut self, event: &Event) -> bool {
+    /// Must be called for each entry of the log, in order.
+    fn is_reached(&mut self, event: &Event) -> bool {
         *self = match (*self, event) {
-            (Self::After(0), _) | (Self::During, Event::Begun(_)) => return true,
+            (Self::After(0), _) | (Self::During, Event::Started(_)) => return true,
             (Self::After(entries), _) => Self::After(entries - 1),
-            (Self::AfterClaim(entries), Event::Begun(_))
+            (Self::AfterClaim(entries), Event::Started(_))
             | (Self::AfterCommit(entries), Event::Committed(_)) => Self::After(entries),
             (waiting, _) => waiting,
         };
@@ -104,27 +103,27 @@ impl Moment {
     }
 }
 
-/// What an entry of the server's log tells of a shard.
+/// An entry of the server's log, as far as it concerns shards.
 enum Event {
-    Begun(String),
+    Started(String),
     Committed(String),
-    /// Something else, a statement of the database mostly.
+    /// Another entry, mostly a statement of the database.
     Other,
 }
 
 impl Event {
     /// # Panics
-    /// If no shard is left: whatever is killed from then on shows nothing.
-    fn of(entry: &Value) -> Self {
+    /// If no shard is left: later kills would test nothing.
+    fn parse(entry: &Value) -> Self {
         let text = |field: &str| entry["fields"][field].as_str().unwrap_or_default();
-        let work = text("work");
+        let description = text("description");
         assert!(
-            !work.starts_with("finalisation"),
-            "the run is over too early"
+            !description.starts_with("scoring"),
+            "the run has ended too early"
         );
         match text("message") {
-            "begun" => Self::Begun(work.to_owned()),
-            "committed" => Self::Committed(work.to_owned()),
+            "started" => Self::Started(description.to_owned()),
+            "committed" => Self::Committed(description.to_owned()),
             _ => Self::Other,
         }
     }
@@ -134,14 +133,14 @@ pub(crate) type Archive = zip::ZipArchive<Cursor<Vec<u8>>>;
 
 /// Waits for the score and downloads the dataset.
 pub(crate) fn outcome(server: &Server, team: &Team, evaluation: &str) -> (Value, Archive) {
-    let finished = team.finished(server, evaluation);
+    let finished = team.wait_until_finished(server, evaluation);
     assert_eq!(finished["state"], "finished", "{finished:#}");
     let dataset = server.get(&format!("{evaluation}/dataset"), Some(&team.token));
     assert_eq!(dataset.status(), 200);
     let bytes = dataset.bytes().expect("the download completes").to_vec();
     let archive = zip::ZipArchive::new(Cursor::new(bytes)).expect("a dataset is a zip");
-    // again: with the dataset the seed is released
-    let finished = team.finished(server, evaluation);
+    // read again: the download released the seed
+    let finished = team.wait_until_finished(server, evaluation);
     (finished["result"].clone(), archive)
 }
 
@@ -155,7 +154,7 @@ fn file(archive: &mut Archive, name: &str) -> Vec<u8> {
     bytes
 }
 
-/// A table without the columns that no run can repeat, in parts.
+/// A table without the columns that no run can reproduce, in batches.
 fn table(archive: &mut Archive, name: &str) -> Vec<RecordBatch> {
     let bytes = Bytes::from(file(archive, name));
     let reader = ParquetRecordBatchReaderBuilder::try_new(bytes)
@@ -163,10 +162,10 @@ fn table(archive: &mut Archive, name: &str) -> Vec<RecordBatch> {
         .unwrap_or_else(|error| panic!("{name}: {error}"));
     let part = |batch: RecordBatch| {
         let schema = batch.schema();
-        let kept: Vec<usize> = (0..batch.num_columns())
-            .filter(|column| !TIMES.contains(&schema.field(*column).name().as_str()))
+        let columns: Vec<usize> = (0..batch.num_columns())
+            .filter(|column| !NON_REPRODUCIBLE.contains(&schema.field(*column).name().as_str()))
             .collect();
-        batch.project(&kept).expect("these columns are there")
+        batch.project(&columns).expect("these columns are there")
     };
     reader
         .map(|batch| part(batch.unwrap_or_else(|error| panic!("{name}: {error}"))))
@@ -211,7 +210,8 @@ fn rows(table: &[RecordBatch]) -> usize {
     table.iter().map(RecordBatch::num_rows).sum()
 }
 
-/// Compares score and dataset of two runs of the same past, but for what no run can repeat. How many episodes they have.
+/// Asserts that two runs from the same data folder have equal scores and datasets, without non-reproducible parts.
+/// Returns the number of episodes.
 pub(crate) fn assert_same(
     (result, mut dataset): (Value, Archive),
     (expected, mut expected_dataset): (Value, Archive),
@@ -226,7 +226,7 @@ pub(crate) fn assert_same(
         assert_eq!(differing_columns(&one, &other), [""; 0], "{name}");
     }
     let episodes = table(&mut dataset, "episodes.parquet");
-    // No fault in it: nothing was blamed on the agent.
+    // The logs are equal: the agent got no fault.
     assert_eq!(
         String::from_utf8_lossy(&file(&mut dataset, "agent.log")),
         String::from_utf8_lossy(&file(&mut expected_dataset, "agent.log")),
@@ -242,12 +242,12 @@ pub(crate) fn assert_same(
 }
 
 #[test]
-fn killed_at_any_moment_a_run_ends_as_an_undisturbed_one() {
+fn repeatedly_killed_server_ends_run_like_undisturbed_one() {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
     let (killed, undisturbed) = (scratch.path().join("killed"), scratch.path().join("calm"));
     let striker = bundle::reference("striker", scratch.path());
 
-    // Two servers with one past: the same season secret, day, team and evaluation.
+    // Two servers with copies of one data folder: the same season secret, day, team and evaluation.
     let server = Server::start(&killed, CONFIG);
     let team = Team::create(&server, "Phoenix");
     let submission = team.submit(&server, &striker);
@@ -264,27 +264,27 @@ fn killed_at_any_moment_a_run_ends_as_an_undisturbed_one() {
 
     let mut committed = BTreeSet::new();
     for life in 0..KILLS {
-        let mut moment = Moment::of(life);
+        let mut moment = KillMoment::draw(life);
         let pause = match moment {
-            // Anywhere between a claim and what follows from the episode, by the measure of the other run.
-            Moment::During => per_episode.mul_f64(1.2 * draw(life)),
+            // Somewhere between the claim and the end of the episode, whose duration the other run has measured.
+            KillMoment::During => per_episode.mul_f64(1.2 * draw(life)),
             _ => Duration::ZERO,
         };
         let reached = |entry: &Value| {
-            let event = Event::of(entry);
+            let event = Event::parse(entry);
             match &event {
-                Event::Begun(shard) => assert!(
+                Event::Started(shard) => assert!(
                     !committed.contains(shard),
-                    "life {life} plays {shard} again, which was committed"
+                    "process {life} repeats {shard}, which was committed"
                 ),
                 Event::Committed(shard) => drop(committed.insert(shard.clone())),
                 Event::Other => {}
             }
-            moment.has_come(&event)
+            moment.is_reached(&event)
         };
         Server::start_and_kill(&killed, CONFIG, reached, pause);
     }
-    // Every fourth life lasts until a commit.
+    // Every fourth process lasts until a commit.
     assert!(committed.len() as u64 >= KILLS / 4, "{committed:?}");
     let server = Server::start(&killed, CONFIG);
     let rows = assert_same(outcome(&server, &team, &evaluation), expected);

@@ -1,45 +1,45 @@
-//! End to end: what an organiser, a team and a visitor get from the real program.
+//! End-to-end tests: what an organiser, a team and a visitor get from the real program.
 
-mod accessible;
+mod accessibility;
+mod agent_faults;
+mod agent_text;
+mod architecture;
 mod axe;
 mod backup;
-mod bad_agents;
 mod busy_host;
+mod cheating_agents;
 mod command_line;
 mod commands;
-mod crash;
-mod cut;
+mod connection_limits;
+mod container_images;
+mod crash_recovery;
+mod cutoff;
+mod dashboards;
 mod demo;
-mod desks;
-mod elsewhere;
-mod fair_shares;
 mod full_disk;
-mod growth;
-mod house;
-mod images;
-mod installed;
+mod installation;
+mod invalid_actions;
 mod kills;
 mod large_uploads;
-mod like_server;
-mod live;
-mod luck;
-mod packages;
-mod people;
+mod live_pages;
+mod local_evaluation;
+mod log_growth;
 mod pictures;
-mod privacy;
-mod real_time;
+mod python_packages;
+mod reference_result;
+mod remote_workers;
 mod replay;
 mod retention;
 mod runtimes;
+mod slot_shares;
 mod soak;
-mod strangers;
-mod told_text;
+mod time_budgets;
 mod tournament;
-mod undisturbed;
+mod tournament_page;
 mod upgrade;
 mod uploads;
-mod void_at_will;
-mod watching;
+mod users;
+mod visibility;
 
 use bytes::Bytes;
 use faceoff_tests::{bundle, program, repository, server::Server};
@@ -47,8 +47,8 @@ use serde_json::{Value, json};
 use std::{fs, io::Cursor, path::Path, process::Command};
 use zip::ZipArchive;
 
-/// A configuration for tests: few episodes, small shards, one slot, time for every answer. No server of a
-/// test copies this host's libraries into memory, but the one that is asked what agents find there.
+/// A configuration for tests: few episodes, small shards, one slot, generous time limits. Test servers do not copy
+/// this host's libraries into memory; the test of covert channels overrides that.
 const CONFIG: &str = concat!(
     include_str!("../patient.toml"),
     r#"
@@ -62,7 +62,6 @@ resident_bytes = 0
 "#
 );
 
-/// A team of a test.
 struct Team {
     token: String,
 }
@@ -84,9 +83,9 @@ impl Team {
         }
     }
 
-    /// Uploads a folder and waits for its verdict.
+    /// Uploads a folder as a bundle and waits for the verdict of its validation run.
     fn submit(&self, server: &Server, folder: &Path) -> Value {
-        let id = self.upload(server, bundle::packed(folder));
+        let id = self.upload(server, bundle::pack(folder));
         self.verdict(server, &id)
     }
 
@@ -100,7 +99,7 @@ impl Team {
             .to_owned()
     }
 
-    fn verdict_so_far(&self, server: &Server, submission: &str) -> Value {
+    fn submission(&self, server: &Server, submission: &str) -> Value {
         let path = format!("/api/v1/submissions/{submission}");
         server.poll(&path, &self.token, |_| true)
     }
@@ -113,13 +112,13 @@ impl Team {
         )
     }
 
-    /// Starts the day, on which this is active, and returns the evaluation's path.
+    /// Starts the day and returns the path of the evaluation of this active submission.
     fn evaluate(&self, server: &Server, submission: &Value) -> String {
         let day = start_day(server);
-        path_of(&day, submission)
+        evaluation_path(&day, submission)
     }
 
-    fn finished(&self, server: &Server, evaluation: &str) -> Value {
+    fn wait_until_finished(&self, server: &Server, evaluation: &str) -> Value {
         server.poll(evaluation, &self.token, |answer| {
             !["queued", "running", "finalising"]
                 .contains(&answer["state"].as_str().unwrap_or_default())
@@ -127,27 +126,27 @@ impl Team {
     }
 }
 
-/// The organiser starts the day.
+/// Starts the evaluation day as the organiser.
 fn start_day(server: &Server) -> Value {
     let answer = server.post("/api/v1/days", &server.admin_token, &json!({}));
     assert_eq!(answer.status(), 200, "starting the day");
     answer.json().expect("the API speaks JSON")
 }
 
-/// The path of the evaluation in which a submission plays a day.
-fn path_of(day: &Value, submission: &Value) -> String {
+/// The API path of a submission's evaluation on a day.
+fn evaluation_path(day: &Value, submission: &Value) -> String {
     let created = day["created"].as_array().expect("a day has evaluations");
-    let of_submission = created
+    let evaluation = created
         .iter()
         .find(|evaluation| evaluation["submission"] == submission["id"]);
-    let id = &of_submission.expect("it was active at the cut")["id"];
+    let id = &evaluation.expect("the submission was active at the cutoff")["id"];
     format!(
         "/api/v1/evaluations/{}",
         id.as_str().expect("an evaluation has an id")
     )
 }
 
-/// A finished evaluation's dataset.
+/// Downloads the dataset of a finished evaluation.
 fn dataset(server: &Server, evaluation: &str, token: &str) -> ZipArchive<Cursor<Bytes>> {
     let answer = server.get(&format!("{evaluation}/dataset"), Some(token));
     assert_eq!(answer.status(), 200, "the dataset of {evaluation}");
@@ -155,16 +154,16 @@ fn dataset(server: &Server, evaluation: &str, token: &str) -> ZipArchive<Cursor<
     ZipArchive::new(Cursor::new(bytes)).expect("a dataset is a zip")
 }
 
-/// A file of a dataset.
+/// A JSON file of a dataset.
 fn entry(dataset: &mut ZipArchive<Cursor<Bytes>>, name: &str) -> Value {
-    let file = dataset.by_name(name).expect("every dataset has it");
+    let file = dataset.by_name(name).expect("every dataset has this file");
     serde_json::from_reader(file).expect("it is JSON")
 }
 
-/// What the local evaluator makes of a bundle, with the seeds that a dataset's manifest publishes, so many
-/// episodes per task and another number of workers.
-fn scored_locally(bundle: &Path, manifest: &Value, episodes: u32, out: &Path) -> Value {
-    let seed = |name: &str| manifest[name].as_str().expect("the manifest names it");
+/// The result of the local evaluator for a bundle: with the seeds from a dataset's manifest, this number of episodes per
+/// task, and another number of workers than the server.
+fn score_locally(bundle: &Path, manifest: &Value, episodes: u32, out: &Path) -> Value {
+    let seed = |name: &str| manifest[name].as_str().expect("the manifest contains the seeds");
     let local = Command::new(program("faceoff"))
         .arg("eval")
         .arg(bundle)
@@ -187,7 +186,7 @@ fn scored_locally(bundle: &Path, manifest: &Value, episodes: u32, out: &Path) ->
     serde_json::from_slice(&result).expect("it is JSON")
 }
 
-/// A result without what no run can repeat: computation times and the points that follow from them.
+/// A result without its non-reproducible parts: computation times and the penalty points that follow from them.
 fn without_times(result: &Value) -> Value {
     fn remove(object: &mut Value, fields: &[&str]) {
         let object = object

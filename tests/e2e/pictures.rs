@@ -1,6 +1,6 @@
-//! The pictures of the README and the documentation that show pages: `make pictures`.
+//! Takes the pictures of pages for README and documentation: `make pictures`.
 
-use crate::{Team, path_of, start_day};
+use crate::{Team, evaluation_path, start_day};
 use faceoff_replay::ContactWith;
 use faceoff_tests::{
     browser::{Browser, Page, View},
@@ -25,40 +25,40 @@ fn image(name: &str) -> PathBuf {
     repository().join("docs/images").join(name)
 }
 
-/// Of what a window of this size shows.
-fn picture(page: &Page, view: View, name: &str) {
-    page.look_through(view);
-    page.window(&image(name));
+/// Saves a picture of what a window of this size shows.
+fn save_picture(page: &Page, view: View, name: &str) {
+    page.set_view(view);
+    page.screenshot_window(&image(name));
 }
 
 #[test]
 #[ignore = "it writes docs/images; `make pictures` runs it"]
-fn pictures_of_the_pages() {
+fn pictures_of_pages_are_taken() {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
     let server = Server::start(&scratch.path().join("data"), CONFIG);
-    let mut played = Vec::new();
+    let mut entries = Vec::new();
     for name in ["hold", "striker", "reckless"] {
         let team = Team::create(&server, name);
         let submission = team.submit(&server, &bundle::reference(name, scratch.path()));
         assert_eq!(submission["state"], "valid", "{submission:#}");
-        played.push((team, submission));
+        entries.push((team, submission));
     }
     let day = start_day(&server);
-    for (team, submission) in &played {
-        let finished = team.finished(&server, &path_of(&day, submission));
+    for (team, submission) in &entries {
+        let finished = team.wait_until_finished(&server, &evaluation_path(&day, submission));
         assert_eq!(finished["state"], "finished", "{finished}");
     }
     let browser = Browser::start(scratch.path());
     let board = browser.open(&format!("{}/", server.url));
     let view = View {
         height: 860,
-        ..View::DESK
+        ..View::DESKTOP
     };
-    picture(&board, view, "board.png");
+    save_picture(&board, view, "board.png");
 
-    // The striker's first goal, at the moment of the strike.
-    let (_, striker) = &played[1];
-    let api = path_of(&day, striker);
+    // The replay of the striker's first goal, at the moment of the strike.
+    let (_, striker) = &entries[1];
+    let api = evaluation_path(&day, striker);
     let episodes: Value = server
         .get(&format!("{api}/episodes"), None)
         .json()
@@ -70,7 +70,7 @@ fn pictures_of_the_pages() {
     let number = &goal.expect("the striker hits a goal")["episode"];
     let path = format!("{api}/episodes/hit/{number}");
     let bytes = server.get(&format!("{path}/motion"), None).bytes();
-    // Whether it came compressed was the client's to undo.
+    // The HTTP client has decompressed the clip; its reader expects it compressed.
     let mut packed = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::fast());
     packed
         .write_all(&bytes.expect("the clip comes whole"))
@@ -89,7 +89,7 @@ fn pictures_of_the_pages() {
     let view = View {
         width: 1200,
         height: 1290,
-        ..View::DESK
+        ..View::DESKTOP
     };
-    picture(&replay, view, "replay-page.png");
+    save_picture(&replay, view, "replay-page.png");
 }

@@ -1,8 +1,8 @@
-//! A stage that takes agents of one runtime only, from the organiser's command to the team's verdict.
+//! A stage that accepts agents of one runtime only, from the organiser's command to the team's verdict.
 
 use crate::{
     CONFIG, Team,
-    commands::{MISUSED, REFUSED, admin, faceoff, member},
+    commands::{USAGE_ERROR, REFUSED, admin, faceoff, member},
 };
 use faceoff_tests::{
     bundle::{python_agent, python_bundle, reference},
@@ -11,7 +11,7 @@ use faceoff_tests::{
 use serde_json::json;
 
 #[test]
-fn a_stage_refuses_what_is_not_of_its_runtimes_and_says_which_they_are() {
+fn stage_refuses_other_runtimes_and_names_accepted_ones() {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
     let server = Server::start(&scratch.path().join("data"), CONFIG);
     let change = |runtimes: &str| {
@@ -25,16 +25,16 @@ fn a_stage_refuses_what_is_not_of_its_runtimes_and_says_which_they_are() {
         ];
         admin(&server, &[&args[..], &[runtimes]].concat())
     };
-    change("julia").not_done(
+    change("julia").expect_refusal(
         REFUSED,
-        &["runtimes: expected some of", "native", "\"julia\""],
+        &["runtimes: expected runtimes", "native", "\"julia\""],
     );
-    change("../x").not_done(REFUSED, &["runtimes", "dots, dashes"]);
-    change("").not_done(REFUSED, &["runtimes"]);
+    change("../x").expect_refusal(REFUSED, &["runtimes", "dots, dashes"]);
+    change("").expect_refusal(REFUSED, &["runtimes"]);
     let args = ["stage", "change", "Qualifying", "--runtimes"];
-    admin(&server, &args).not_done(MISUSED, &["--runtimes"]);
+    admin(&server, &args).expect_refusal(USAGE_ERROR, &["--runtimes"]);
     let unconfirmed = admin(&server, &[&args[..], &["native"]].concat());
-    unconfirmed.not_done(REFUSED, &["other rules begin revision 2", "“confirm”"]);
+    unconfirmed.expect_refusal(REFUSED, &["new rules begin revision 2", "“confirm”"]);
 
     let team = Team::create(&server, "Alpha");
     let python = python_bundle(scratch.path(), "python", &python_agent("say(hold)"));
@@ -43,24 +43,24 @@ fn a_stage_refuses_what_is_not_of_its_runtimes_and_says_which_they_are() {
         (&first["state"], &first["runtime"]),
         (&json!("valid"), &json!("python3"))
     );
-    let told = change("native").done();
+    let output = change("native").expect_success();
     assert!(
-        told.contains("agents   of the runtime native only"),
-        "{told}"
+        output.contains("runtimes native only"),
+        "{output}"
     );
 
     let refused = team.submit(&server, &python);
     assert_eq!(refused["state"], "invalid", "{refused:#}");
     let reason = refused["reason"].as_str().expect("a refusal has a reason");
-    for words in ["“Qualifying”", "native only", "names python3 in agent.toml"] {
-        assert!(reason.contains(words), "{reason}");
+    for text in ["“Qualifying”", "native only", "names python3 in agent.toml"] {
+        assert!(reason.contains(text), "{reason}");
     }
     assert_eq!(refused["timing"], json!(null), "it was not started");
-    // What was valid before may be active, and is told that it does not play.
+    // A submission that was valid before can be active, but the command reports that the stage excludes it.
     let id = first["id"].as_str().expect("a submission has an id");
-    let active = member(&server, &team.token, "activate", &[id]).done();
+    let active = member(&server, &team.token, "activate", &[id]).expect_success();
     assert!(
-        active.contains("does not play at the next cut") && active.contains("native only"),
+        active.contains("excluded from the next cutoff") && active.contains("native only"),
         "{active}"
     );
     let status = [
@@ -71,14 +71,14 @@ fn a_stage_refuses_what_is_not_of_its_runtimes_and_says_which_they_are() {
         "--token",
         &team.token,
     ];
-    let status = faceoff(&status, "").done();
-    assert!(status.contains("does not play at the next cut"), "{status}");
-    admin(&server, &["start-day"]).not_done(REFUSED, &["that the stage takes"]);
+    let status = faceoff(&status, "").expect_success();
+    assert!(status.contains("excluded from the next cutoff"), "{status}");
+    admin(&server, &["start-day"]).expect_refusal(REFUSED, &["that the stage accepts"]);
     let native = team.submit(&server, &reference("striker", scratch.path()));
     assert_eq!(
         (&native["state"], &native["runtime"]),
         (&json!("valid"), &json!("native"))
     );
-    let told = change("all").done();
-    assert!(!told.contains("runtime"), "{told}");
+    let output = change("all").expect_success();
+    assert!(!output.contains("runtime"), "{output}");
 }

@@ -1,16 +1,16 @@
-//! All of it at once, for as long as one likes: evaluations, uploads good and bad, readers, a disk that fills
-//! up and has room again, and `kill -9`. At the end every result is the one of an undisturbed run, every
-//! upload has the verdict that it deserves, and nothing is left over.
-#![expect(clippy::print_stdout, reason = "it says what it has done in its hour")]
+//! A long run of everything at once: evaluations, valid and invalid uploads, readers, a disk that fills up and is freed,
+//! and `kill -9`. At the end each result equals that of an undisturbed run, each upload has the right verdict, and no
+//! files are left over.
+#![expect(clippy::print_stdout, reason = "it prints a summary of its run")]
 
 use crate::{
-    Team, dataset, entry, growth::BOUND_BYTES, kills::draw, path_of, scored_locally, start_day,
+    Team, dataset, entry, log_growth::LOG_LIMIT_BYTES, kills::draw, evaluation_path, score_locally, start_day,
     upgrade, without_times,
 };
 use faceoff_tests::{
-    bundle::{packed, python_agent, python_bundle, reference},
+    bundle::{pack, python_agent, python_bundle, reference},
     server::{Server, http},
-    small_disk::{Full, LogTo, SmallDisk},
+    small_disk::{FilledDisk, LogTo, SmallDisk},
 };
 use reqwest::blocking::{Client, RequestBuilder};
 use serde_json::Value;
@@ -23,72 +23,72 @@ use std::{
     time::{Duration, Instant},
 };
 
-/// What a team's agent does in each step.
+/// Code for each step of an agent that holds still.
 const HOLD: &str = "say(hold)";
-/// Swings one joint to and fro, too fast now and then.
+/// Swings one joint, sometimes too fast.
 const SWING: &str = "import math\n\
      p = list(held)\n\
      p[0] += 0.3 * math.sin(0.02 * message['step'] * (1 + message['step'] / 200))\n\
      say({'type': 'act', 'step': message['step'], 'action': [p, [0.0] * 7]})";
-/// Before that it sleeps, once an episode, so that evaluations last as long as the disturbance.
-const PACE: &str = "if message['step'] == 0:\n    time.sleep(1)\n";
+/// Sleeps once an episode, so that evaluations last as long as the disturbances.
+const PAUSE: &str = "if message['step'] == 0:\n    time.sleep(1)\n";
 
 /// A number from the environment.
-fn setting(name: &str, otherwise: u64) -> u64 {
-    env::var(name).map_or(otherwise, |text| text.parse().expect("a number"))
+fn setting(name: &str, default: u64) -> u64 {
+    env::var(name).map_or(default, |text| text.parse().expect("a number"))
 }
 
-/// Draws, each another: the number of the next.
-struct Draws(u64);
+/// Random numbers from a seed: the index of the next draw.
+struct Random(u64);
 
-impl Draws {
-    fn of_seed(seed: u64) -> Self {
+impl Random {
+    fn from_seed(seed: u64) -> Self {
         Self(seed << 32)
     }
 
-    /// Below `most`.
-    fn below(&mut self, most: u64) -> u64 {
+    /// A number below `limit`.
+    fn below(&mut self, limit: u64) -> u64 {
         self.0 += 1;
-        (draw(self.0) * most as f64) as u64
+        (draw(self.0) * limit as f64) as u64
     }
 
-    fn millis(&mut self, most: u64) -> Duration {
-        Duration::from_millis(self.below(most))
+    fn millis_below(&mut self, limit: u64) -> Duration {
+        Duration::from_millis(self.below(limit))
     }
 }
 
-/// What was done and how it was answered, counted.
+/// Counts of actions and of their responses.
 #[derive(Debug, Default)]
 struct Tally(Mutex<BTreeMap<String, u64>>);
 
 impl Tally {
-    fn add(&self, what: impl Into<String>) {
-        *lock(&self.0).entry(what.into()).or_default() += 1;
+    fn add(&self, action: impl Into<String>) {
+        *lock(&self.0).entry(action.into()).or_default() += 1;
     }
 }
 
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().expect("nobody panics with it")
+    mutex.lock().expect("no thread panics while it holds the lock")
 }
 
-/// What all threads share.
+/// State that all threads share.
 struct Soak {
-    /// Where the server is now.
+    /// The server's current address; it changes with each restart.
     url: Mutex<String>,
-    ends: Instant,
+    end: Instant,
     tally: Tally,
     client: Client,
 }
 
 impl Soak {
     fn is_over(&self) -> bool {
-        Instant::now() >= self.ends
+        Instant::now() >= self.end
     }
 
-    /// The status of the answer, if there was one, and its body.
-    fn ask(
+    /// Sends a request; the status and body of the response, `None` if the connection broke.
+    fn send(
         &self,
-        what: &str,
+        action: &str,
         request: impl Fn(&Client, &str) -> RequestBuilder,
     ) -> Option<(u16, String)> {
         let url = lock(&self.url).clone();
@@ -99,40 +99,40 @@ impl Soak {
         });
         match answer {
             Ok((status, body)) => {
-                self.tally.add(format!("{what} {status}"));
+                self.tally.add(format!("{action} {status}"));
                 Some((status, body))
             }
             // The server was killed.
             Err(_) => {
-                self.tally.add(format!("{what} broken off"));
+                self.tally.add(format!("{action} broken off"));
                 None
             }
         }
     }
 
-    /// Reads pages until it is over.
-    fn read(&self, pages: &[String]) {
+    /// Fetches pages until the end.
+    fn fetch_pages(&self, pages: &[String]) {
         for page in pages.iter().cycle() {
             if self.is_over() {
                 return;
             }
-            self.ask("page", |client, url| client.get(format!("{url}{page}")));
+            self.send("page", |client, url| client.get(format!("{url}{page}")));
             thread::sleep(Duration::from_millis(50));
         }
     }
 
-    /// Uploads one after the other until it is over; returns which were taken, and the verdict due to each.
+    /// Uploads archives in turn until the end; returns the ids of the accepted ones, with the expected verdicts.
     fn upload(
         &self,
         token: &str,
         archives: &[(Vec<u8>, &'static str)],
     ) -> Vec<(String, &'static str)> {
-        let mut taken = Vec::new();
+        let mut accepted = Vec::new();
         for (archive, verdict) in archives.iter().cycle() {
             if self.is_over() {
-                return taken;
+                return accepted;
             }
-            let answer = self.ask("upload", |client, url| {
+            let answer = self.send("upload", |client, url| {
                 client
                     .post(format!("{url}/api/v1/submissions"))
                     .bearer_auth(token)
@@ -141,63 +141,63 @@ impl Soak {
             if let Some((201, body)) = answer {
                 let body: Value = serde_json::from_str(&body).expect("the API speaks JSON");
                 let id = body["id"].as_str().expect("a submission has an id");
-                taken.push((id.to_owned(), *verdict));
+                accepted.push((id.to_owned(), *verdict));
             }
             thread::sleep(Duration::from_secs(6));
         }
-        taken
+        accepted
     }
 }
 
-/// A team that is evaluated: what it uploaded, and the same without pauses.
+/// An evaluated team, with its bundle without pauses for the local evaluation.
 struct Contestant {
     team: Team,
     submission: Value,
-    unhurried: PathBuf,
+    bundle_without_pauses: PathBuf,
 }
 
 impl Contestant {
-    fn enter(server: &Server, name: &str, bundle: &Path, unhurried: PathBuf) -> Self {
+    fn enter(server: &Server, name: &str, bundle: &Path, bundle_without_pauses: PathBuf) -> Self {
         let team = Team::create(server, name);
         let submission = team.submit(server, bundle);
         assert_eq!(submission["state"], "valid", "{submission:#}");
         Self {
             team,
             submission,
-            unhurried,
+            bundle_without_pauses,
         }
     }
 
     fn python(server: &Server, folder: &Path, name: &str, on_step: &str) -> Self {
         let bundle =
             |name: &str, on_step: &str| python_bundle(folder, name, &python_agent(on_step));
-        let paced = bundle(&format!("paced-{name}"), &format!("{PACE}{on_step}"));
-        Self::enter(server, name, &paced, bundle(name, on_step))
+        let with_pauses = bundle(&format!("paced-{name}"), &format!("{PAUSE}{on_step}"));
+        Self::enter(server, name, &with_pauses, bundle(name, on_step))
     }
 }
 
-/// What is wrong with a log, if anything is that no disturbance explains.
-fn assert_calm(log: &str) {
+/// Asserts that a log shows no error beyond the disturbances.
+fn assert_no_unexpected_errors(log: &str) {
     for word in ["panicked", "begin_with", "poisoned"] {
         assert!(!log.contains(word), "{word}: {log}");
     }
 }
 
-/// Fills, kills and restarts until it is over.
-fn disturb(disk: &mut SmallDisk, soak: &Soak, draws: &mut Draws) {
+/// Fills the disk, kills and restarts the server until the end.
+fn disturb(disk: &mut SmallDisk, soak: &Soak, random: &mut Random) {
     while !soak.is_over() {
-        thread::sleep(Duration::from_secs(4) + draws.millis(20_000));
-        let kind = draws.below(3);
+        thread::sleep(Duration::from_secs(4) + random.millis_below(20_000));
+        let kind = random.below(3);
         let full = (kind != 0).then(|| {
             soak.tally.add("disk filled");
-            let full = Full::of(&disk.data_dir);
-            thread::sleep(draws.millis(12_000));
+            let full = FilledDisk::fill(&disk.data_dir);
+            thread::sleep(random.millis_below(12_000));
             full
         });
         if kind != 1 {
             soak.tally.add("server killed");
-            assert_calm(&disk.server.log());
-            let pause = draws.millis(3000);
+            assert_no_unexpected_errors(&disk.server.log());
+            let pause = random.millis_below(3000);
             disk.kill_and_restart(|| {
                 drop(full);
                 thread::sleep(pause);
@@ -208,13 +208,13 @@ fn disturb(disk: &mut SmallDisk, soak: &Soak, draws: &mut Draws) {
 }
 
 #[test]
-#[ignore = "takes as long as it is told to; `make soak` runs it alone, for an hour"]
-fn everything_at_once_ends_as_if_nothing_had_been() {
+#[ignore = "it runs for an hour by default; `make soak` runs it alone"]
+fn disturbed_server_reaches_undisturbed_results() {
     let minutes = setting("SOAK_MINUTES", 60);
-    let mut draws = Draws::of_seed(setting("SOAK_SEED", 2026));
+    let mut random = Random::from_seed(setting("SOAK_SEED", 2026));
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
     let folder = scratch.path();
-    // Of each task; two teams take more than a second for each.
+    // Episodes of each task; two of the teams need more than a second for each.
     let episodes = u32::try_from(4 * minutes).expect("some hours") + 6;
     let config = format!(
         "{}\n[server]\nmin_free_bytes = {}\n[evaluation]\nepisodes_per_task = {episodes}\n\
@@ -233,21 +233,21 @@ fn everything_at_once_ends_as_if_nothing_had_been() {
     let day = start_day(server);
     let evaluations: Vec<String> = contestants
         .iter()
-        .map(|one| path_of(&day, &one.submission))
+        .map(|contestant| evaluation_path(&day, &contestant.submission))
         .collect();
     let uploaders: Vec<Team> = ["Ann", "Bob"].map(|name| Team::create(server, name)).into();
     let unknown_runtime = python_bundle(folder, "unknown", &python_agent(HOLD));
     let manifest = "name = \"unknown\"\ncommand = [\"python3\"]\nruntime = \"none\"\n";
     fs::write(unknown_runtime.join("agent.toml"), manifest).expect("a scratch file can be written");
-    let good = packed(&python_bundle(folder, "good", &python_agent(HOLD)));
-    let cut_off = good[..good.len() / 2].to_vec();
+    let good = pack(&python_bundle(folder, "good", &python_agent(HOLD)));
+    let truncated = good[..good.len() / 2].to_vec();
     let archives = [
         (good, "valid"),
         (b"no archive at all".to_vec(), "refused at once"),
-        (cut_off, "invalid"),
-        (packed(&unknown_runtime), "invalid"),
+        (truncated, "invalid"),
+        (pack(&unknown_runtime), "invalid"),
         (
-            packed(&python_bundle(folder, "bad", &python_agent("say({})"))),
+            pack(&python_bundle(folder, "bad", &python_agent("say({})"))),
             "invalid",
         ),
     ];
@@ -264,39 +264,41 @@ fn everything_at_once_ends_as_if_nothing_had_been() {
 
     let soak = Soak {
         url: Mutex::new(server.url.clone()),
-        ends: Instant::now() + Duration::from_secs(60 * minutes),
+        end: Instant::now() + Duration::from_secs(60 * minutes),
         tally: Tally::default(),
         client: http()
             .timeout(Duration::from_secs(60))
             .build()
             .expect("a client needs nothing"),
     };
-    let taken: Vec<(usize, String, &str)> = thread::scope(|scope| {
+    let accepted: Vec<(usize, String, &str)> = thread::scope(|scope| {
         for _ in 0..3 {
-            scope.spawn(|| soak.read(&pages));
+            scope.spawn(|| soak.fetch_pages(&pages));
         }
-        let uploading: Vec<_> = uploaders
+        let upload_threads: Vec<_> = uploaders
             .iter()
             .map(|team| scope.spawn(|| soak.upload(&team.token, &archives)))
             .collect();
-        disturb(&mut disk, &soak, &mut draws);
-        let taken = uploading.into_iter().enumerate();
-        taken
+        disturb(&mut disk, &soak, &mut random);
+        let results = upload_threads.into_iter().enumerate();
+        results
             .flat_map(|(team, thread)| {
-                let taken = thread.join().expect("an uploader fails by itself");
-                taken.into_iter().map(move |(id, due)| (team, id, due))
+                let accepted = thread.join().expect("an upload thread does not panic");
+                accepted
+                    .into_iter()
+                    .map(move |(id, expected)| (team, id, expected))
             })
             .collect()
     });
 
     let server = &disk.server;
-    for (team, id, due) in &taken {
+    for (team, id, expected) in &accepted {
         let verdict = uploaders[*team].verdict(server, id);
-        assert_eq!(verdict["state"], *due, "{verdict:#}");
+        assert_eq!(verdict["state"], *expected, "{verdict:#}");
     }
     for (contestant, evaluation) in contestants.iter().zip(&evaluations) {
         let token = &contestant.team.token;
-        let finished = contestant.team.finished(server, evaluation);
+        let finished = contestant.team.wait_until_finished(server, evaluation);
         assert_eq!(finished["state"], "finished", "{finished:#}");
         println!(
             "from {} to {}",
@@ -304,23 +306,23 @@ fn everything_at_once_ends_as_if_nothing_had_been() {
         );
         assert!(finished["rerun_of"].is_null(), "{finished:#}");
         let out = tempfile::tempdir().expect("a scratch folder can be made");
-        // The last one to finish releases the day.
+        // The end of the last evaluation releases the day.
         let _ = server.poll(evaluation, token, |answer| !answer["released_at"].is_null());
         upgrade::verify(server, evaluation, token, out.path());
         let manifest = entry(&mut dataset(server, evaluation, token), "manifest.json");
-        let bundle = &contestant.unhurried;
-        let local = scored_locally(bundle, &manifest, episodes, &out.path().join("local"));
-        let finished = contestant.team.finished(server, evaluation);
+        let bundle = &contestant.bundle_without_pauses;
+        let local = score_locally(bundle, &manifest, episodes, &out.path().join("local"));
+        let finished = contestant.team.wait_until_finished(server, evaluation);
         assert_eq!(without_times(&finished["result"]), without_times(&local));
     }
     assert_eq!(server.get("/api/v1/health", None).status(), 200);
-    assert_calm(&server.log());
+    assert_no_unexpected_errors(&server.log());
     let log = fs::metadata(disk.data_dir.join("faceoff.sqlite3-wal")).map_or(0, |file| file.len());
-    assert!(log < BOUND_BYTES, "{log} bytes");
+    assert!(log < LOG_LIMIT_BYTES, "{log} bytes");
     let tally = lock(&soak.tally.0).clone();
     println!(
-        "{minutes} minutes: {tally:#?}; {} uploads taken, {episodes} episodes of each task",
-        taken.len()
+        "{minutes} minutes: {tally:#?}; {} accepted uploads, {episodes} episodes of each task",
+        accepted.len()
     );
     let answers: BTreeSet<&str> = tally.keys().map(String::as_str).collect();
     let expected = BTreeSet::from([

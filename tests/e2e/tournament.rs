@@ -1,11 +1,11 @@
-//! A tournament as its organiser, its teams and a visitor meet it, by the command line alone.
+//! A whole tournament on the command line, as organiser, teams and visitor.
 
-#![expect(clippy::unwrap_used, reason = "a test that cannot go on fails")]
+#![expect(clippy::unwrap_used, reason = "a test that cannot continue fails")]
 
 use crate::{
     CONFIG, Team,
-    commands::{FAILED, MISUSED, NOT_ALLOWED, REFUSED, Told, admin, faceoff, member},
-    people::joined,
+    commands::{FAILED, USAGE_ERROR, NOT_ALLOWED, REFUSED, CommandOutput, admin, faceoff, member},
+    users::invite_and_join,
 };
 use faceoff_tests::{bundle, server::Server};
 use serde_json::Value;
@@ -14,13 +14,13 @@ use zip::ZipArchive;
 
 const TEAMS: [&str; 3] = ["Ada", "Bob", "Cyd"];
 
-fn visitor(server: &Server, args: &[&str]) -> Told {
+fn visitor(server: &Server, args: &[&str]) -> CommandOutput {
     let command = ["tournament", "--server", &server.url];
     faceoff(&[&command[..], args].concat(), "")
 }
 
-/// Until the tournament is in this phase.
-fn in_phase(server: &Server, tournament: &Value, phase: &str) -> Value {
+/// Waits until the tournament is in this phase.
+fn wait_for_phase(server: &Server, tournament: &Value, phase: &str) -> Value {
     let path = format!("/api/v1/tournaments/{}", tournament["id"].as_str().unwrap());
     server.poll(&path, &server.admin_token, |answer| {
         answer["phase"] == phase
@@ -28,12 +28,12 @@ fn in_phase(server: &Server, tournament: &Value, phase: &str) -> Value {
 }
 
 fn games(server: &Server) -> Vec<Value> {
-    let told = visitor(server, &["games", "Cup", "--json"]).json();
-    told.as_array().unwrap().clone()
+    let games = visitor(server, &["games", "Cup", "--json"]).json();
+    games.as_array().unwrap().clone()
 }
 
-fn id(of: &Value) -> &str {
-    of["id"].as_str().unwrap()
+fn id(value: &Value) -> &str {
+    value["id"].as_str().unwrap()
 }
 
 /// The names of the two sides.
@@ -46,7 +46,7 @@ fn path(file: &Path) -> &str {
 }
 
 #[test]
-fn a_tournament_from_its_opening_to_its_close_by_the_command_line() {
+fn commands_run_a_tournament_from_opening_to_close() {
     let scratch = tempfile::tempdir().unwrap();
     let server = Server::start(&scratch.path().join("data"), CONFIG);
     let teams = TEAMS.map(|name| Team::create(&server, name));
@@ -58,8 +58,8 @@ fn a_tournament_from_its_opening_to_its_close_by_the_command_line() {
     });
     let as_ada = |command: &str, args: &[&str]| member(&server, &teams[0].token, command, args);
 
-    // Open: rules, teams, and games that do not count.
-    visitor(&server, &["show"]).not_done(FAILED, &["there is no tournament yet"]);
+    // Opening: rules, teams, and games that do not count.
+    visitor(&server, &["show"]).expect_refusal(FAILED, &["there is no tournament yet"]);
     let rules = [
         "--format",
         "round-robin",
@@ -74,11 +74,11 @@ fn a_tournament_from_its_opening_to_its_close_by_the_command_line() {
         (&cup["phase"], &cup["rules"]["steps"]),
         (&"open".into(), &1500.into())
     );
-    admin(&server, &[&open[..], &rules].concat()).not_done(REFUSED, &["409"]);
+    admin(&server, &[&open[..], &rules].concat()).expect_refusal(REFUSED, &["409"]);
     admin(&server, &["tournament", "open", "Other", "--rounds", "3"])
-        .not_done(MISUSED, &["--format"]);
-    let entered = admin(&server, &["tournament", "enter", "cup", "Cyd"]).done();
-    for words in [
+        .expect_refusal(USAGE_ERROR, &["--format"]);
+    let entered = admin(&server, &["tournament", "enter", "cup", "Cyd"]).expect_success();
+    for text in [
         "Cup (open)",
         "Ada",
         "Bob",
@@ -86,9 +86,9 @@ fn a_tournament_from_its_opening_to_its_close_by_the_command_line() {
         "1500 control steps",
         "starts round 1",
     ] {
-        assert!(entered.contains(words), "{words:?} is not in {entered}");
+        assert!(entered.contains(text), "{text:?} is not in {entered}");
     }
-    as_ada("game", &["test"]).not_done(REFUSED, &["baseline"]);
+    as_ada("game", &["test"]).expect_refusal(REFUSED, &["baseline"]);
     let baseline = [
         "tournament",
         "change",
@@ -96,73 +96,76 @@ fn a_tournament_from_its_opening_to_its_close_by_the_command_line() {
         "--baseline",
         id(&submissions[2]),
     ];
-    let changed = admin(&server, &baseline).done();
+    let changed = admin(&server, &baseline).expect_success();
     assert!(changed.contains(id(&submissions[2])), "{changed}");
-    let bert = joined(&server, &["invite-member", "Bob", "Bert"], "Bert");
+    let bert = invite_and_join(&server, &["invite-member", "Bob", "Bert"], "Bert");
     let decline = ["change", "--declines-friendly-games", "true"];
-    member(&server, &bert, "team", &decline).done();
-    as_ada("game", &["friendly", "Bob"]).not_done(REFUSED, &["409", "Bob"]);
+    member(&server, &bert, "team", &decline).expect_success();
+    as_ada("game", &["friendly", "Bob"]).expect_refusal(REFUSED, &["409", "Bob"]);
     let ordered = as_ada("game", &["--json", "test", "Cup"]).json();
     let test_game = id(&ordered["ordered"][0]).to_owned();
-    let watched = as_ada("game", &["watch", &test_game]).done();
+    let watched = as_ada("game", &["watch", &test_game]).expect_success();
     assert!(
-        watched.contains("over; it was played to its end"),
+        watched.contains("over: faceoff game show"),
         "{watched}"
     );
-    let own = as_ada("game", &["list"]).done();
+    let own = as_ada("game", &["list"]).expect_success();
     assert!(
         own.contains(&test_game) && own.contains("  test  "),
         "{own}"
     );
-    // It is the two teams' alone.
-    member(&server, &teams[1].token, "game", &["show", &test_game]).not_done(REFUSED, &["404"]);
+    // A test game is visible to its team alone.
+    member(&server, &teams[1].token, "game", &["show", &test_game]).expect_refusal(REFUSED, &["404"]);
 
     // The round.
-    let round = admin(&server, &["tournament", "start-round", "Cup"]).done();
+    let round = admin(&server, &["tournament", "start-round", "Cup"]).expect_success();
     assert!(round.contains("round 1"), "{round}");
-    assert_eq!(round.matches("has nobody to play").count(), 3, "{round}");
-    admin(&server, &["tournament", "start-round", "Cup"]).not_done(REFUSED, &["409"]);
+    assert_eq!(round.matches(": bye for ").count(), 3, "{round}");
+    admin(&server, &["tournament", "start-round", "Cup"]).expect_refusal(REFUSED, &["409"]);
     member(
         &server,
         &bert,
         "tournament",
         &["withdraw", "Cup", "too tired"],
     )
-    .not_done(REFUSED, &["409", "Bob", "too tired"]);
-    in_phase(&server, &cup, "played");
-    let shown = visitor(&server, &["show"]).done();
-    for words in [
-        "all rounds are over, champion ",
+    .expect_refusal(REFUSED, &["409", "Bob", "too tired"]);
+    wait_for_phase(&server, &cup, "played");
+    let shown = visitor(&server, &["show"]).expect_success();
+    for text in [
+        "all rounds finished, champion ",
         "3 of 3 games played",
         "points per round",
     ] {
-        assert!(shown.contains(words), "{words:?} is not in {shown}");
+        assert!(shown.contains(text), "{text:?} is not in {shown}");
     }
     let played = games(&server);
     assert_eq!(played.len(), 3);
-    let table = visitor(&server, &["games", "--round", "1"]).done();
+    let table = visitor(&server, &["games", "--round", "1"]).expect_success();
     for game in &played {
         assert_eq!(game["result"]["steps"], 1500, "{game:#}");
         assert!(table.contains(id(game)), "{table}");
     }
-    let ratings = visitor(&server, &["ratings"]).done();
-    for words in ["A wins", "ratings by results", "Bradley-Terry"] {
-        assert!(ratings.contains(words), "{words:?} is not in {ratings}");
+    let ratings = visitor(&server, &["ratings"]).expect_success();
+    for text in ["A wins", "ratings by results", "Bradley-Terry"] {
+        assert!(ratings.contains(text), "{text:?} is not in {ratings}");
     }
-    let certainty = visitor(&server, &["certainty"]).done();
-    assert!(certainty.contains("was not played again"), "{certainty}");
+    let champion_shares = visitor(&server, &["certainty"]).expect_success();
+    assert!(
+        champion_shares.contains("has not been replayed"),
+        "{champion_shares}"
+    );
 
-    // A side's own file at once, both sides' for the organiser, who verifies it.
-    let of_ada = played
+    // A team can download its own side's file, the organiser those of both sides. The organiser verifies them.
+    let ada_game = played
         .iter()
         .find(|game| sides(game).contains(&"Ada"))
         .unwrap();
-    let number = 1 + sides(of_ada)
+    let number = 1 + sides(ada_game)
         .iter()
         .position(|name| *name == "Ada")
         .unwrap();
     let file = scratch.path().join("own.zip");
-    as_ada("game", &["download", id(of_ada), path(&file)]).done();
+    as_ada("game", &["download", id(ada_game), path(&file)]).expect_success();
     let mut own = ZipArchive::new(File::open(&file).unwrap()).unwrap();
     assert!(own.by_name(&format!("side-{number}.parquet")).is_ok());
     assert!(
@@ -170,55 +173,55 @@ fn a_tournament_from_its_opening_to_its_close_by_the_command_line() {
             .is_err()
     );
     let both = scratch.path().join("both.zip");
-    as_ada("game", &["download", id(of_ada), path(&both), "--both"])
-        .not_done(NOT_ALLOWED, &["403"]);
-    let log = as_ada("game", &["log", id(of_ada)]);
+    as_ada("game", &["download", id(ada_game), path(&both), "--both"])
+        .expect_refusal(NOT_ALLOWED, &["403"]);
+    let log = as_ada("game", &["log", id(ada_game)]);
     assert_eq!(log.code, Some(0));
     let as_organiser = |args: &[&str]| member(&server, &server.admin_token, "game", args);
-    as_organiser(&["download", id(of_ada), path(&both), "--both"]).done();
-    let known = as_organiser(&["show", id(of_ada), "--json"]).json();
-    let recording = &known["result"]["recording"];
+    as_organiser(&["download", id(ada_game), path(&both), "--both"]).expect_success();
+    let original = as_organiser(&["show", id(ada_game), "--json"]).json();
+    let recording = &original["result"]["recording"];
     let hash = recording["game_blake3"].as_str().unwrap();
     let verified = faceoff(&["verify", path(&both), "--blake3", hash, "--json"], "").json();
     assert_eq!(verified["verified"], true);
     assert_eq!(verified["result"]["seed"], recording["seed"]);
 
-    // A game is void, and played again on the same seed.
-    let void = ["tournament", "void", id(of_ada), "a camera fell down"];
-    let name = sides(of_ada).join(" - ");
-    admin(&server, &void).not_done(REFUSED, &["409", &name]);
+    // A void game is repeated with the same seed.
+    let void = ["tournament", "void", id(ada_game), "a camera fell down"];
+    let name = sides(ada_game).join(" - ");
+    admin(&server, &void).expect_refusal(REFUSED, &["409", &name]);
     let confirmed = [&void[..], &["--confirm", &name]].concat();
-    let voided = admin(&server, &confirmed).done();
+    let voided = admin(&server, &confirmed).expect_success();
     assert!(voided.contains("void: a camera fell down"), "{voided}");
-    let shown = visitor(&server, &["show"]).done();
+    let shown = visitor(&server, &["show"]).expect_success();
     assert!(
-        shown.contains("1 void or broken, to be played again"),
+        shown.contains("1 to be repeated"),
         "{shown}"
     );
-    admin(&server, &["tournament", "rerun", id(of_ada)]).done();
-    in_phase(&server, &cup, "played");
-    let again = as_organiser(&["show", id(of_ada), "--json"]).json();
+    admin(&server, &["tournament", "rerun", id(ada_game)]).expect_success();
+    wait_for_phase(&server, &cup, "played");
+    let repeated = as_organiser(&["show", id(ada_game), "--json"]).json();
     assert_eq!(
-        (&again["state"], &again["attempt"]),
+        (&repeated["state"], &repeated["attempt"]),
         (&"played".into(), &2.into())
     );
-    assert_eq!(again["result"]["recording"]["seed"], recording["seed"]);
-    assert_eq!(again["sides"], known["sides"]);
-    let attempts = admin(&server, &["tournament", "attempts", id(of_ada)]).done();
+    assert_eq!(repeated["result"]["recording"]["seed"], recording["seed"]);
+    assert_eq!(repeated["sides"], original["sides"]);
+    let attempts = admin(&server, &["tournament", "attempts", id(ada_game)]).expect_success();
     assert_eq!(attempts.lines().count(), 2, "{attempts}");
 
-    // Closed, it is public.
-    admin(&server, &["tournament", "close", "Cup"]).not_done(REFUSED, &["409", "Cup"]);
-    let closed = admin(&server, &["tournament", "close", "Cup", "--confirm", "Cup"]).done();
+    // After the tournament is closed, its games are public.
+    admin(&server, &["tournament", "close", "Cup"]).expect_refusal(REFUSED, &["409", "Cup"]);
+    let closed = admin(&server, &["tournament", "close", "Cup", "--confirm", "Cup"]).expect_success();
     assert!(closed.contains("Cup (closed"), "{closed}");
     let public = scratch.path().join("public.zip");
     let download = ["game", "--server", &server.url, "download"];
-    let download = [&download[..], &[id(of_ada), path(&public), "--both"]].concat();
-    faceoff(&download, "").done();
-    faceoff(&["verify", path(&public)], "").done();
-    let hash = again["result"]["recording"]["game_blake3"]
+    let download = [&download[..], &[id(ada_game), path(&public), "--both"]].concat();
+    faceoff(&download, "").expect_success();
+    faceoff(&["verify", path(&public)], "").expect_success();
+    let hash = repeated["result"]["recording"]["game_blake3"]
         .as_str()
         .unwrap();
-    faceoff(&["verify", path(&public), "--blake3", hash], "").done();
-    admin(&server, &["tournament", "rerun", id(of_ada)]).not_done(REFUSED, &["409"]);
+    faceoff(&["verify", path(&public), "--blake3", hash], "").expect_success();
+    admin(&server, &["tournament", "rerun", id(ada_game)]).expect_refusal(REFUSED, &["409"]);
 }

@@ -1,4 +1,4 @@
-//! A data folder of an earlier version, cut off in the middle of its work, opens, migrates and continues.
+//! Upgrades: a data folder of an earlier version, killed during its work, is opened, migrated and continued.
 
 use faceoff_tests::{program, repository, server::Server};
 use flate2::read::GzDecoder;
@@ -9,7 +9,7 @@ use std::{
     process::Command,
 };
 
-/// As the folder's own server was configured.
+/// The configuration of the server that made the folder.
 const CONFIG: &str = r#"
 [evaluation]
 episodes_per_task = 2
@@ -20,12 +20,12 @@ slots = 1
 lease_s = 5
 "#;
 
-/// What a client of the earlier version saw last.
-struct Told(Value);
+/// The last API responses of the earlier version, with the teams' tokens.
+struct RecordedAnswers(Value);
 
-impl Told {
+impl RecordedAnswers {
     fn read(data_dir: &Path) -> Self {
-        let text = fs::read(data_dir.join("told.json")).expect("the fixture tells what it holds");
+        let text = fs::read(data_dir.join("told.json")).expect("the fixture has its server's last answers");
         Self(serde_json::from_slice(&text).expect("it is JSON"))
     }
 
@@ -35,11 +35,11 @@ impl Told {
 
     fn answer(&self, name: &str) -> &Value {
         let answer = &self.0["answers"][name];
-        assert!(answer.is_object(), "the fixture tells nothing of {name}");
+        assert!(answer.is_object(), "the fixture has no answer {name}");
         answer
     }
 
-    /// The path of the evaluation or submission that was told of.
+    /// The API path of a recorded evaluation or submission.
     fn path(&self, kind: &str, name: &str) -> String {
         let id = self.answer(name)["id"].as_str().expect("it has an id");
         format!("/api/v1/{kind}/{id}")
@@ -59,7 +59,7 @@ fn get(server: &Server, path: &str, token: &str) -> Value {
     answer.json().expect("the API speaks JSON")
 }
 
-/// Downloads a dataset and simulates it again.
+/// Downloads a dataset and verifies it with `faceoff verify`.
 pub(crate) fn verify(server: &Server, evaluation: &str, token: &str, folder: &Path) {
     let answer = server.get(&format!("{evaluation}/dataset"), Some(token));
     assert_eq!(answer.status(), 200, "the dataset of {evaluation}");
@@ -78,75 +78,75 @@ pub(crate) fn verify(server: &Server, evaluation: &str, token: &str, folder: &Pa
 }
 
 #[test]
-fn a_data_folder_of_the_first_release_continues_where_it_was_cut_off() {
+fn first_release_data_folder_is_upgraded_and_continued() {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
     unpack("data-folder-e67a08c.tar.gz", scratch.path());
     let data_dir = scratch.path().join("data");
-    let told = Told::read(&data_dir);
+    let recorded = RecordedAnswers::read(&data_dir);
     let server = Server::start(&data_dir, CONFIG);
     let admin = server.admin_token.clone();
 
-    // What was over is what it was. The first day is released; of the second some is under way.
-    for over in [
+    // Ended evaluations are unchanged. The first day is released; the second has running evaluations.
+    for name in [
         "day one Alpha",
         "day one Beta",
         "day two Delta",
         "day two Gamma",
     ] {
-        let mut found = get(&server, &told.path("evaluations", over), &admin);
+        let mut found = get(&server, &recorded.path("evaluations", name), &admin);
         if let Some(seed) = found.pointer_mut("/result/seed") {
-            assert!(seed.take().is_string(), "{over}");
+            assert!(seed.take().is_string(), "{name}");
         }
         let fields = found.as_object_mut().expect("an answer is an object");
-        let released_at = fields.remove("released_at").expect("it is told");
-        if over.starts_with("day one") {
-            assert!(released_at.is_string(), "{over}");
+        let released_at = fields.remove("released_at").expect("an answer has this field");
+        if name.starts_with("day one") {
+            assert!(released_at.is_string(), "{name}");
         }
-        // What the old program did not know of.
+        // Fields that the old version did not have.
         let stage = get(&server, "/api/v1/stages", &admin)[0].take();
         let fields = found.as_object_mut().expect("an answer is an object");
-        assert_eq!(fields.remove("stage"), Some(stage["id"].clone()), "{over}");
-        assert_eq!(fields.remove("revision"), Some(1.into()), "{over}");
-        assert_eq!(fields.remove("deadline_at"), Some(Value::Null), "{over}");
-        assert_eq!(fields.remove("public"), Some(false.into()), "{over}");
-        let next = fields.remove("next").expect("it is told");
-        assert!(next.is_string(), "{over}");
+        assert_eq!(fields.remove("stage"), Some(stage["id"].clone()), "{name}");
+        assert_eq!(fields.remove("revision"), Some(1.into()), "{name}");
+        assert_eq!(fields.remove("deadline_at"), Some(Value::Null), "{name}");
+        assert_eq!(fields.remove("public"), Some(false.into()), "{name}");
+        let next = fields.remove("next").expect("an answer has this field");
+        assert!(next.is_string(), "{name}");
         assert_eq!(stage["names_seeds"], false, "its days keep their seeds");
-        assert_eq!(&found, told.answer(over), "{over}");
+        assert_eq!(&found, recorded.answer(name), "{name}");
     }
     for (ablation, evaluation) in [
         ("ablation Alpha", "day one Alpha"),
         ("ablation Beta", "day one Beta"),
     ] {
-        let submission = told.answer(evaluation)["submission"]
+        let submission = recorded.answer(evaluation)["submission"]
             .as_str()
             .expect("an id");
         let path = format!("/api/v1/submissions/{submission}/ablation");
         assert_eq!(
             &get(&server, &path, &admin),
-            told.answer(ablation),
+            recorded.answer(ablation),
             "{ablation}"
         );
     }
 
-    // What was under way is carried on, in all its kinds.
-    let alpha = told.token("Alpha");
+    // Running evaluations, validation runs and ablations continue.
+    let alpha = recorded.token("Alpha");
     for (name, team) in [("day two Alpha", "Alpha"), ("day two Epsilon", "Epsilon")] {
-        let path = told.path("evaluations", name);
-        let finished = server.poll(&path, told.token(team), |answer| {
+        let path = recorded.path("evaluations", name);
+        let finished = server.poll(&path, recorded.token(team), |answer| {
             !["queued", "running", "finalising"].contains(&answer["state"].as_str().unwrap_or(""))
         });
         assert_eq!(finished["state"], "finished", "{name}: {finished:#}");
         assert_eq!(finished["result"]["tasks"]["hit"]["episodes"], 2, "{name}");
-        assert_eq!(finished["result"]["ruleset"], FIRST, "{name}");
+        assert_eq!(finished["result"]["ruleset"], FIRST_RULESET, "{name}");
     }
-    let waiting = server.poll(
-        &told.path("submissions", "submission Beta"),
-        told.token("Beta"),
+    let validated = server.poll(
+        &recorded.path("submissions", "submission Beta"),
+        recorded.token("Beta"),
         |answer| answer["state"] != "validating",
     );
-    assert_eq!(waiting["state"], "valid", "{waiting:#}");
-    let slow = told.answer("day two Alpha")["submission"]
+    assert_eq!(validated["state"], "valid", "{validated:#}");
+    let slow = recorded.answer("day two Alpha")["submission"]
         .as_str()
         .expect("an id");
     let ablation = server.poll(
@@ -157,7 +157,7 @@ fn a_data_folder_of_the_first_release_continues_where_it_was_cut_off() {
     assert_eq!(ablation["state"], "finished", "{ablation:#}");
     assert_eq!(ablation["tasks"]["hit"].as_array().map(Vec::len), Some(6));
 
-    // The last end of the second day released it, and nothing was played twice.
+    // The last evaluation released the second day, and no evaluation was repeated.
     let season = get(&server, "/api/v1/season", &admin);
     let days = season["days"].as_array().expect("a season has its days");
     assert_eq!(days.len(), 2, "{season:#}");
@@ -174,24 +174,24 @@ fn a_data_folder_of_the_first_release_continues_where_it_was_cut_off() {
         "{second_day:#}"
     );
 
-    // Episodes of two versions, one dataset: simulated again, they are what was recorded.
+    // Datasets with episodes of both versions pass verification.
     for name in ["day one Alpha", "day two Alpha"] {
         verify(
             &server,
-            &told.path("evaluations", name),
+            &recorded.path("evaluations", name),
             alpha,
             scratch.path(),
         );
     }
-    // The first ruleset's board stays until there is a result of the next, and does not mix with it.
-    assert_board(&server, "/api/v1/board", FIRST, 2);
+    // The board of the first ruleset stays until a result of the next one exists; boards never mix rulesets.
+    assert_board(&server, "/api/v1/board", FIRST_RULESET, 2);
     let started = server.post("/api/v1/days", &admin, &serde_json::json!({}));
     assert!(started.status().is_success(), "starting a day");
     let today = get(&server, "/api/v1/evaluations", &admin);
-    let mut begun = today.as_array().expect("a list").iter();
-    let beta = begun
+    let mut evaluations = today.as_array().expect("a list").iter();
+    let beta = evaluations
         .find(|evaluation| evaluation["team_name"] == "Beta")
-        .unwrap_or_else(|| panic!("Beta plays: {today:#}"));
+        .unwrap_or_else(|| panic!("Beta has no evaluation: {today:#}"));
     let path = format!(
         "/api/v1/evaluations/{}",
         beta["id"].as_str().expect("it has an id")
@@ -203,10 +203,11 @@ fn a_data_folder_of_the_first_release_continues_where_it_was_cut_off() {
     for row in board["rows"].as_array().expect("a board has rows") {
         assert_eq!(row["ruleset"], "airhockey-2023.3", "{board:#}");
     }
-    assert_board(&server, "/api/v1/board?revision=1", FIRST, 2);
+    assert_board(&server, "/api/v1/board?revision=1", FIRST_RULESET, 2);
 }
 
-const FIRST: &str = "airhockey-2023.1";
+/// The ruleset of the first release.
+const FIRST_RULESET: &str = "airhockey-2023.1";
 
 fn assert_board(server: &Server, path: &str, ruleset: &str, rows: usize) {
     let board = get(server, path, &server.admin_token);

@@ -1,14 +1,14 @@
-//! Uploads that take places, disk or time from others: slow ones, refused ones, archives without an end. All the
-//! while another team's evaluation goes on to the result that it has on a quiet host.
+//! Uploads that could take upload slots, disk space or time from other teams: slow, refused and endless ones. Meanwhile
+//! another team's evaluation gets its undisturbed result.
 
 use crate::{
     Team,
-    undisturbed::{CONFIG, assert_undisturbed},
+    reference_result::{CONFIG, assert_undisturbed},
 };
 use faceoff_tests::{
-    bundle::{packed, python_agent, python_bundle},
+    bundle::{pack, python_agent, python_bundle},
     repository,
-    server::{PATIENCE, Server},
+    server::{TIMEOUT, Server},
 };
 use flate2::{Compression, write::GzEncoder};
 use reqwest::Method;
@@ -30,44 +30,44 @@ fn hold() -> PathBuf {
     repository().join("agents/hold")
 }
 
-/// Polls for what must come true; the pause keeps the CPU for the evaluation.
-fn wait_until(what: &str, mut is_so: impl FnMut() -> bool) {
+/// Waits for a condition; the pause between checks keeps the CPU for the evaluation.
+fn wait_until(condition: &str, mut is_met: impl FnMut() -> bool) {
     let started = Instant::now();
-    while !is_so() {
-        assert!(started.elapsed() < PATIENCE, "still waiting: {what}");
+    while !is_met() {
+        assert!(started.elapsed() < TIMEOUT, "still waiting: {condition}");
         thread::sleep(Duration::from_millis(20));
     }
 }
 
-/// How many files are below a folder.
-fn files(folder: &Path) -> usize {
+/// The number of files below a folder.
+fn count_files(folder: &Path) -> usize {
     let Ok(entries) = fs::read_dir(folder) else {
         return 0;
     };
     entries
         .map(|entry| {
             let path = entry.expect("a folder can be read").path();
-            if path.is_dir() { files(&path) } else { 1 }
+            if path.is_dir() { count_files(&path) } else { 1 }
         })
         .sum()
 }
 
-/// A team with an agent that is to play.
-struct Honest {
+/// A team whose evaluation must not be disturbed.
+struct HonestTeam {
     team: Team,
     submission: Value,
 }
 
-impl Honest {
-    fn enter(server: &Server) -> Self {
+impl HonestTeam {
+    fn create(server: &Server) -> Self {
         let team = Team::create(server, "Honest");
         let submission = team.submit(server, &hold());
         assert_eq!(submission["state"], "valid", "{submission:#}");
         Self { team, submission }
     }
 
-    /// Starts the day, on which nobody else has anything to play.
-    fn play(&self, server: &Server) -> String {
+    /// Starts the day, on which no other team has an active submission.
+    fn start_evaluation(&self, server: &Server) -> String {
         self.team.evaluate(server, &self.submission)
     }
 
@@ -76,49 +76,49 @@ impl Honest {
     }
 }
 
-/// How a client makes an upload last.
+/// How a client slows its upload down.
 #[derive(Debug, Clone, Copy)]
-enum Dribble {
-    /// A byte now and then.
+enum Slowness {
+    /// Single bytes with pauses.
     ByteByByte,
-    /// The head, and then nothing.
-    NothingAfterTheHead,
-    /// Steadily, but below the least rate.
-    Steadily,
+    /// The header, and then nothing.
+    NothingAfterHeader,
+    /// Continuously, but below the minimum rate.
+    BelowMinRate,
 }
 
-/// An upload of a megabyte that never comes to its end.
-struct Slow {
+/// An upload of a megabyte that never ends.
+struct SlowUpload {
     stream: TcpStream,
-    dribble: Dribble,
+    slowness: Slowness,
 }
 
-impl Slow {
-    fn begin(server: &Server, token: &str, dribble: Dribble) -> Self {
+impl SlowUpload {
+    fn begin(server: &Server, token: &str, slowness: Slowness) -> Self {
         let mut stream = TcpStream::connect(server.address()).expect("the server listens");
         let head = format!(
             "POST /api/v1/submissions HTTP/1.1\r\nhost: x\r\nauthorization: Bearer {token}\r\n\
              content-length: {MIB}\r\n\r\n"
         );
-        stream.write_all(head.as_bytes()).expect("it is taken");
-        if !matches!(dribble, Dribble::NothingAfterTheHead) {
-            stream.write_all(&GZIP).expect("it is taken");
+        stream.write_all(head.as_bytes()).expect("the server reads it");
+        if !matches!(slowness, Slowness::NothingAfterHeader) {
+            stream.write_all(&GZIP).expect("the server reads it");
         }
-        Self { stream, dribble }
+        Self { stream, slowness }
     }
 
-    /// Goes on until the server has had enough, and returns its answer.
-    fn go_on(mut self) -> String {
-        let (piece, pause) = match self.dribble {
-            Dribble::ByteByByte => (vec![0; 1], Duration::from_millis(700)),
-            Dribble::NothingAfterTheHead => (Vec::new(), Duration::from_secs(1)),
-            Dribble::Steadily => (vec![0; 2000], Duration::from_millis(200)),
+    /// Continues until the server closes the connection; returns its response.
+    fn run(mut self) -> String {
+        let (piece, pause) = match self.slowness {
+            Slowness::ByteByByte => (vec![0; 1], Duration::from_millis(700)),
+            Slowness::NothingAfterHeader => (Vec::new(), Duration::from_secs(1)),
+            Slowness::BelowMinRate => (vec![0; 2000], Duration::from_millis(200)),
         };
         let mut answer = Vec::new();
         let mut buffer = [0; 4096];
         self.stream
             .set_read_timeout(Some(pause))
-            .expect("a pause is no zero");
+            .expect("the pause is not zero");
         loop {
             match self.stream.read(&mut buffer) {
                 Ok(0) => break,
@@ -126,7 +126,7 @@ impl Slow {
                 Err(error)
                     if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) =>
                 {
-                    // After its answer the server takes no more.
+                    // After its response the server reads no more.
                     let _ = self.stream.write_all(&piece);
                 }
                 Err(_) => break,
@@ -137,42 +137,41 @@ impl Slow {
 }
 
 #[test]
-fn slow_uploads_take_nobodys_place_and_end() {
+fn slow_uploads_time_out_without_blocking_other_teams() {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
     let data_dir = scratch.path().join("data");
     let config =
         format!("{CONFIG}\n[uploads]\nat_once = 2\nleast_bytes_per_s = 65536\ngrace_s = 10.0\n");
     let server = Server::start(&data_dir, &config);
-    let honest = Honest::enter(&server);
+    let honest = HonestTeam::create(&server);
 
-    // More than the sixteen that once were all places: of one team, and of many.
+    // More than sixteen uploads, which once was the total limit: several per team.
     let variants = [
-        Dribble::ByteByByte,
-        Dribble::NothingAfterTheHead,
-        Dribble::Steadily,
+        Slowness::ByteByByte,
+        Slowness::NothingAfterHeader,
+        Slowness::BelowMinRate,
     ];
     let slow_teams: Vec<_> = (0..9)
         .map(|number| Team::create(&server, &format!("Slow {number}")))
         .collect();
     let mut slow = Vec::new();
     for (number, team) in slow_teams.iter().enumerate() {
-        for place in 0..2 {
-            let dribble = variants[(number + place) % variants.len()];
-            slow.push(Slow::begin(&server, &team.token, dribble));
+        for upload in 0..2 {
+            let slowness = variants[(number + upload) % variants.len()];
+            slow.push(SlowUpload::begin(&server, &team.token, slowness));
         }
     }
-    let under_way: Vec<_> = slow
+    let upload_threads: Vec<_> = slow
         .into_iter()
-        .map(|slow| thread::spawn(move || slow.go_on()))
+        .map(|slow| thread::spawn(move || slow.run()))
         .collect();
-    let evaluation = honest.play(&server);
+    let evaluation = honest.start_evaluation(&server);
 
-    // Everybody else's go on, a slow team's other ones do not. (By now, on a slow host, its places may be free
-    // again.)
-    let id = honest.team.upload(&server, packed(&hold()));
+    // Other teams can upload; a slow team cannot. On a slow host, its upload slots may be free again by now.
+    let id = honest.team.upload(&server, pack(&hold()));
     let verdict = honest.team.verdict(&server, &id);
     assert_eq!(verdict["state"], "valid", "{verdict:#}");
-    let third = server.upload(&slow_teams[0].token, packed(&hold()));
+    let third = server.upload(&slow_teams[0].token, pack(&hold()));
     if third.status() != 201 {
         assert_eq!(third.status(), 429);
         assert!(third.headers().contains_key("retry-after"));
@@ -180,16 +179,16 @@ fn slow_uploads_take_nobodys_place_and_end() {
         assert_eq!(problem["type"], "/problems#too-many-uploads", "{problem:#}");
     }
 
-    for ended in under_way {
-        let answer = ended.join().expect("a client does not panic");
+    for thread in upload_threads {
+        let answer = thread.join().expect("a client does not panic");
         assert!(answer.starts_with("HTTP/1.1 408 "), "{answer}");
         assert!(
-            answer.contains("least rate of 65536 bytes per second"),
+            answer.contains("minimum rate of 65536 bytes per second"),
             "{answer}"
         );
     }
-    wait_until("what came of them is removed", || {
-        files(&data_dir.join("uploads")) == 0
+    wait_until("the partial files are removed", || {
+        count_files(&data_dir.join("uploads")) == 0
     });
     for team in &slow_teams[1..] {
         let own = server.get("/api/v1/submissions", Some(&team.token));
@@ -209,8 +208,8 @@ impl Tar {
 
     fn entry(mut self, kind: EntryType, name: &str, content: &[u8]) -> Self {
         let mut header = Header::new_gnu();
-        let place = &mut header.as_gnu_mut().expect("it is GNU's").name;
-        place[..name.len()].copy_from_slice(name.as_bytes());
+        let field = &mut header.as_gnu_mut().expect("a GNU header").name;
+        field[..name.len()].copy_from_slice(name.as_bytes());
         header.set_entry_type(kind);
         header.set_mode(0o644);
         header.set_size(content.len() as u64);
@@ -224,12 +223,12 @@ impl Tar {
     fn gz(mut self) -> Vec<u8> {
         self.0.extend_from_slice(&[0; 1024]);
         let mut encoder = GzEncoder::new(Vec::new(), Compression::best());
-        encoder.write_all(&self.0).expect("memory takes it");
-        encoder.finish().expect("memory takes it")
+        encoder.write_all(&self.0).expect("writing to memory does not fail");
+        encoder.finish().expect("writing to memory does not fail")
     }
 }
 
-/// An extension header's worth of a comment.
+/// A pax header with a comment of almost a MiB.
 fn pax_comment() -> Vec<u8> {
     let length = MIB - 8;
     let mut record = format!("{length} comment=").into_bytes();
@@ -238,44 +237,44 @@ fn pax_comment() -> Vec<u8> {
     record
 }
 
-/// A zip whose directory says more entries than it has room for files.
+/// A zip with this many folders.
 fn many_entries(entries: u32) -> Vec<u8> {
     let mut zip = zip::ZipWriter::new(std::io::Cursor::new(Vec::new()));
     let options = zip::write::SimpleFileOptions::default();
     for entry in 0..entries {
         zip.add_directory(format!("f{entry}"), options)
-            .expect("memory takes it");
+            .expect("writing to memory does not fail");
     }
-    zip.finish().expect("memory takes it").into_inner()
+    zip.finish().expect("writing to memory does not fail").into_inner()
 }
 
 #[test]
-fn archives_without_an_end_are_refused_soon() {
+fn oversized_archive_structures_are_refused() {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
     let data_dir = scratch.path().join("data");
     let config = format!("{CONFIG}\n[bundle]\nfiles = 1000\n");
     let server = Server::start(&data_dir, &config);
-    let honest = Honest::enter(&server);
+    let honest = HonestTeam::create(&server);
     let team = Team::create(&server, "Endless");
-    let evaluation = honest.play(&server);
-    let long = |kind, content: &[u8]| {
+    let evaluation = honest.start_evaluation(&server);
+    let repeated_entries = |kind, content: &[u8]| {
         let tar = (0..350).fold(Tar::new(), |tar, _| tar.entry(kind, "long", content));
         tar.gz()
     };
     let empty = GzEncoder::new(Vec::new(), Compression::fast());
-    let mut members = empty.finish().expect("memory takes it").repeat(70_000);
-    members.extend(Tar::new().gz());
-    let too_much = "more than its files explain";
+    let mut streams = empty.finish().expect("writing to memory does not fail").repeat(70_000);
+    streams.extend(Tar::new().gz());
+    let overhead = "more bytes than its files explain";
     let archives = [
-        (long(EntryType::XHeader, &pax_comment()), too_much),
-        (long(EntryType::GNULongName, &vec![b'n'; MIB]), too_much),
+        (repeated_entries(EntryType::XHeader, &pax_comment()), overhead),
+        (repeated_entries(EntryType::GNULongName, &vec![b'n'; MIB]), overhead),
         (
             Tar::new()
                 .entry(EntryType::Directory, "d", &vec![0; 350 * MIB])
                 .gz(),
-            too_much,
+            overhead,
         ),
-        (members, "compressed streams"),
+        (streams, "compressed streams"),
         (
             Tar::new().entry(EntryType::GNUSparse, "s", b"").gz(),
             "sparse",
@@ -287,24 +286,24 @@ fn archives_without_an_end_are_refused_soon() {
         let id = team.upload(&server, archive);
         let verdict = team.verdict(&server, &id);
         assert_eq!(verdict["state"], "invalid", "{verdict:#}");
-        let told = verdict["reason"].as_str().expect("a refusal has a reason");
-        assert!(told.contains(reason), "{told}");
+        let text = verdict["reason"].as_str().expect("a refusal has a reason");
+        assert!(text.contains(reason), "{text}");
     }
     let folder = data_dir.join("artifacts/bundles");
     wait_until("only the honest team's bundle is kept", || {
-        files(&folder) == 1
+        count_files(&folder) == 1
     });
     honest.assert_undisturbed(&server, &evaluation, scratch.path());
 }
 
 #[test]
-fn what_is_refused_is_not_kept() {
+fn refused_uploads_are_removed_from_disk() {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
     let data_dir = scratch.path().join("data");
     let server = Server::start(&data_dir, CONFIG);
-    let honest = Honest::enter(&server);
+    let honest = HonestTeam::create(&server);
     let team = Team::create(&server, "Refused");
-    let evaluation = honest.play(&server);
+    let evaluation = honest.start_evaluation(&server);
     let bundle =
         |name: &str, on_step: &str| python_bundle(scratch.path(), name, &python_agent(on_step));
     let wrong = bundle("wrong", "say(hold)");
@@ -312,76 +311,75 @@ fn what_is_refused_is_not_kept() {
     let falls = bundle("falls", "sys.stderr.write('I fall\\n')\nsys.exit(9)");
     let no_tar = {
         let mut encoder = GzEncoder::new(Vec::new(), Compression::fast());
-        encoder.write_all(&[7; 5000]).expect("memory takes it");
-        encoder.finish().expect("memory takes it")
+        encoder.write_all(&[7; 5000]).expect("writing to memory does not fail");
+        encoder.finish().expect("writing to memory does not fail")
     };
-    let kept = data_dir.join("artifacts/bundles");
+    let bundles = data_dir.join("artifacts/bundles");
     let mut refused = Vec::new();
     for (archive, reason, log) in [
-        (packed(&wrong), "agent.toml", ""),
+        (pack(&wrong), "agent.toml", ""),
         (no_tar, "damaged", ""),
-        (packed(&falls), "status 9", "I fall"),
+        (pack(&falls), "status 9", "I fall"),
     ] {
         let id = team.upload(&server, archive);
         let verdict = team.verdict(&server, &id);
         assert_eq!(verdict["state"], "invalid", "{verdict:#}");
         for (part, field) in [(reason, "reason"), (log, "log")] {
-            let told = verdict[field].as_str().expect("it is told");
-            assert!(told.contains(part), "{verdict:#}");
+            let text = verdict[field].as_str().expect("a refusal has this field");
+            assert!(text.contains(part), "{verdict:#}");
         }
-        wait_until("the archive is removed", || files(&kept) == 1);
+        wait_until("the archive is removed", || count_files(&bundles) == 1);
         refused.push((id, verdict));
     }
-    // What is no archive at all, and what breaks off, in the middle or before its first byte.
+    // A body that is no archive, and uploads that break off, in the middle or before the first byte.
     assert_eq!(
         server.upload(&team.token, b"#!/bin/sh".to_vec()).status(),
         415
     );
-    for dribble in [Dribble::Steadily, Dribble::NothingAfterTheHead] {
-        let broken = Slow::begin(&server, &team.token, dribble);
-        wait_until("it has begun", || files(&data_dir.join("uploads")) == 1);
+    for slowness in [Slowness::BelowMinRate, Slowness::NothingAfterHeader] {
+        let broken = SlowUpload::begin(&server, &team.token, slowness);
+        wait_until("the upload has started", || count_files(&data_dir.join("uploads")) == 1);
         drop(broken);
-        wait_until("it has left nothing", || {
-            files(&data_dir.join("uploads")) == 0
+        wait_until("its partial file is removed", || {
+            count_files(&data_dir.join("uploads")) == 0
         });
     }
-    assert_eq!(files(&kept), 1);
+    assert_eq!(count_files(&bundles), 1);
     honest.assert_undisturbed(&server, &evaluation, scratch.path());
     server.kill();
 
-    // What an older version kept, or a kill between two steps has left, goes at the next start: the refused
-    // team's, as it were, and one that no submission ever named.
-    let owner = fs::read_dir(&kept)
+    // The next start removes bundles that an earlier version or a kill has left: here one that no submission names.
+    let owner = fs::read_dir(&bundles)
         .expect("there are bundles")
         .map(|entry| entry.expect("a folder can be read").path())
-        .find(|folder| files(folder) == 1)
+        .find(|folder| count_files(folder) == 1)
         .expect("the honest team's folder");
-    let left = owner.join("0190-of-nobody.tar.gz");
-    let file = fs::File::create(&left).expect("a scratch file can be written");
+    let leftover = owner.join("0190-unreferenced.tar.gz");
+    let file = fs::File::create(&leftover).expect("a scratch file can be written");
     let long_ago = SystemTime::now() - Duration::from_secs(7 * 24 * 3600);
     file.set_modified(long_ago).expect("a file has a time");
     let server = Server::start(&data_dir, CONFIG);
-    wait_until("what is left is removed", || !left.exists());
-    assert_eq!(files(&kept), 1);
+    wait_until("the leftover file is removed", || !leftover.exists());
+    assert_eq!(count_files(&bundles), 1);
     for (id, mut verdict) in refused {
         let path = format!("/api/v1/submissions/{id}");
-        let mut told: Value = server
+        let mut current: Value = server
             .get(&path, Some(&team.token))
             .json()
             .expect("the API speaks JSON");
-        // Its archive may have gone after the verdict was read, or before.
-        for view in [&mut told, &mut verdict] {
+        // The archive may have been removed before or after the verdict was read.
+        for view in [&mut current, &mut verdict] {
             let fields = view.as_object_mut().expect("a submission is an object");
             fields.remove("archive_removed");
         }
-        assert_eq!(told, verdict, "its reason and log stay");
+        assert_eq!(current, verdict, "its reason and log stay");
     }
 }
 
 #[test]
-fn a_teams_quota_is_told_in_numbers_and_is_its_own() {
+fn upload_quota_is_per_team_and_reported_in_bytes() {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
-    let bundle = packed(&hold());
+    let bundle = pack(&hold());
     let size = bundle.len();
     let config = format!(
         "{CONFIG}\n[uploads]\nday_bytes = {}\nstored_bytes = {}\n",
@@ -403,13 +401,13 @@ fn a_teams_quota_is_told_in_numbers_and_is_its_own() {
         let problem: Value = answer.json().expect("a problem is JSON");
         assert_eq!(problem["type"], format!("/problems#{kind}"), "{problem:#}");
         assert_eq!(problem["limit_bytes"], limit, "{problem:#}");
-        let detail = problem["detail"].as_str().expect("it is told");
+        let detail = problem["detail"].as_str().expect("a problem has a detail");
         assert!(detail.contains(&limit.to_string()), "{detail}");
     };
     let full = server.upload(&greedy.token, bundle.clone());
     refused(full, 409, "stored-quota-spent", 2 * size + size / 2);
-    // The same without an announced length.
-    let unannounced = server
+    // The same without Content-Length.
+    let without_length = server
         .request(Method::POST, "/api/v1/submissions", &greedy.token)
         .header("content-type", "application/octet-stream")
         .body(reqwest::blocking::Body::new(std::io::Cursor::new(
@@ -417,13 +415,13 @@ fn a_teams_quota_is_told_in_numbers_and_is_its_own() {
         )))
         .send()
         .expect("the server answers");
-    refused(unannounced, 409, "stored-quota-spent", 2 * size + size / 2);
+    refused(without_length, 409, "stored-quota-spent", 2 * size + size / 2);
 
-    // What is refused is not stored, but it came.
-    let mut bad = bundle.clone();
-    bad.truncate(size / 2);
+    // Refused uploads do not count as stored, but count for the day.
+    let mut truncated = bundle.clone();
+    truncated.truncate(size / 2);
     for _ in 0..3 {
-        let id = other.upload(&server, bad.clone());
+        let id = other.upload(&server, truncated.clone());
         let verdict = other.verdict(&server, &id);
         assert_eq!(verdict["state"], "invalid", "{verdict:#}");
     }

@@ -1,16 +1,16 @@
-"""How much looking on a server bears, and what agents notice of it: nothing.
+"""Measures how many visitors a server can serve, and checks that agents are not slowed down by them.
 
     python3 tests/load/load.py target/release/faceoff target/release/striker
 
-Makes a season of its own in a temporary folder: teams with the agent striker, a day of real evaluations, a board. Then, with
-the answers warm and the generators (wrk, hey) on the same CPUs:
+Creates a season in a temporary folder: teams with the agent striker, a day of real evaluations, a board. Then, with warm
+caches and the load generators (wrk, hey) on the same CPUs:
 
-- idle: as many requests as 32 connections can make, for the board's page and its JSON;
-- while evaluations run: 500 requests per second offered over ten connections, half of them pages;
-- while evaluations run: as many as 256 connections can make, which is more than there is room for.
+- idle: as many requests as 32 connections can send, for the board's page and its JSON;
+- during evaluations: 500 requests per second over ten connections, half of them for pages;
+- during evaluations: as many requests as 256 connections can send, which exceeds the server's limit.
 
-Prints rates, latencies, the payload of each answer, and the penalty points for slow answers of each part. Nothing is asserted but
-that agents noticed nothing: how fast a machine is, is the machine's.
+Prints rates, latencies, the size of each response, and the episodes with penalty points for slow answers. The only assertion is
+that there are none of those, since the rates depend on the machine.
 """
 
 import csv
@@ -31,7 +31,7 @@ from pathlib import Path
 TEAMS = 20
 EPISODES = 50  # of each task
 OFFERED_PER_S = 500
-CONNECTIONS = 10  # more that are paced alike ask in bursts, which is another question
+CONNECTIONS = 10  # more connections with the same pace would send bursts
 
 CONFIG = f"""
 [server]
@@ -46,7 +46,7 @@ slots = 1
 
 
 class Season:
-    """A server of this test alone."""
+    """A server with a season of its own."""
 
     def __init__(self, program: Path, folder: Path):
         self.data = folder / "data"
@@ -61,7 +61,7 @@ class Season:
         self.url = self.process.stdout.readline().strip()
         self.admin = (self.data / "admin-token").read_text().strip()
 
-    def ask(self, method: str, path: str, token: str, body=None, media="application/json"):
+    def request(self, method: str, path: str, token: str, body=None, media="application/json"):
         if media == "application/json" and body is not None:
             body = json.dumps(body).encode()
         request = urllib.request.Request(self.url + path, body, method=method)
@@ -69,26 +69,26 @@ class Season:
         request.add_header("Content-Type", media)
         while True:
             try:
-                with urllib.request.urlopen(request) as answer:
-                    return json.load(answer)
+                with urllib.request.urlopen(request) as response:
+                    return json.load(response)
             except urllib.error.HTTPError as error:
-                # As any client of a busy server does.
+                # Retry, as any client of a busy server should.
                 if error.code != 503:
                     raise
                 time.sleep(float(error.headers["Retry-After"]))
 
-    def until(self, path: str, token: str, done):
-        while not done(answer := self.ask("GET", path, token)):
+    def wait_until(self, path: str, token: str, done):
+        while not done(view := self.request("GET", path, token)):
             time.sleep(0.2)
-        return answer
+        return view
 
-    def end(self):
+    def stop(self):
         self.process.terminate()
         self.process.wait()
 
 
-def packed(striker: Path, folder: Path) -> bytes:
-    """The agent as a team uploads it."""
+def pack_bundle(striker: Path, folder: Path) -> bytes:
+    """The bundle of the agent, as a team uploads it."""
     bundle = folder / "striker"
     bundle.mkdir()
     shutil.copy(Path(__file__).parents[2] / "agents/striker/agent.toml", bundle)
@@ -97,11 +97,11 @@ def packed(striker: Path, folder: Path) -> bytes:
     return Path(archive).read_bytes()
 
 
-def over(evaluation: dict) -> bool:
+def is_over(evaluation: dict) -> bool:
     return evaluation["state"] not in ("queued", "running", "finalising")
 
 
-def released(evaluation: dict) -> bool:
+def is_released(evaluation: dict) -> bool:
     return evaluation.get("released_at") is not None
 
 
@@ -112,15 +112,15 @@ def slow_answers(evaluations: list[dict]) -> int:
 
 
 def wrk(url: str, connections: int, seconds: int) -> dict:
-    words = ["wrk", "--latency", "-t1", f"-c{connections}", f"-d{seconds}s", url]
-    told = subprocess.run(words, capture_output=True, text=True, check=True).stdout
-    refused = re.search(r"Non-2xx or 3xx responses: (\d+)", told)
-    total = int(re.search(r"(\d+) requests in", told)[1])
-    errors = re.search(r"Socket errors: (.*)", told)
-    assert total > (int(refused[1]) if refused else 0), told
+    command = ["wrk", "--latency", "-t1", f"-c{connections}", f"-d{seconds}s", url]
+    output = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    refused = re.search(r"Non-2xx or 3xx responses: (\d+)", output)
+    total = int(re.search(r"(\d+) requests in", output)[1])
+    errors = re.search(r"Socket errors: (.*)", output)
+    assert total > (int(refused[1]) if refused else 0), output
     return {
-        "per_s": float(re.search(r"Requests/sec:\s+([\d.]+)", told)[1]),
-        "p99": re.search(r"99%\s+(\S+)", told)[1],
+        "per_s": float(re.search(r"Requests/sec:\s+([\d.]+)", output)[1]),
+        "p99": re.search(r"99%\s+(\S+)", output)[1],
         "answered": total - int(refused[1] if refused else 0),
         "refused": int(refused[1]) if refused else 0,
         "errors": errors[1] if errors else "none",
@@ -133,16 +133,16 @@ def percentile(times_ms: list[float], share: float) -> float:
 
 
 def hey(url: str, connections: int, seconds: int, per_s: int | None = None) -> dict:
-    """What came of asking over so many connections, as often as each may or, without a rate, can."""
-    words = ["hey", "-z", f"{seconds}s", "-c", str(connections), "-o", "csv"]
+    """Sends requests over `connections` connections: `per_s` in total, or without it as many as possible. Returns rates and latencies."""
+    command = ["hey", "-z", f"{seconds}s", "-c", str(connections), "-o", "csv"]
     if per_s is not None:
-        words += ["-q", str(per_s / connections)]
-    told = subprocess.run([*words, url], capture_output=True, text=True, check=True).stdout
+        command += ["-q", str(per_s / connections)]
+    output = subprocess.run([*command, url], capture_output=True, text=True, check=True).stdout
     times_ms: dict[str, list[float]] = {}
-    for answer in csv.DictReader(io.StringIO(told)):
+    for answer in csv.DictReader(io.StringIO(output)):
         times_ms.setdefault(answer["status-code"], []).append(1e3 * float(answer["response-time"]))
-    assert "200" in times_ms, told[:1000]
-    # A connection asks again when it has its answer: slow ones show as a rate below the one that was to be.
+    assert "200" in times_ms, output[:1000]
+    # A connection sends its next request after the response, so slow responses lower the rate.
     return {"per_s": round(sum(map(len, times_ms.values())) / seconds, 1)} | {
         status: {"answers": len(times), "p50_ms": percentile(times, 0.5), "p99_ms": percentile(times, 0.99)}
         for status, times in sorted(times_ms.items())
@@ -160,71 +160,71 @@ def main() -> None:
         folder = Path(name)
         season = Season(program, folder)
         try:
-            run(season, packed(striker, folder))
+            run(season, pack_bundle(striker, folder))
         finally:
-            season.end()
+            season.stop()
 
 
 def run(season: Season, archive: bytes) -> None:
     admin = season.admin
     teams = []
     for number in range(TEAMS):
-        team = season.ask("POST", "/api/v1/teams", admin, {"name": f"Team {number + 1}"})
+        team = season.request("POST", "/api/v1/teams", admin, {"name": f"Team {number + 1}"})
         path = "/api/v1/submissions?file_name=striker.tar.gz"
-        made = season.ask("POST", path, team["token"], archive, "application/octet-stream")
-        teams.append((team, made["id"]))
+        submission = season.request("POST", path, team["token"], archive, "application/octet-stream")
+        teams.append((team, submission["id"]))
     for team, submission in teams:
         path = f"/api/v1/submissions/{submission}"
-        found = season.until(path, team["token"], lambda one: one["state"] != "validating")
+        found = season.wait_until(path, team["token"], lambda one: one["state"] != "validating")
         assert found["state"] == "valid", found
-    day = season.ask("POST", "/api/v1/days", admin, {})
+    day = season.request("POST", "/api/v1/days", admin, {})
     created = [one["id"] for one in day["created"]]
 
     def results(ids: list[str]) -> list[dict]:
-        """Once all are over: what they broke is told with the release of the day."""
-        ended = [season.until(f"/api/v1/evaluations/{one}", admin, over) for one in ids]
+        """The results once the day is released: fouls are hidden before."""
+        ended = [season.wait_until(f"/api/v1/evaluations/{one}", admin, is_over) for one in ids]
         assert all(one["state"] == "finished" for one in ended), ended
-        return [season.until(f"/api/v1/evaluations/{one}", admin, released) for one in ids]
+        return [season.wait_until(f"/api/v1/evaluations/{one}", admin, is_released) for one in ids]
 
     quiet = results(created)
     board, data = season.url + "/", season.url + "/api/v1/board"
     print(f"{TEAMS} teams on the board; page {payload(board)} bytes, JSON {payload(data)} bytes")
-    print(f"nobody looks on: {slow_answers(quiet)} episodes with slow answers")
+    print(f"without visitors: {slow_answers(quiet)} episodes with slow answers")
 
     print("idle, 32 connections:")
-    for what, url in (("page", board), ("JSON", data)):
+    for name, url in (("page", board), ("JSON", data)):
         wrk(url, 32, 2)
-        print(f"  {what}: {wrk(url, 32, 10)}")
+        print(f"  {name}: {wrk(url, 32, 10)}")
 
-    stage = day["stage"] if "stage" in day else season.ask("GET", "/api/v1/stages", admin)[0]["id"]
+    stage = day["stage"] if "stage" in day else season.request("GET", "/api/v1/stages", admin)[0]["id"]
 
-    def beside(what: str, load) -> None:
-        """Runs the load until more evaluations have been played through."""
+    def measure(name: str, load) -> None:
+        """Repeats the load until further evaluations have finished."""
         ids = []
         for team, _ in teams[:10]:
             path = f"/api/v1/stages/{stage}/days/{day['day']}/extra-turn"
-            body = {"team": team["id"], "reason": what, "confirm": team["name"]}
-            ids.append(season.ask("POST", path, admin, body)["id"])
+            body = {"team": team["id"], "reason": name, "confirm": team["name"]}
+            ids.append(season.request("POST", path, admin, body)["id"])
         with ThreadPoolExecutor() as pool:
             ended = pool.submit(results, ids)
             rounds = []
             while not ended.done():
                 rounds.append(load())
             found = slow_answers(ended.result())
-        print(f"{what}: {found} episodes of {len(ids) * 3 * EPISODES} with slow answers")
+        print(f"{name}: {found} episodes of {len(ids) * 3 * EPISODES} with slow answers")
         for one in rounds:
             print(f"  {one}")
-        assert rounds, "the evaluations ended before anybody looked"
-        assert found == 0, "agents noticed that people look on"
+        assert rounds, "the evaluations ended before the load started"
+        assert found == 0, "visitors slowed agents down"
 
-    def offered() -> list[dict]:
+    def paced_load() -> list[dict]:
         with ThreadPoolExecutor() as pool:
             half = OFFERED_PER_S // 2
             parts = [pool.submit(hey, url, CONNECTIONS // 2, 10, half) for url in (board, data)]
             return [part.result() for part in parts]
 
-    beside(f"{OFFERED_PER_S} requests per second while evaluations run", offered)
-    beside("256 connections while evaluations run", lambda: hey(board, 256, 10))
+    measure(f"{OFFERED_PER_S} requests per second during evaluations", paced_load)
+    measure("256 connections during evaluations", lambda: hey(board, 256, 10))
 
 
 if __name__ == "__main__":

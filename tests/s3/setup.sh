@@ -1,5 +1,5 @@
 #!/bin/sh
-# Makes TARGET_DIR/s3-test, a virtual environment with what the tests need to have a bucket; again if its requirements have changed.
+# Creates TARGET_DIR/s3-test, a virtual environment with an S3 server for tests. Creates it again if the requirements have changed.
 set -eu
 here=$(dirname "$(realpath "$0")")
 : "${TARGET_DIR:=target}"

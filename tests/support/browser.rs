@@ -1,7 +1,7 @@
-//! A real Chromium, as a visitor has one: pages are opened, looked at and waited for by its DevTools protocol, which it speaks
-//! over a pair of pipes. There is no port, and nothing of the pages knows of it.
+//! A real Chromium, controlled by its DevTools protocol over a pair of pipes. It opens no port, and pages need no changes
+//! for it.
 
-use crate::server::{PATIENCE, Process};
+use crate::server::{TIMEOUT, Process};
 use base64::{Engine, engine::general_purpose::STANDARD};
 use serde_json::{Value, json};
 use std::{
@@ -19,34 +19,33 @@ use std::{
 };
 use tempfile::TempDir;
 
-/// What Chromium is called on Debian, on Ubuntu and by its maker.
-const NAMES: [&str; 3] = ["chromium", "chromium-browser", "google-chrome"];
-/// Between two looks at a page that is waited for.
-const LOOK: Duration = Duration::from_millis(50);
+/// Names of the program: on Debian, on Ubuntu, and of Google Chrome.
+const PROGRAMS: [&str; 3] = ["chromium", "chromium-browser", "google-chrome"];
+/// Pause between two checks of a condition on a page.
+const POLL_INTERVAL: Duration = Duration::from_millis(50);
 
 /// A browser without a window. Dropping it ends it.
 #[derive(Debug)]
 pub struct Browser {
-    wire: Wire,
+    devtools: DevTools,
     _process: Process,
     _profile: TempDir,
 }
 
-/// Through what a page is looked at.
+/// The window and the preferences of a visitor.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct View {
     pub width: u32,
     pub height: u32,
-    /// The visitor prefers dark pages.
+    /// The visitor prefers the dark colour scheme.
     pub dark: bool,
     pub scripts: bool,
-    /// Where the visitor's clock is.
+    /// The visitor's time zone.
     pub time_zone: &'static str,
 }
 
 impl View {
-    /// A window on a desk.
-    pub const DESK: Self = Self {
+        pub const DESKTOP: Self = Self {
         width: 1280,
         height: 900,
         dark: false,
@@ -56,22 +55,22 @@ impl View {
     pub const PROJECTOR: Self = Self {
         width: 2560,
         height: 1440,
-        ..Self::DESK
+        ..Self::DESKTOP
     };
-    /// The narrowest that pages are made for.
+    /// The narrowest supported window.
     pub const PHONE: Self = Self {
         width: 320,
         height: 640,
-        ..Self::DESK
+        ..Self::DESKTOP
     };
 
-    /// The same in the dark.
+    /// This view with the dark colour scheme.
     #[must_use]
     pub const fn dark(self) -> Self {
         Self { dark: true, ..self }
     }
 
-    /// The same where scripts are switched off.
+    /// This view with scripts disabled.
     #[must_use]
     pub const fn without_scripts(self) -> Self {
         Self {
@@ -82,18 +81,18 @@ impl View {
 }
 
 impl Browser {
-    /// Starts one whose profile is below `scratch`.
+    /// Starts a browser with its profile below `scratch`.
     ///
     /// # Panics
     /// If no Chromium is installed, or it does not start.
     #[must_use]
     pub fn start(scratch: &Path) -> Self {
-        let name = NAMES
+        let name = PROGRAMS
             .into_iter()
             .find(|name| Command::new(name).arg("--version").output().is_ok())
             .expect("a Chromium is installed; `make setup-test` installs one");
         let profile = tempfile::tempdir_in(scratch).expect("a scratch folder can be made");
-        // It reads its orders from descriptor 3 and answers on 4.
+        // Chromium reads commands from descriptor 3 and answers on descriptor 4.
         let mut child = Command::new("sh")
             .args(["-c", "exec \"$0\" \"$@\" 3<&0 4>&1 </dev/null >/dev/null"])
             .arg(name)
@@ -102,7 +101,7 @@ impl Browser {
                 "--remote-debugging-pipe",
                 "--no-sandbox",
                 "--disable-gpu",
-                // The replay draws in space, here without a graphics card.
+                // The replay needs WebGL, here without a graphics card.
                 "--enable-unsafe-swiftshader",
                 "--disable-quic",
                 "--disable-dev-shm-usage",
@@ -120,56 +119,56 @@ impl Browser {
             .stderr(Stdio::null())
             .spawn()
             .expect("the browser can be started");
-        let orders = child.stdin.take().expect("standard input is piped");
+        let commands = child.stdin.take().expect("standard input is piped");
         let answers = child.stdout.take().expect("standard output is piped");
-        let wire = Wire::new(orders, BufReader::new(answers));
+        let devtools = DevTools::new(commands, BufReader::new(answers));
         let browser = Self {
-            wire,
+            devtools,
             _process: Process(child),
             _profile: profile,
         };
-        browser.wire.ask(None, "Browser.getVersion", &json!({}));
+        browser.devtools.call(None, "Browser.getVersion", &json!({}));
         browser
     }
 
-    /// Opens an address on a desk and waits until it is loaded.
+    /// Opens an address in a desktop window and waits until it is loaded.
     ///
     /// # Panics
     /// If the browser has ended.
     #[must_use]
     pub fn open(&self, url: &str) -> Page<'_> {
-        self.open_in(View::DESK, url)
+        self.open_in(View::DESKTOP, url)
     }
 
-    /// Opens an address in a window of its own, which shares no cookies with others, and waits until it is loaded.
+    /// Opens an address in a new window, which shares no cookies with others, and waits until it is loaded.
     ///
     /// # Panics
     /// If the browser has ended.
     #[must_use]
     pub fn open_in(&self, view: View, url: &str) -> Page<'_> {
         let context = self
-            .wire
-            .ask(None, "Target.createBrowserContext", &json!({}));
-        let target = self.wire.ask(
+            .devtools
+            .call(None, "Target.createBrowserContext", &json!({}));
+        let target = self.devtools.call(
             None,
             "Target.createTarget",
             &json!({ "url": "about:blank", "browserContextId": context["browserContextId"] }),
         );
-        let attached = self.wire.ask(
+        let attached = self.devtools.call(
             None,
             "Target.attachToTarget",
             &json!({ "targetId": target["targetId"], "flatten": true }),
         );
         let session = attached["sessionId"].as_str();
         let page = Page {
-            wire: &self.wire,
+            devtools: &self.devtools,
             session: session.expect("a session has an id").to_owned(),
         };
         for domain in ["Page", "Runtime", "Log"] {
-            page.ask(&format!("{domain}.enable"), &json!({}));
+            page.call(&format!("{domain}.enable"), &json!({}));
         }
-        page.look_through(view);
-        page.go(url);
+        page.set_view(view);
+        page.go_to(url);
         page
     }
 }
@@ -177,30 +176,30 @@ impl Browser {
 /// A window of a browser.
 #[derive(Debug)]
 pub struct Page<'a> {
-    wire: &'a Wire,
+    devtools: &'a DevTools,
     session: String,
 }
 
 impl Page<'_> {
-    /// Makes the window another.
+    /// Changes the window and the visitor's preferences.
     ///
     /// # Panics
     /// If the browser has ended.
-    pub fn look_through(&self, view: View) {
-        self.ask(
+    pub fn set_view(&self, view: View) {
+        self.call(
             "Emulation.setDeviceMetricsOverride",
             &json!({ "width": view.width, "height": view.height, "deviceScaleFactor": 1, "mobile": false }),
         );
         let scheme = if view.dark { "dark" } else { "light" };
-        self.ask(
+        self.call(
             "Emulation.setEmulatedMedia",
             &json!({ "features": [{ "name": "prefers-color-scheme", "value": scheme }] }),
         );
-        self.ask(
+        self.call(
             "Emulation.setTimezoneOverride",
             &json!({ "timezoneId": view.time_zone }),
         );
-        self.ask(
+        self.call(
             "Emulation.setScriptExecutionDisabled",
             &json!({ "value": !view.scripts }),
         );
@@ -210,28 +209,32 @@ impl Page<'_> {
     ///
     /// # Panics
     /// If it cannot be loaded at all.
-    pub fn go(&self, url: &str) {
-        self.mark();
-        let gone = self.ask("Page.navigate", &json!({ "url": url }));
-        assert!(gone["errorText"].is_null(), "{url}: {}", gone["errorText"]);
-        self.wait_for_another();
+    pub fn go_to(&self, url: &str) {
+        self.mark_document();
+        let navigated = self.call("Page.navigate", &json!({ "url": url }));
+        assert!(
+            navigated["errorText"].is_null(),
+            "{url}: {}",
+            navigated["errorText"]
+        );
+        self.wait_for_new_document();
     }
 
-    /// Does what leads to another document, and waits until that is loaded.
+    /// Evaluates an expression that navigates to another document, and waits until that is loaded.
     ///
     /// # Panics
     /// If the expression throws.
-    pub fn leave_by(&self, expression: &str) {
-        self.mark();
+    pub fn navigate_by(&self, expression: &str) {
+        self.mark_document();
         let _ = self.evaluate(expression);
-        self.wait_for_another();
+        self.wait_for_new_document();
     }
 
-    fn mark(&self) {
+    fn mark_document(&self) {
         let _ = self.evaluate("window.isBefore = true");
     }
 
-    fn wait_for_another(&self) {
+    fn wait_for_new_document(&self) {
         self.wait_until(
             "window.isBefore === undefined && location.href != 'about:blank' && document.readyState == 'complete'",
         );
@@ -243,45 +246,45 @@ impl Page<'_> {
     /// If the browser has ended.
     pub fn before_scripts(&self, script: &str) {
         let params = json!({ "source": script });
-        self.ask("Page.addScriptToEvaluateOnNewDocument", &params);
+        self.call("Page.addScriptToEvaluateOnNewDocument", &params);
     }
 
-    /// Bytes that its scripts hold, once what nobody needs is gone.
+    /// Bytes that the page's scripts use after garbage collection.
     ///
     /// # Panics
     /// If the browser has ended.
     #[must_use]
     pub fn script_bytes(&self) -> f64 {
-        self.ask("HeapProfiler.collectGarbage", &json!({}));
-        let usage = self.ask("Runtime.getHeapUsage", &json!({}));
+        self.call("HeapProfiler.collectGarbage", &json!({}));
+        let usage = self.call("Runtime.getHeapUsage", &json!({}));
         usage["usedSize"].as_f64().expect("a number of bytes")
     }
 
-    /// CPU time that its scripts have taken since it was asked first, in s.
+    /// CPU time of the page's scripts since the first call, in s.
     ///
     /// # Panics
     /// If the browser has ended.
     #[must_use]
-    pub fn script_s(&self) -> f64 {
-        self.ask(
+    pub fn script_cpu_s(&self) -> f64 {
+        self.call(
             "Performance.enable",
             &json!({ "timeDomain": "threadTicks" }),
         );
-        let measured = self.ask("Performance.getMetrics", &json!({}));
+        let measured = self.call("Performance.getMetrics", &json!({}));
         let metrics = measured["metrics"].as_array().into_iter().flatten();
-        let of_scripts = metrics
+        let script_duration = metrics
             .into_iter()
             .find(|metric| metric["name"] == "ScriptDuration");
-        let taken = of_scripts.and_then(|metric| metric["value"].as_f64());
-        taken.expect("the browser measures it")
+        let seconds = script_duration.and_then(|metric| metric["value"].as_f64());
+        seconds.expect("the browser measures it")
     }
 
-    /// Fills fields of the page's form, by their names, and sends it as its button does.
+    /// Fills fields of a form by their names, submits it, and waits for the next document.
     ///
     /// # Panics
     /// If there is no such form or field.
     pub fn send_form(&self, form: &str, fields: &[(&str, &str)]) {
-        self.leave_by(&format!(
+        self.navigate_by(&format!(
             "(() => {{
                 const form = document.querySelector({});
                 for (const [name, value] of {}) form.elements[name].value = value;
@@ -292,13 +295,13 @@ impl Page<'_> {
         ));
     }
 
-    /// What an expression comes to, after it is settled if it is a promise.
+    /// The value of an expression; a promise is awaited.
     ///
     /// # Panics
     /// If it throws.
     #[must_use]
     pub fn evaluate(&self, expression: &str) -> Value {
-        let answer = self.ask("Runtime.evaluate", &evaluation(expression));
+        let answer = self.call("Runtime.evaluate", &evaluation(expression));
         assert!(
             answer["exceptionDetails"].is_null(),
             "{expression}: {}",
@@ -307,14 +310,14 @@ impl Page<'_> {
         answer["result"]["value"].clone()
     }
 
-    /// Waits until an expression is true. What a page that is just being replaced throws is no answer.
+    /// Waits until an expression is true. Exceptions count as false: the page may be loading.
     ///
     /// # Panics
-    /// After [`PATIENCE`], with the page.
+    /// After [`TIMEOUT`], with the page.
     pub fn wait_until(&self, expression: &str) {
         let started = Instant::now();
         loop {
-            let answer = self.wire.call(
+            let answer = self.devtools.try_call(
                 Some(&self.session),
                 "Runtime.evaluate",
                 &evaluation(&format!("Boolean({expression})")),
@@ -323,24 +326,24 @@ impl Page<'_> {
                 return;
             }
             assert!(
-                started.elapsed() < PATIENCE,
+                started.elapsed() < TIMEOUT,
                 "still waiting for {expression}:\n{}",
                 self.html()
             );
-            // Looking now and then is what a visitor does; the pause keeps the CPU for the server.
-            thread::sleep(LOOK);
+            // The pause keeps the CPU for the server.
+            thread::sleep(POLL_INTERVAL);
         }
     }
 
-    /// Waits until the page has an element that a selector finds.
+    /// Waits until the page has an element for a selector.
     ///
     /// # Panics
-    /// After [`PATIENCE`], with the page.
+    /// After [`TIMEOUT`], with the page.
     pub fn wait_for(&self, selector: &str) {
         self.wait_until(&format!("document.querySelector({})", json!(selector)));
     }
 
-    /// The words of the first element that a selector finds, as they are shown.
+    /// The visible text of the first element for a selector.
     ///
     /// # Panics
     /// If there is none.
@@ -378,11 +381,11 @@ impl Page<'_> {
             };
             let pressed =
                 json!({ "type": kind, "key": key, "code": key, "windowsVirtualKeyCode": code });
-            self.ask("Input.dispatchKeyEvent", &pressed);
+            self.call("Input.dispatchKeyEvent", &pressed);
         }
     }
 
-    /// A picture of all of the page, as PNG.
+    /// Saves a picture of the whole page as PNG.
     ///
     /// # Panics
     /// If it cannot be written.
@@ -390,17 +393,17 @@ impl Page<'_> {
         self.capture(true, file);
     }
 
-    /// A picture of what its window shows.
+    /// Saves a picture of the visible part as PNG.
     ///
     /// # Panics
     /// If it cannot be written.
-    pub fn window(&self, file: &Path) {
+    pub fn screenshot_window(&self, file: &Path) {
         self.capture(false, file);
     }
 
     fn capture(&self, beyond_window: bool, file: &Path) {
         let params = json!({ "captureBeyondViewport": beyond_window });
-        let taken = self.ask("Page.captureScreenshot", &params);
+        let taken = self.call("Page.captureScreenshot", &params);
         let picture = STANDARD.decode(taken["data"].as_str().unwrap_or_default());
         fs::write(file, picture.expect("a picture in base 64")).expect("a file can be written");
     }
@@ -416,23 +419,23 @@ impl Page<'_> {
         wider.as_i64().expect("widths are whole numbers")
     }
 
-    /// What the browser has complained of since the window was opened: exceptions, errors on the console, what
-    /// could not be loaded and what the page's own policy refused.
+    /// Errors since the window was opened: exceptions, errors on the console, failed loads and violations of the page's
+    /// content security policy.
     ///
     /// # Panics
     /// If a thread of the test has panicked.
     #[must_use]
     pub fn console_errors(&self) -> Vec<String> {
-        let inbox = self.wire.inbox();
-        let of_page = inbox
+        let inbox = self.devtools.inbox();
+        let page_events = inbox
             .events
             .iter()
             .filter(|event| event["sessionId"] == self.session.as_str());
-        of_page.filter_map(complaint).collect()
+        page_events.filter_map(console_error).collect()
     }
 
-    fn ask(&self, method: &str, params: &Value) -> Value {
-        self.wire.ask(Some(&self.session), method, params)
+    fn call(&self, method: &str, params: &Value) -> Value {
+        self.devtools.call(Some(&self.session), method, params)
     }
 }
 
@@ -440,8 +443,8 @@ fn evaluation(expression: &str) -> Value {
     json!({ "expression": expression, "awaitPromise": true, "returnByValue": true })
 }
 
-/// What an event complains of, if it is a complaint.
-fn complaint(event: &Value) -> Option<String> {
+/// The text of an event that reports an error.
+fn console_error(event: &Value) -> Option<String> {
     let params = &event["params"];
     let is_error = match event["method"].as_str()? {
         "Runtime.exceptionThrown" => true,
@@ -452,15 +455,15 @@ fn complaint(event: &Value) -> Option<String> {
     is_error.then(|| params.to_string())
 }
 
-/// Two pipes: orders, and what comes back.
+/// The connection to the browser: a pipe for commands and one for answers and events.
 #[derive(Debug)]
-struct Wire {
-    orders: Mutex<ChildStdin>,
-    next: AtomicU64,
-    came: Arc<(Mutex<Inbox>, Condvar)>,
+struct DevTools {
+    commands: Mutex<ChildStdin>,
+    next_id: AtomicU64,
+    received: Arc<(Mutex<Inbox>, Condvar)>,
 }
 
-/// What has come back.
+/// Received answers and events.
 #[derive(Debug, Default)]
 struct Inbox {
     answers: HashMap<u64, Value>,
@@ -468,20 +471,20 @@ struct Inbox {
     has_ended: bool,
 }
 
-impl Wire {
-    fn new(orders: ChildStdin, mut answers: impl BufRead + Send + 'static) -> Self {
-        let came = Arc::new((Mutex::<Inbox>::default(), Condvar::new()));
-        // It ends with the browser.
+impl DevTools {
+    fn new(commands: ChildStdin, mut answers: impl BufRead + Send + 'static) -> Self {
+        let received = Arc::new((Mutex::<Inbox>::default(), Condvar::new()));
+        // The thread ends with the browser.
         thread::spawn({
-            let came = Arc::clone(&came);
+            let received = Arc::clone(&received);
             move || {
                 let mut message = Vec::new();
                 loop {
                     message.clear();
                     let read = answers.read_until(0, &mut message);
                     let is_end = read.is_err() || message.pop() != Some(0);
-                    let (inbox, signal) = &*came;
-                    let mut inbox = inbox.lock().expect("nobody panics with the inbox");
+                    let (inbox, signal) = &*received;
+                    let mut inbox = inbox.lock().expect("no thread panics while it holds the inbox");
                     if is_end {
                         inbox.has_ended = true;
                     } else if let Ok(message) = serde_json::from_slice::<Value>(&message) {
@@ -498,40 +501,40 @@ impl Wire {
             }
         });
         Self {
-            orders: Mutex::new(orders),
-            next: AtomicU64::new(1),
-            came,
+            commands: Mutex::new(commands),
+            next_id: AtomicU64::new(1),
+            received,
         }
     }
 
     fn inbox(&self) -> MutexGuard<'_, Inbox> {
-        self.came.0.lock().expect("nobody panics with the inbox")
+        self.received.0.lock().expect("no thread panics while it holds the inbox")
     }
 
-    /// What a method answers, which must not refuse.
-    fn ask(&self, session: Option<&str>, method: &str, params: &Value) -> Value {
-        self.call(session, method, params)
+    /// Calls a method that must succeed; returns its result.
+    fn call(&self, session: Option<&str>, method: &str, params: &Value) -> Value {
+        self.try_call(session, method, params)
             .unwrap_or_else(|refusal| panic!("{method}: {refusal}"))
     }
 
-    /// What a method answers, or why it does not.
-    fn call(&self, session: Option<&str>, method: &str, params: &Value) -> Result<Value, Value> {
-        let id = self.next.fetch_add(1, Ordering::Relaxed);
-        let mut order = json!({ "id": id, "method": method, "params": params });
+    /// Calls a method; returns its result or its error.
+    fn try_call(&self, session: Option<&str>, method: &str, params: &Value) -> Result<Value, Value> {
+        let id = self.next_id.fetch_add(1, Ordering::Relaxed);
+        let mut command = json!({ "id": id, "method": method, "params": params });
         if let Some(session) = session {
-            order["sessionId"] = json!(session);
+            command["sessionId"] = json!(session);
         }
-        let mut bytes = order.to_string().into_bytes();
+        let mut bytes = command.to_string().into_bytes();
         bytes.push(0);
-        let mut orders = self.orders.lock().expect("nobody panics with the pipe");
-        orders.write_all(&bytes).expect("the browser reads");
-        drop(orders);
+        let mut pipe = self.commands.lock().expect("no thread panics while it holds the pipe");
+        pipe.write_all(&bytes).expect("the browser reads");
+        drop(pipe);
         let waiting = |inbox: &mut Inbox| !inbox.has_ended && !inbox.answers.contains_key(&id);
         let (mut inbox, _) = self
-            .came
+            .received
             .1
-            .wait_timeout_while(self.inbox(), PATIENCE, waiting)
-            .expect("nobody panics with the inbox");
+            .wait_timeout_while(self.inbox(), TIMEOUT, waiting)
+            .expect("no thread panics while it holds the inbox");
         let answer = inbox.answers.remove(&id);
         let mut answer = answer.unwrap_or_else(|| panic!("{method}: the browser has ended"));
         match answer["error"].take() {

@@ -1,4 +1,4 @@
-//! A bucket that speaks as S3 does, on this machine.
+//! A local server with the protocol of S3, and a bucket on it.
 
 use crate::{
     repository,
@@ -10,20 +10,19 @@ use std::{
     process::{ChildStdin, Command, Stdio},
 };
 
-/// It, until this is dropped.
+/// A bucket. Dropping it ends its server.
 #[derive(Debug)]
 pub struct Bucket {
     _process: Process,
-    /// It ends with its input.
+    /// The server ends when its standard input is closed.
     _input: ChildStdin,
     endpoint: String,
 }
 
-/// What the bucket is called.
 const NAME: &str = "matches";
 
 impl Bucket {
-    /// An empty one.
+    /// Starts a server with an empty bucket.
     ///
     /// # Panics
     /// If its server is not installed, or does not start.
@@ -41,17 +40,17 @@ impl Bucket {
             .spawn();
         let mut process = Process(started.unwrap_or_else(|error| {
             panic!(
-                "{}: {error}; TARGET_DIR={} tests/s3/setup.sh makes it",
+                "{}: {error}; TARGET_DIR={} tests/s3/setup.sh installs it",
                 python.display(),
                 target.display()
             )
         }));
         let input = process.0.stdin.take().expect("its input is piped");
-        let told = process.0.stdout.take().expect("its output is piped");
+        let output = process.0.stdout.take().expect("its output is piped");
         let mut endpoint = String::new();
-        BufReader::new(told)
+        BufReader::new(output)
             .read_line(&mut endpoint)
-            .expect("it tells its address");
+            .expect("it prints its address");
         let endpoint = endpoint.trim().to_owned();
         let made = http()
             .build()
@@ -70,42 +69,42 @@ impl Bucket {
     /// `s3://…`, for a configuration.
     #[must_use]
     pub fn url(&self) -> String {
-        format!("s3://{NAME}/of/ours")
+        format!("s3://{NAME}/of/season")
     }
 
-    /// Where it listens.
+    /// The address of its server.
     ///
     /// # Panics
-    /// If it told no address.
+    /// If the server printed no valid address.
     #[must_use]
     pub fn address(&self) -> SocketAddr {
         let address = self.endpoint.strip_prefix("http://").unwrap_or_default();
-        address.parse().expect("it tells its address")
+        address.parse().expect("it prints its address")
     }
 
-    /// By which a server finds it at `address`, and says who it is.
+    /// Environment variables with which a server reaches the bucket at `address` and signs its requests.
     #[must_use]
     pub fn environment(address: SocketAddr) -> Vec<(&'static str, String)> {
         let endpoint = format!("http://{address}");
-        let words = [
+        let variables = [
             ("AWS_ENDPOINT", &*endpoint),
             ("AWS_ALLOW_HTTP", "true"),
             ("AWS_REGION", "us-east-1"),
             ("AWS_ACCESS_KEY_ID", "server"),
-            ("AWS_SECRET_ACCESS_KEY", "nobody's"),
+            ("AWS_SECRET_ACCESS_KEY", "secret"),
         ];
-        words.map(|(name, value)| (name, value.to_owned())).into()
+        variables.map(|(name, value)| (name, value.to_owned())).into()
     }
 
-    /// The keys of all that is in it.
+    /// The keys of all its objects.
     ///
     /// # Panics
-    /// If it does not answer.
+    /// If the server does not answer.
     #[must_use]
     pub fn keys(&self) -> Vec<String> {
         let client = http().build().expect("a client needs nothing");
-        let asked = client.get(format!("{}/{NAME}?list-type=2", self.endpoint));
-        let listed = asked.send().and_then(|answer| answer.text());
+        let request = client.get(format!("{}/{NAME}?list-type=2", self.endpoint));
+        let listed = request.send().and_then(|answer| answer.text());
         let listed = listed.expect("it answers");
         let keys = listed.split("<Key>").skip(1);
         keys.filter_map(|rest| Some(rest.split_once("</Key>")?.0.to_owned()))

@@ -7,10 +7,10 @@ use std::{
     path::{Path, PathBuf},
 };
 
-/// The folder of a reference agent, complete with its program.
+/// The folder of a reference agent, with its program.
 ///
 /// # Panics
-/// If the agent is unknown or cannot be copied.
+/// If the agent is unknown or cannot be copy_folder.
 #[must_use]
 pub fn reference(name: &str, into: &Path) -> PathBuf {
     let source = repository().join("agents").join(name);
@@ -24,9 +24,8 @@ pub fn reference(name: &str, into: &Path) -> PathBuf {
     folder
 }
 
-/// An agent of one Python file that greets as it should and then runs `on_step` for each `step`
-/// message: statements that see `message`, the decoded line, `say(object)` and `hold`, the answer
-/// that keeps still.
+/// The source of a Python agent that answers as it should and runs the statements `on_step` for each `step` message.
+/// These can use `message`, the decoded line, `say(object)`, and `hold`, the answer that holds the arm still.
 #[must_use]
 pub fn python_agent(on_step: &str) -> String {
     let body = on_step.replace('\n', "\n        ");
@@ -75,26 +74,26 @@ pub fn python_bundle(folder: &Path, name: &str, source: &str) -> PathBuf {
     bundle
 }
 
-/// A copy of a folder of files.
+/// Copies a folder of files.
 ///
 /// # Panics
-/// If it cannot be made.
+/// If it has subfolders or cannot be copy_folder.
 #[must_use]
-pub(crate) fn copied(folder: &Path, to: &Path) -> PathBuf {
+pub(crate) fn copy_folder(folder: &Path, to: &Path) -> PathBuf {
     fs::create_dir_all(to).expect("a scratch folder can be made");
     for entry in fs::read_dir(folder).expect("the folder is there") {
         let entry = entry.expect("a folder can be read");
-        fs::copy(entry.path(), to.join(entry.file_name())).expect("it holds files only");
+        fs::copy(entry.path(), to.join(entry.file_name())).expect("the folder has files only");
     }
     to.to_path_buf()
 }
 
-/// The folder as a `.tar.gz`.
+/// Packs the folder as a `.tar.gz`.
 ///
 /// # Panics
 /// If the folder cannot be read.
 #[must_use]
-pub fn packed(folder: &Path) -> Vec<u8> {
+pub fn pack(folder: &Path) -> Vec<u8> {
     let mut archive = tar::Builder::new(GzEncoder::new(Vec::new(), Compression::fast()));
     archive
         .append_dir_all(".", folder)

@@ -1,5 +1,5 @@
-//! What the end-to-end tests share: the real `faceoff` program as a child process, bundles on disk
-//! and an HTTP client that knows nothing of the server's types.
+//! Shared code of the end-to-end tests: the real `faceoff` program as a child process, bundles on disk, and an HTTP client
+//! that does not use the server's types.
 
 pub mod browser;
 pub mod bucket;
@@ -17,7 +17,7 @@ use std::path::PathBuf;
 pub fn repository() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR"))
         .parent()
-        .expect("tests/ lies in the repository's root")
+        .expect("tests/ is in the repository's root")
         .to_path_buf()
 }
 
@@ -32,7 +32,7 @@ pub fn program(name: &str) -> PathBuf {
     let folder = test
         .ancestors()
         .nth(2)
-        .expect("a test lies two folders below the target folder");
+        .expect("a test is two folders below the target folder");
     let program = folder.join(name);
     assert!(
         program.is_file(),

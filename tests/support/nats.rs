@@ -1,6 +1,6 @@
 //! A real `nats-server` with JetStream.
 
-use crate::server::{PATIENCE, Process};
+use crate::server::{TIMEOUT, Process};
 use std::{
     fs,
     net::{SocketAddr, TcpStream},
@@ -10,10 +10,9 @@ use std::{
     time::{Duration, Instant},
 };
 
-/// Its configuration, in its folder.
 const CONFIG: &str = "nats-server.conf";
 
-/// It, on a port of its own. Dropping it ends it at once (SIGKILL).
+/// A NATS server on a free port. Dropping it kills it (SIGKILL).
 #[derive(Debug)]
 pub struct Nats {
     process: Process,
@@ -22,29 +21,30 @@ pub struct Nats {
 }
 
 impl Nats {
-    /// Starts one that keeps its streams below `folder`.
+    /// Starts a server that stores its streams below `folder`.
     ///
     /// # Panics
-    /// If none is installed, or it does not start.
+    /// If `nats-server` is not installed, or does not start.
     #[must_use]
     pub fn start(folder: &Path) -> Self {
-        Self::configured(folder, "")
+        Self::start_with_config(folder, "")
     }
 
-    /// Starts one with a configuration, but for its port and folder.
+    /// Starts a server with this configuration; port and folder are set here.
     ///
     /// # Panics
     /// As [`start`](Self::start).
     #[must_use]
-    pub fn configured(folder: &Path, config: &str) -> Self {
+    pub fn start_with_config(folder: &Path, config: &str) -> Self {
         fs::create_dir_all(folder).expect("a scratch folder can be made");
         fs::write(folder.join(CONFIG), config).expect("a scratch file can be written");
         let process = run(folder, "-1");
-        // It tells which port it was given in a file that is named for its process.
-        let told = folder.join(format!("nats-server_{}.ports", process.0.id()));
+        // The server writes its port to a file named after its process id.
+        let ports_file = folder.join(format!("nats-server_{}.ports", process.0.id()));
         let address = wait_for(|| {
-            let told: serde_json::Value = serde_json::from_slice(&fs::read(&told).ok()?).ok()?;
-            let url = told["nats"][0].as_str()?;
+            let ports: serde_json::Value =
+                serde_json::from_slice(&fs::read(&ports_file).ok()?).ok()?;
+            let url = ports["nats"][0].as_str()?;
             let (_, address) = url.split_once("://")?;
             address.parse().ok()
         });
@@ -55,8 +55,7 @@ impl Nats {
         }
     }
 
-    /// The id of its process.
-    #[must_use]
+        #[must_use]
     pub fn process_id(&self) -> u32 {
         self.process.0.id()
     }
@@ -72,59 +71,60 @@ impl Nats {
         format!("nats://{}", self.address)
     }
 
-    /// From its next start on it has this configuration.
+    /// Writes a configuration that applies from the next start.
     ///
     /// # Panics
-    /// If that cannot be written.
+    /// If the file cannot be written.
     pub fn configure(&self, config: &str) {
         fs::write(self.folder.join(CONFIG), config).expect("a scratch file can be written");
     }
 
-    /// Ends it as a power cut would, and starts it again where it was.
+    /// Kills the server and starts it again on the same port and folder.
     ///
     /// # Panics
     /// If it does not start.
-    pub fn kill_and_start(&mut self) {
-        self.process.end();
-        self.start_again();
+    pub fn kill_and_restart(&mut self) {
+        self.process.kill();
+        self.restart();
     }
 
-    /// Likewise, and of its streams nothing is left.
+    /// Kills the server, removes its streams, and starts it again.
     ///
     /// # Panics
     /// If it does not start, or its streams cannot be removed.
-    pub fn lose_all_and_start(&mut self) {
-        self.process.end();
+    pub fn lose_streams_and_restart(&mut self) {
+        self.process.kill();
         fs::remove_dir_all(self.folder.join("jetstream")).expect("its streams can be removed");
-        self.start_again();
+        self.restart();
     }
 
-    /// Likewise, and of its streams only how far they were read is left, as after a power cut.
+    /// Kills the server, removes the messages of its streams but not the consumers' positions, as a power cut can, and starts
+    /// it again.
     ///
     /// # Panics
-    /// If it does not start, or what it has stored cannot be removed.
-    pub fn lose_messages_and_start(&mut self) {
-        self.process.end();
+    /// If it does not start, or the messages cannot be removed.
+    pub fn lose_messages_and_restart(&mut self) {
+        self.process.kill();
         let streams = fs::read_dir(self.folder.join("jetstream/$G/streams"));
-        for stream in streams.expect("it has streams") {
+        for stream in streams.expect("the server has streams") {
             let messages = stream.expect("a folder can be read").path().join("msgs");
             fs::remove_dir_all(&messages).expect("a stream has messages");
             fs::create_dir(&messages).expect("a folder can be made");
         }
-        self.start_again();
+        self.restart();
     }
 
-    fn start_again(&mut self) {
+    fn restart(&mut self) {
         self.process = run(&self.folder, &self.address.port().to_string());
         wait_for(|| TcpStream::connect(self.address).ok());
     }
 }
 
 fn run(folder: &Path, port: &str) -> Process {
-    // Debian has it where ordinary users do not look.
-    let debians = Path::new("/usr/sbin/nats-server");
-    let name = match debians.exists() {
-        true => debians,
+    // Debian installs it in /usr/sbin, which is not in the PATH of ordinary users.
+    let debian_path = Path::new("/usr/sbin/nats-server");
+    let name = match debian_path.exists() {
+        true => debian_path,
         false => Path::new("nats-server"),
     };
     let started = Command::new(name)
@@ -143,14 +143,14 @@ fn run(folder: &Path, port: &str) -> Process {
     Process(started.expect("nats-server is installed; `make setup-test` installs it"))
 }
 
-fn wait_for<T>(mut look: impl FnMut() -> Option<T>) -> T {
+fn wait_for<T>(mut check: impl FnMut() -> Option<T>) -> T {
     let started = Instant::now();
     loop {
-        if let Some(found) = look() {
+        if let Some(found) = check() {
             return found;
         }
-        assert!(started.elapsed() < PATIENCE, "nats-server does not start");
-        // It tells nobody that it is ready.
+        assert!(started.elapsed() < TIMEOUT, "nats-server does not start");
+        // The server does not signal that it is ready.
         thread::sleep(Duration::from_millis(20));
     }
 }

@@ -1,6 +1,6 @@
-//! Python packages for agents of tests, from the package index, kept for later runs.
+//! Python packages for test agents, from the package index and cached for later runs.
 
-use crate::{bundle::copied, program, repository};
+use crate::{bundle::copy_folder, program, repository};
 use std::{
     fs,
     path::{Path, PathBuf},
@@ -10,19 +10,19 @@ use std::{
 fn target() -> PathBuf {
     let programs = program("faceoff");
     let target = programs.ancestors().nth(2);
-    let target = target.expect("programs lie two folders below the target folder's");
+    let target = target.expect("programs are two folders below the target folder");
     target.to_owned()
 }
 
-/// Where what was downloaded stays.
-fn kept() -> PathBuf {
+/// The folder for downloaded packages.
+fn download_cache() -> PathBuf {
     target().join("runtimes")
 }
 
-/// The runtime `python3-ml`, made by `tests/runtimes.sh` the first time, where agents see it.
+/// The folder of the runtime `python3-ml`, which `tests/runtimes.sh` makes the first time.
 ///
 /// # Panics
-/// If it cannot be made, as without a package index.
+/// If it cannot be made, for example without a package index.
 #[must_use]
 pub fn python3_ml() -> PathBuf {
     let script = repository().join("tests/runtimes.sh");
@@ -30,13 +30,13 @@ pub fn python3_ml() -> PathBuf {
     Path::new(folder.trim_end_matches('\n')).join("python3-ml")
 }
 
-/// The bundle `tests/bundles/NAME`, complete.
+/// Copies the bundle `tests/bundles/NAME`, with the protocol module that it needs.
 ///
 /// # Panics
 /// If it cannot be copied.
 #[must_use]
 pub fn test_bundle(name: &str, into: &Path) -> PathBuf {
-    let folder = copied(
+    let folder = copy_folder(
         &repository().join("tests/bundles").join(name),
         &into.join(name),
     );
@@ -45,16 +45,16 @@ pub fn test_bundle(name: &str, into: &Path) -> PathBuf {
     folder
 }
 
-/// Brings what `requirements.txt` of a bundle names into its folder `vendor`, as docs/sandbox.md tells teams to, for a
-/// server whose Python is `version` (`3.11`).
+/// Installs the packages of a bundle's `requirements.txt` into its folder `vendor`, as docs/sandbox.md describes, for a
+/// server with this version of Python (`3.11`).
 ///
 /// # Panics
-/// If that cannot be done, as without a package index.
+/// If the installation fails, for example without a package index.
 pub fn vendor(bundle: &Path, version: &str) {
-    // What pip fetched for an earlier test is there without the index.
-    let wheels = kept().join(format!("wheels-{version}"));
+    // Packages that an earlier test downloaded need no index.
+    let wheels = download_cache().join(format!("wheels-{version}"));
     let requirements = bundle.join("requirements.txt");
-    let pip = |verb: &str, place: &Path| {
+    let pip = |verb: &str, target: &Path| {
         let mut pip = Command::new("/usr/bin/python3");
         pip.args(["-m", "pip", "--disable-pip-version-check", verb])
             .args([
@@ -71,21 +71,21 @@ pub fn vendor(bundle: &Path, version: &str) {
             } else {
                 "--target"
             })
-            .arg(place);
+            .arg(target);
         pip
     };
     if !wheels.exists() {
-        fs::create_dir_all(kept()).expect("the target folder can be written");
-        let fetched = tempfile::tempdir_in(kept()).expect("the target folder can be written");
+        fs::create_dir_all(download_cache()).expect("the target folder can be written");
+        let fetched = tempfile::tempdir_in(download_cache()).expect("the target folder can be written");
         run(&mut pip("download", fetched.path()));
-        // Another test may have been faster.
+        // A concurrent test may have created the folder.
         let _ = fs::rename(fetched.path(), &wheels);
     }
     let mut install = pip("install", &bundle.join("vendor"));
     run(install.args(["--no-index", "--find-links"]).arg(&wheels));
 }
 
-/// What it prints; it must succeed.
+/// Runs a command that must succeed; returns its output.
 fn run(command: &mut Command) -> String {
     let output = command.output().expect("the program can be started");
     assert!(

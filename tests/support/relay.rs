@@ -1,4 +1,4 @@
-//! A link that can be cut, and leads elsewhere when it is told to: connections to an address that stays are passed on.
+//! A TCP relay with a fixed address, whose target can change, and whose connections can be delayed or cut.
 
 use std::{
     io::{Read as _, Write as _},
@@ -8,25 +8,24 @@ use std::{
     time::Duration,
 };
 
-/// Which connections break. The same seed draws the same.
+/// Which connections break, drawn from a seed.
 #[derive(Debug, Clone, Copy)]
-pub struct Breaks {
-    /// Of all the draws.
+pub struct ConnectionBreaks {
     pub seed: u64,
-    /// Of a hundred new connections so many are refused.
+    /// Percentage of new connections that are refused.
     pub refused_percent: u64,
-    /// Each other one is cut after a drawn number of bytes, at most so many, both ways together.
-    pub most_bytes: u64,
+    /// Other connections break after a random number of bytes up to this, counted in both directions.
+    pub max_bytes: u64,
 }
 
-impl Breaks {
-    /// How many bytes the n-th connection passes on before it breaks.
-    fn life_bytes(self, connection: u64) -> u64 {
+impl ConnectionBreaks {
+    /// Bytes that the n-th connection forwards before it breaks; 0: it is refused.
+    fn bytes_until_break(self, connection: u64) -> u64 {
         let [first, second] = [0, 1].map(|index| draw(self.seed, 2 * connection + index));
         if first % 100 < self.refused_percent {
             0
         } else {
-            1 + second % self.most_bytes
+            1 + second % self.max_bytes
         }
     }
 }
@@ -39,7 +38,7 @@ const fn draw(seed: u64, n: u64) -> u64 {
     x ^ (x >> 31)
 }
 
-/// A link, for as long as the test runs.
+/// A relay, which runs until the test ends.
 #[derive(Debug)]
 pub struct Relay {
     address: SocketAddr,
@@ -48,19 +47,19 @@ pub struct Relay {
 
 #[derive(Debug, Default)]
 struct Link {
-    /// None: nobody is there.
-    to: Option<SocketAddr>,
-    /// How long a piece takes.
+    /// `None`: connections are dropped.
+    target: Option<SocketAddr>,
+    /// Delay of each forwarded chunk.
     delay: Duration,
-    breaks: Option<Breaks>,
+    breaks: Option<ConnectionBreaks>,
     connections: u64,
-    /// Those of them that were broken.
+    /// Connections that broke by [`ConnectionBreaks`].
     broken: u64,
     open: Vec<TcpStream>,
 }
 
 impl Relay {
-    /// One that leads nowhere yet.
+    /// Starts a relay without a target.
     ///
     /// # Panics
     /// If the host has no port left.
@@ -73,7 +72,7 @@ impl Relay {
             let link = Arc::clone(&link);
             move || {
                 for near in listener.incoming().map_while(Result::ok) {
-                    connect(&link, near);
+                    forward_connection(&link, near);
                 }
             }
         });
@@ -85,105 +84,105 @@ impl Relay {
         self.address
     }
 
-    /// From now on it leads there.
-    pub fn lead_to(&self, to: SocketAddr) {
-        self.link().to = Some(to);
+    /// Sets the target of new connections.
+    pub fn set_target(&self, to: SocketAddr) {
+        self.link().target = Some(to);
     }
 
-    /// From now on each piece of what goes through, in either direction, takes so long.
-    pub fn delay(&self, delay: Duration) {
+    /// Delays each chunk in both directions from now on.
+    pub fn set_delay(&self, delay: Duration) {
         self.link().delay = delay;
     }
 
-    /// From now on new connections break.
-    pub fn breaks(&self, breaks: Breaks) {
+    /// Makes new connections break from now on.
+    pub fn set_breaks(&self, breaks: ConnectionBreaks) {
         self.link().breaks = Some(breaks);
     }
 
-    /// How many connections were broken so far.
+    /// The number of connections that broke so far.
     #[must_use]
-    pub fn broken(&self) -> u64 {
+    pub fn broken_connections(&self) -> u64 {
         self.link().broken
     }
 
-    /// Cuts all connections; it leads nowhere until it is told again.
-    pub fn cut(&self) {
+    /// Cuts all connections and removes the target.
+    pub fn disconnect(&self) {
         let mut link = self.link();
-        link.to = None;
+        link.target = None;
         for open in link.open.drain(..) {
-            // One that has ended is cut.
+            // The connection may have ended already.
             let _ = open.shutdown(Shutdown::Both);
         }
     }
 
     fn link(&self) -> MutexGuard<'_, Link> {
-        self.link.lock().expect("nobody panics with the link")
+        self.link.lock().expect("no thread panics while it holds the link")
     }
 }
 
-/// Passes on what comes, both ways, or drops the connection.
-fn connect(link: &Arc<Mutex<Link>>, near: TcpStream) {
-    let (to, life_bytes) = {
-        let mut link = link.lock().expect("nobody panics with the link");
+/// Forwards a connection in both directions, or drops it.
+fn forward_connection(link: &Arc<Mutex<Link>>, near: TcpStream) {
+    let (target, bytes_until_break) = {
+        let mut link = link.lock().expect("no thread panics while it holds the link");
         let connection = link.connections;
         link.connections += 1;
-        let life_bytes = link.breaks.map(|breaks| breaks.life_bytes(connection));
-        if life_bytes == Some(0) {
+        let bytes_until_break = link.breaks.map(|breaks| breaks.bytes_until_break(connection));
+        if bytes_until_break == Some(0) {
             link.broken += 1;
             return;
         }
-        (link.to, life_bytes)
+        (link.target, bytes_until_break)
     };
-    let Some(far) = to.and_then(|to| TcpStream::connect(to).ok()) else {
+    let Some(far) = target.and_then(|target| TcpStream::connect(target).ok()) else {
         return;
     };
     let ends = [(&near, &far), (&far, &near)];
     let ends = ends.map(|(from, to)| Some((from.try_clone().ok()?, to.try_clone().ok()?)));
-    let [Some(there), Some(back)] = ends else {
+    let [Some(outbound), Some(inbound)] = ends else {
         return;
     };
     {
-        let mut link = link.lock().expect("nobody panics with the link");
+        let mut link = link.lock().expect("no thread panics while it holds the link");
         link.open.push(near);
         link.open.push(far);
     }
-    // Of both ways together; none: it does not break.
-    let left = life_bytes.map(|bytes| Arc::new(Mutex::new(bytes)));
-    for (from, to) in [there, back] {
+    // Bytes left in both directions together; `None`: the connection does not break.
+    let left = bytes_until_break.map(|bytes| Arc::new(Mutex::new(bytes)));
+    for (from, to) in [outbound, inbound] {
         let (link, left) = (Arc::clone(link), left.clone());
-        thread::spawn(move || pass(&link, from, to, left.as_deref()));
+        thread::spawn(move || forward(&link, from, to, left.as_deref()));
     }
 }
 
-fn pass(link: &Mutex<Link>, mut from: TcpStream, mut to: TcpStream, left: Option<&Mutex<u64>>) {
-    let mut piece = vec![0; 1 << 16];
+fn forward(link: &Mutex<Link>, mut from: TcpStream, mut to: TcpStream, left: Option<&Mutex<u64>>) {
+    let mut chunk = vec![0; 1 << 16];
     loop {
-        let bytes = from.read(&mut piece).unwrap_or_default();
-        let delay = link.lock().expect("nobody panics with the link").delay;
+        let bytes = from.read(&mut chunk).unwrap_or_default();
+        let delay = link.lock().expect("no thread panics while it holds the link").delay;
         if !delay.is_zero() {
             thread::sleep(delay);
         }
-        let passes = left.map_or(bytes, |left| take(left, bytes));
-        if bytes == 0 || to.write_all(&piece[..passes]).is_err() {
+        let forwarded = left.map_or(bytes, |left| take_bytes(left, bytes));
+        if bytes == 0 || to.write_all(&chunk[..forwarded]).is_err() {
             break;
         }
-        if passes < bytes {
-            // Whichever way takes the last byte: the other finds both ends shut.
+        if forwarded < bytes {
+            // The direction that takes the last byte closes both ends.
             if from.shutdown(Shutdown::Both).is_ok() {
-                link.lock().expect("nobody panics with the link").broken += 1;
+                link.lock().expect("no thread panics while it holds the link").broken += 1;
             }
-            // One that has ended is cut.
+            // The connection may have ended already.
             let _ = to.shutdown(Shutdown::Both);
             return;
         }
     }
-    // The other way goes on until its own end.
+    // The other direction continues until its end.
     let _ = to.shutdown(Shutdown::Write);
 }
 
-/// Takes so many, or those that are left.
-fn take(left: &Mutex<u64>, bytes: usize) -> usize {
-    let mut left = left.lock().expect("nobody panics with a number");
+/// Takes up to this number from the bytes that are left.
+fn take_bytes(left: &Mutex<u64>, bytes: usize) -> usize {
+    let mut left = left.lock().expect("no thread panics while it holds the number");
     let taken = usize::try_from(*left).map_or(bytes, |left| left.min(bytes));
     *left -= taken as u64;
     taken

@@ -17,27 +17,26 @@ use std::{
     time::{Duration, Instant},
 };
 
-/// How long a test waits for something that should happen before it calls it lost: so long that only a
-/// dead machine is called that.
-pub const PATIENCE: Duration = Duration::from_secs(1800);
-/// The smallest pipe that Linux offers: a page.
+/// How long a test waits for an expected event before it fails: long enough for slow machines.
+pub const TIMEOUT: Duration = Duration::from_secs(1800);
+/// Size of the smallest pipe on Linux.
 const PAGE_BYTES: usize = 4096;
 
-/// Of whatever makes clients. None speaks TLS, so none asks for the machine's certificate authorities.
+/// A builder for HTTP clients. They use no TLS, so the machine's certificate authorities are not read.
 pub fn http() -> ClientBuilder {
-    let nobody = rustls::ClientConfig::builder()
+    let no_authorities = rustls::ClientConfig::builder()
         .with_root_certificates(rustls::RootCertStore::empty())
         .with_no_client_auth();
-    Client::builder().tls_backend_preconfigured(nobody)
+    Client::builder().tls_backend_preconfigured(no_authorities)
 }
 
-/// A process that does not outlive the test, however that ends.
+/// A child process that is killed when the test ends, even by a panic.
 #[derive(Debug)]
 pub(crate) struct Process(pub(crate) Child);
 
 impl Process {
-    pub(crate) fn end(&mut self) {
-        // Already ended is fine.
+    pub(crate) fn kill(&mut self) {
+        // The process may have ended already.
         let _ = self.0.kill();
         let _ = self.0.wait();
     }
@@ -45,11 +44,11 @@ impl Process {
 
 impl Drop for Process {
     fn drop(&mut self) {
-        self.end();
+        self.kill();
     }
 }
 
-/// A running server. Dropping it ends the process at once, as a power cut would (SIGKILL).
+/// A running server. Dropping it kills the process (SIGKILL).
 #[derive(Debug)]
 pub struct Server {
     process: Process,
@@ -69,10 +68,10 @@ impl Server {
     /// If it does not start; the panic shows its log.
     #[must_use]
     pub fn start(data_dir: &Path, config: &str) -> Self {
-        Self::answering(command(data_dir, config), |_| data_dir.to_owned())
+        Self::start_command(command(data_dir, config), |_| data_dir.to_owned())
     }
 
-    /// Starts it with these variables in its environment.
+    /// Starts the server with these environment variables.
     ///
     /// # Panics
     /// As [`start`](Self::start).
@@ -84,10 +83,10 @@ impl Server {
     ) -> Self {
         let mut server = command(data_dir, config);
         server.envs(variables.iter().map(|(name, value)| (*name, value)));
-        Self::answering(server, |_| data_dir.to_owned())
+        Self::start_command(server, |_| data_dir.to_owned())
     }
 
-    /// Starts it on a host that allows it so many file descriptors and no more.
+    /// Starts the server with this limit of file descriptors.
     ///
     /// # Panics
     /// As [`start`](Self::start).
@@ -104,29 +103,29 @@ impl Server {
             .args(server.get_args())
             .stdin(Stdio::null())
             .stderr(Stdio::piped());
-        Self::answering(shell, |_| data_dir.to_owned())
+        Self::start_command(shell, |_| data_dir.to_owned())
     }
 
-    /// Waits until the started program answers. `data_dir` tells of its process where this one sees
-    /// its data folder.
-    pub(crate) fn answering(mut command: Command, data_dir: impl Fn(u32) -> PathBuf) -> Self {
+    /// Starts the command and waits until the server answers. `data_dir` returns the path under which the test sees the data
+    /// folder of a process.
+    pub(crate) fn start_command(mut command: Command, data_dir: impl Fn(u32) -> PathBuf) -> Self {
         let child = command.stdout(Stdio::piped()).spawn();
         let mut process = Process(child.expect("the program can be started"));
         let child = &mut process.0;
         let log = Log::collect(child.stderr.take().expect("standard error is piped"));
         let client = http()
-            .timeout(PATIENCE)
+            .timeout(TIMEOUT)
             .build()
             .expect("a client needs nothing");
-        // The only line on its standard output is its address; none comes if it ends before.
-        let mut told =
+        // The server prints one line, its address. There is none if it ends before.
+        let mut output =
             BufReader::new(child.stdout.take().expect("standard output is piped")).lines();
-        let Some(url) = told.next().transpose().expect("a pipe can be read") else {
+        let Some(url) = output.next().transpose().expect("a pipe can be read") else {
             let status = child.wait().expect("a child can be reaped");
-            panic!("the server ended with {status}:\n{}", log.whole());
+            panic!("the server ended with {status}:\n{}", log.into_text());
         };
         let admin_token = fs::read_to_string(data_dir(child.id()).join("admin-token"))
-            .expect("the server leaves the organiser's token in its folder")
+            .expect("the server writes the organiser's token to its folder")
             .trim()
             .to_owned();
         Self {
@@ -138,39 +137,38 @@ impl Server {
         }
     }
 
-    /// The id of its process.
-    #[must_use]
+        #[must_use]
     pub fn process_id(&self) -> u32 {
         self.process.0.id()
     }
 
-    /// What it has logged so far.
+    /// The log so far.
     ///
     /// # Panics
-    /// If the thread that reads the log did.
+    /// If the thread that reads the log has panicked.
     #[must_use]
     pub fn log(&self) -> String {
-        self.log.so_far()
+        self.log.text()
     }
 
-    /// Waits until the log has `words`, `times` times.
+    /// Waits until the log contains `text` this many times.
     ///
     /// # Panics
-    /// After [`PATIENCE`], with the log.
-    pub fn wait_for_log(&self, words: &str, times: usize) {
-        self.log.wait_for(words, times);
+    /// After [`TIMEOUT`], with the log.
+    pub fn wait_for_log(&self, text: &str, times: usize) {
+        self.log.wait_for(text, times);
     }
 
-    /// How many sockets it has open: connections, and the one that listens.
+    /// The number of open sockets: connections and the listener.
     ///
     /// # Panics
-    /// If the system does not tell.
+    /// If the server has ended.
     #[must_use]
     pub fn sockets(&self) -> usize {
         let folder = format!("/proc/{}/fd", self.process.0.id());
         let open = fs::read_dir(folder).expect("the server runs");
         let is_socket = |entry: &io::Result<fs::DirEntry>| {
-            // One that was closed meanwhile is none.
+            // A descriptor may have been closed meanwhile.
             let target = entry.as_ref().ok().map(|entry| fs::read_link(entry.path()));
             target
                 .and_then(Result::ok)
@@ -191,23 +189,22 @@ impl Server {
             .expect("it listens on the loopback interface")
     }
 
-    /// Ends the server, as dropping it does.
+    /// Kills the server, as dropping it does.
     pub fn kill(self) {
         drop(self);
     }
 
-    /// [`kill`](Self::kill), for who replaces it.
-    pub(crate) fn end(&mut self) {
-        self.process.end();
+    /// [`kill`](Self::kill) for a caller that replaces the server afterwards.
+    pub(crate) fn kill_process(&mut self) {
+        self.process.kill();
     }
 
-    /// Starts the server and ends it as [`kill`](Self::kill) does, `later` after `reached` has said yes
-    /// to an entry of its log. The log tells every statement of the database, and goes through a
-    /// pipe of one page: however quick the server and however slow this thread, the server is at most
-    /// a page of log further than what `reached` has seen.
+    /// Starts the server and kills it `later` after `reached` returns true for an entry of its log. The log has each
+    /// statement of the database and goes through a pipe of one page. So the server is at most one page of log ahead of
+    /// what `reached` has seen.
     ///
     /// # Panics
-    /// If it cannot be started, or ends by itself.
+    /// If the server cannot be started, or ends before.
     pub fn start_and_kill(
         data_dir: &Path,
         config: &str,
@@ -223,26 +220,26 @@ impl Server {
             .stderr(writer)
             .spawn();
         let process = Process(child.expect("the program can be started"));
-        // A reader that reads ahead would let the server run ahead.
+        // A larger buffer would let the server run ahead.
         let mut log = BufReader::with_capacity(1, log);
         let mut line = String::new();
         loop {
             line.clear();
             let length = log.read_line(&mut line).expect("a log is text");
-            assert!(length > 0, "the server ended by itself");
+            assert!(length > 0, "the server ended before it was killed");
             let entry = serde_json::from_str(&line)
                 .unwrap_or_else(|error| panic!("a line of the log: {error}: {line}"));
             if reached(&entry) {
                 break;
             }
         }
-        // Not to wait for something: the moment that was drawn.
+        // The delay is part of the drawn moment.
         thread::sleep(later);
-        // While its log is still held: nothing would hold the server back.
+        // The log's pipe is still full, so the server cannot run ahead.
         drop(process);
     }
 
-    /// `GET`, with a token if one is given.
+    /// Sends `GET`, with a token if one is given.
     ///
     /// # Panics
     /// If the server does not answer.
@@ -255,13 +252,13 @@ impl Server {
         request.send().expect("the server answers")
     }
 
-    /// A request of any kind, to be sent by the caller.
+    /// A request with any method, which the caller sends.
     pub fn request(&self, method: Method, path: &str, token: &str) -> RequestBuilder {
         let url = format!("{}{path}", self.url);
         self.client.request(method, url).bearer_auth(token)
     }
 
-    /// `POST` of a JSON body.
+    /// Sends `POST` with a JSON body.
     ///
     /// # Panics
     /// If the server does not answer.
@@ -275,7 +272,7 @@ impl Server {
             .expect("the server answers")
     }
 
-    /// `POST` of an archive.
+    /// Uploads an archive as a submission.
     ///
     /// # Panics
     /// If the server does not answer.
@@ -290,10 +287,10 @@ impl Server {
             .expect("the server answers")
     }
 
-    /// Asks `path` until `done` says so, and returns the last answer.
+    /// Repeats `GET path` until `done` returns true; returns the last response.
     ///
     /// # Panics
-    /// After [`PATIENCE`], with the last answer.
+    /// After [`TIMEOUT`], with the last answer.
     #[must_use]
     pub fn poll(&self, path: &str, token: &str, done: impl Fn(&Value) -> bool) -> Value {
         let started = Instant::now();
@@ -306,28 +303,28 @@ impl Server {
                 return answer;
             }
             assert!(
-                started.elapsed() < PATIENCE,
+                started.elapsed() < TIMEOUT,
                 "still waiting for {path}: {answer:#}"
             );
-            // Polling is what a client of this API does; the pause keeps the CPU for the evaluation, and for other tests.
+            // The pause keeps the CPU for the evaluation and for other tests.
             let waited = started.elapsed() / 10;
             thread::sleep(waited.clamp(Duration::from_millis(20), Duration::from_millis(250)));
         }
     }
 }
 
-/// The server on any free port, with its log on a pipe.
+/// The command for a server on a free port, with its log on a pipe.
 fn command(data_dir: &Path, config: &str) -> Command {
     fs::create_dir_all(data_dir).expect("a scratch folder can be made");
     let config_file = data_dir.join("faceoff.toml");
     fs::write(&config_file, config).expect("a scratch file can be written");
     let mut command = Command::new(program("faceoff"));
-    serve(&mut command, data_dir, &config_file);
+    add_serve_arguments(&mut command, data_dir, &config_file);
     command
 }
 
-/// The arguments of the program.
-pub(crate) fn serve(command: &mut Command, data_dir: &Path, config_file: &Path) {
+/// Adds the arguments of `faceoff serve`.
+pub(crate) fn add_serve_arguments(command: &mut Command, data_dir: &Path, config_file: &Path) {
     command
         .arg("serve")
         .args(["--listen", "127.0.0.1:0"])
@@ -339,7 +336,7 @@ pub(crate) fn serve(command: &mut Command, data_dir: &Path, config_file: &Path) 
         .stderr(Stdio::piped());
 }
 
-/// A child's log, drained so that the child never blocks.
+/// A child's log, read continuously so that the child never blocks.
 #[derive(Debug)]
 pub(crate) struct Log {
     text: Arc<Mutex<String>>,
@@ -353,7 +350,7 @@ impl Log {
             let text = Arc::clone(&text);
             move || {
                 for line in BufReader::new(stderr).lines().map_while(Result::ok) {
-                    let mut text = text.lock().expect("nobody panics with the log");
+                    let mut text = text.lock().expect("no thread panics while it holds the log");
                     text.push_str(&line);
                     text.push('\n');
                 }
@@ -362,31 +359,31 @@ impl Log {
         Self { text, reader }
     }
 
-    pub(crate) fn so_far(&self) -> String {
+    pub(crate) fn text(&self) -> String {
         self.text
             .lock()
-            .expect("nobody panics with the log")
+            .expect("no thread panics while it holds the log")
             .clone()
     }
 
-    pub(crate) fn wait_for(&self, words: &str, times: usize) {
+    pub(crate) fn wait_for(&self, text: &str, times: usize) {
         let started = Instant::now();
-        while self.so_far().matches(words).count() < times {
+        while self.text().matches(text).count() < times {
             assert!(
-                started.elapsed() < PATIENCE,
-                "still waiting for {words:?}:\n{}",
-                self.so_far()
+                started.elapsed() < TIMEOUT,
+                "still waiting for {text:?}:\n{}",
+                self.text()
             );
-            // A log is looked at, as people do.
+            // The pause keeps the CPU for the server.
             thread::sleep(Duration::from_millis(20));
         }
     }
 
-    /// Of a child that has ended.
-    fn whole(self) -> String {
+    /// The complete log of a child that has ended.
+    fn into_text(self) -> String {
         let Self { text, reader } = self;
         reader.join().expect("the log is read to its end");
-        let text = text.lock().expect("nobody panics with the log");
+        let text = text.lock().expect("no thread panics while it holds the log");
         text.clone()
     }
 }

@@ -1,12 +1,12 @@
-//! A server whose data folder is a small disk, which a test fills and empties while it runs.
+//! A server whose data folder is on a small disk, which a test fills and empties while the server runs.
 //!
-//! The disk is a file system in memory, mounted where only a process that does nothing else and the server
-//! see it: it goes with that process, which goes with the test, and outlives the server. The test reaches it
-//! through the process's root folder.
+//! The disk is a file system in memory, in a mount namespace that only a holder process and the server share. It exists
+//! as long as the holder, which ends with the test and outlives the server. The test reaches it through the holder's root
+//! folder.
 
 use crate::{
     program,
-    server::{Process, Server, serve},
+    server::{Process, Server, add_serve_arguments},
 };
 use rustix::fs::statvfs;
 use std::{
@@ -25,16 +25,16 @@ use std::{
 const PAGE_BYTES: usize = 4096;
 const FILLER: &str = "filler";
 
-/// Mounts a disk of `$0` at `$1`, says so, and keeps it until its input ends.
+/// Mounts a disk of size `$0` at `$1`, prints `mounted`, and holds it until its input ends.
 const MOUNT_AND_HOLD: &str =
     r#"mount -t tmpfs -o "size=$0,mode=0700" faceoff "$1" && echo mounted && exec cat"#;
-/// Becomes the rest; `$0` is where its log goes, if not where it went.
+/// Runs the arguments, with standard error appended to the file `$0` unless that is empty.
 const LOG_AND_RUN: &str = r#"if [ -n "$0" ]; then exec "$@" 2>>"$0"; else exec "$@"; fi"#;
 
 /// Where the server's log goes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum LogTo {
-    /// Where [`Server::log`] finds it.
+    /// The pipe that [`Server::log`] reads.
     Test,
     /// A file on the small disk, [`SmallDisk::log_file`].
     Disk,
@@ -46,19 +46,19 @@ pub struct SmallDisk {
     pub server: Server,
     /// The data folder, as this process sees it.
     pub data_dir: PathBuf,
-    disk: Disk,
+    disk: ServerDisk,
 }
 
-/// A small disk, for whoever is started in its sight.
+/// A small disk in a separate mount namespace.
 #[derive(Debug)]
-pub struct Mounted {
+pub struct MountedDisk {
     holder: Process,
-    /// Where those that are started in its sight see it.
+    /// Path of the disk inside its mount namespace.
     pub mount: PathBuf,
 }
 
-impl Mounted {
-    /// A disk of `bytes` at `folder`.
+impl MountedDisk {
+    /// Mounts a disk of `bytes` at `folder`.
     ///
     /// # Panics
     /// If it cannot be mounted: this needs root, as the sandbox does.
@@ -74,53 +74,53 @@ impl Mounted {
             .stdout(Stdio::piped())
             .spawn();
         let mut holder = Process(child.expect("the program can be started"));
-        let mut told = String::new();
+        let mut line = String::new();
         BufReader::new(holder.0.stdout.take().expect("it is piped"))
-            .read_line(&mut told)
+            .read_line(&mut line)
             .expect("a pipe can be read");
         assert_eq!(
-            told.trim(),
+            line.trim(),
             "mounted",
             "this needs root, as the sandbox does"
         );
         Self { holder, mount }
     }
 
-    /// It, as this process sees it.
+    /// The disk's path outside of its mount namespace, for the test.
     ///
     /// # Panics
-    /// If the folder has gone.
+    /// If the folder does not exist.
     #[must_use]
-    pub fn seen_from_here(&self) -> PathBuf {
+    pub fn outside_path(&self) -> PathBuf {
         let absolute = self.mount.canonicalize().expect("the folder was made");
         let below_root = absolute.strip_prefix("/").expect("it is absolute");
         PathBuf::from(format!("/proc/{}/root", self.holder.0.id())).join(below_root)
     }
 
-    /// What becomes the program that its next word names, in the sight of the disk. The id stays.
+    /// A command that runs its arguments as a program in the disk's mount namespace, with the same process id.
     #[must_use]
-    pub fn in_sight(&self) -> Command {
+    pub fn namespace_command(&self) -> Command {
         let mut command = Command::new("nsenter");
         command.args(["--mount", "--target", &self.holder.0.id().to_string()]);
         command
     }
 }
 
-/// The disk, and how a server on it is started.
+/// The disk and the configuration of a server on it.
 #[derive(Debug)]
-struct Disk {
-    disk: Mounted,
+struct ServerDisk {
+    disk: MountedDisk,
     config_file: PathBuf,
     log: LogTo,
 }
 
-impl Disk {
+impl ServerDisk {
     fn mount(folder: &Path, bytes: u64, config: &str, log: LogTo) -> Self {
         let config_file = folder.join("faceoff.toml");
         fs::create_dir_all(folder).expect("a scratch folder can be made");
         fs::write(&config_file, config).expect("a scratch file can be written");
         Self {
-            disk: Mounted::at(&folder.join("disk"), bytes),
+            disk: MountedDisk::at(&folder.join("disk"), bytes),
             config_file,
             log,
         }
@@ -128,11 +128,11 @@ impl Disk {
 
     /// The data folder, as this process sees it.
     fn data_dir(&self) -> PathBuf {
-        self.disk.seen_from_here()
+        self.disk.outside_path()
     }
 
     fn start_server(&self) -> Server {
-        let mut command = self.disk.in_sight();
+        let mut command = self.disk.namespace_command();
         command
             .args(["sh", "-c", LOG_AND_RUN])
             .arg(match self.log {
@@ -140,20 +140,20 @@ impl Disk {
                 LogTo::Disk => self.disk.mount.join("log"),
             })
             .arg(program("faceoff"));
-        serve(&mut command, &self.disk.mount, &self.config_file);
-        // Every program on the way becomes the next one: the id stays.
-        Server::answering(command, |_| self.data_dir())
+        add_serve_arguments(&mut command, &self.disk.mount, &self.config_file);
+        // Each program executes the next one in its place, so the process id stays.
+        Server::start_command(command, |_| self.data_dir())
     }
 }
 
 impl SmallDisk {
-    /// Starts a server with a data folder of `bytes`; its configuration lies beside that, in `folder`.
+    /// Starts a server with a data folder of `bytes`; its configuration is beside that, in `folder`.
     ///
     /// # Panics
     /// If it does not start: this needs root, as the sandbox does.
     #[must_use]
     pub fn start(folder: &Path, bytes: u64, config: &str, log: LogTo) -> Self {
-        let disk = Disk::mount(folder, bytes, config, log);
+        let disk = ServerDisk::mount(folder, bytes, config, log);
         Self {
             server: disk.start_server(),
             data_dir: disk.data_dir(),
@@ -161,23 +161,23 @@ impl SmallDisk {
         }
     }
 
-    /// Kills the server, does something, and starts another on the same disk.
+    /// Kills the server, calls `between`, and starts a new server on the same disk.
     ///
     /// # Panics
-    /// If that does not start.
+    /// If the new server does not start.
     pub fn kill_and_restart(&mut self, between: impl FnOnce()) {
-        self.server.end();
+        self.server.kill_process();
         between();
         self.server = self.disk.start_server();
     }
 
-    /// The log on the disk.
+    /// The log file on the disk, for [`LogTo::Disk`].
     #[must_use]
     pub fn log_file(&self) -> PathBuf {
         self.data_dir.join("log")
     }
 
-    /// What is free on the disk, in bytes.
+    /// Free space on the disk, in bytes.
     ///
     /// # Panics
     /// If the server has ended.
@@ -187,41 +187,40 @@ impl SmallDisk {
         disk.f_bavail * disk.f_frsize
     }
 
-    /// Fills the disk to its last page and keeps it full, whatever the server removes, until the
-    /// answer is dropped.
+    /// Fills the disk to its last page and keeps it full, whatever the server removes, until the guard is dropped.
     ///
     /// # Panics
     /// If the disk does not fill up.
     #[must_use]
-    pub fn full(&self) -> Full {
-        Full::of(&self.data_dir)
+    pub fn fill(&self) -> FilledDisk {
+        FilledDisk::fill(&self.data_dir)
     }
 
-    /// Fills the disk but for about so many bytes, once; until the answer is dropped.
+    /// Fills the disk once, except for about this many bytes, until the guard is dropped.
     ///
     /// # Panics
     /// If less is free.
     #[must_use]
-    pub fn all_but(&self, bytes: u64) -> Full {
+    pub fn fill_except(&self, bytes: u64) -> FilledDisk {
         let file = self.data_dir.join(FILLER);
         let free = self.free_bytes();
-        let taken = free.checked_sub(bytes).expect("so much is free");
+        let taken = free.checked_sub(bytes).expect("the disk has this much free space");
         let zeros = vec![0; usize::try_from(taken).expect("a small disk")];
-        fs::write(&file, zeros).expect("so much is free");
-        Full {
+        fs::write(&file, zeros).expect("the disk has this much free space");
+        FilledDisk {
             file,
-            over: Arc::default(),
+            stop: Arc::default(),
             filling: None,
         }
     }
 
-    /// All files below a folder of the data folder.
+    /// All files below a subfolder of the data folder.
     #[must_use]
     pub fn files(&self, folder: &str) -> Vec<PathBuf> {
         let mut files = Vec::new();
         let mut folders = vec![self.data_dir.join(folder)];
         while let Some(folder) = folders.pop() {
-            // What the server removes meanwhile is not there.
+            // The server may have removed the folder meanwhile.
             let Ok(entries) = fs::read_dir(&folder) else {
                 continue;
             };
@@ -237,28 +236,28 @@ impl SmallDisk {
     }
 }
 
-/// A disk that is full for as long as this lives.
+/// A guard that keeps a disk full.
 #[derive(Debug)]
-pub struct Full {
+pub struct FilledDisk {
     file: PathBuf,
-    over: Arc<AtomicBool>,
+    stop: Arc<AtomicBool>,
     filling: Option<JoinHandle<()>>,
 }
 
-impl Full {
+impl FilledDisk {
     /// Fills the disk of a data folder as [`SmallDisk::full`] does.
     ///
     /// # Panics
     /// If the disk does not fill up.
     #[must_use]
-    pub fn of(data_dir: &Path) -> Self {
+    pub fn fill(data_dir: &Path) -> Self {
         let file = data_dir.join(FILLER);
         fill(&file);
-        let over = Arc::new(AtomicBool::new(false));
+        let stop = Arc::new(AtomicBool::new(false));
         let filling = thread::spawn({
-            let (file, over) = (file.clone(), Arc::clone(&over));
+            let (file, stop) = (file.clone(), Arc::clone(&stop));
             move || {
-                while !over.load(Ordering::Relaxed) {
+                while !stop.load(Ordering::Relaxed) {
                     fill(&file);
                     thread::sleep(Duration::from_millis(1));
                 }
@@ -266,24 +265,24 @@ impl Full {
         });
         Self {
             file,
-            over,
+            stop,
             filling: Some(filling),
         }
     }
 }
 
-impl Drop for Full {
+impl Drop for FilledDisk {
     fn drop(&mut self) {
-        self.over.store(true, Ordering::Relaxed);
+        self.stop.store(true, Ordering::Relaxed);
         if let Some(filling) = self.filling.take() {
-            // It can only have failed together with the server, which says so itself.
+            // If it failed, the server has failed, too, and the test reports that.
             let _ = filling.join();
         }
         let _ = fs::remove_file(&self.file);
     }
 }
 
-/// Appends until nothing fits.
+/// Appends to the file until the disk is full.
 fn fill(file: &Path) {
     let filler = OpenOptions::new().create(true).append(true).open(file);
     let mut filler = filler.expect("the disk is there");

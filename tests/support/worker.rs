@@ -10,7 +10,7 @@ use std::{
     process::{Command, Stdio},
 };
 
-/// A worker. Dropping it ends it at once, as a power cut would (SIGKILL).
+/// A remote worker. Dropping it kills it (SIGKILL).
 #[derive(Debug)]
 pub struct Worker {
     process: Process,
@@ -18,36 +18,36 @@ pub struct Worker {
 }
 
 impl Worker {
-    /// Starts a worker of this name, whose folder is below `scratch`, with `config` (the text of a configuration file).
+    /// Starts a worker with this name, a folder below `scratch`, and `config` (the text of a configuration file).
     ///
     /// # Panics
     /// If it cannot be started.
     #[must_use]
     pub fn start(scratch: &Path, name: &str, config: &str) -> Self {
-        Self::start_with(scratch, name, config, &[])
+        Self::start_with_arguments(scratch, name, config, &[])
     }
 
-    /// Likewise, with more words on its command line.
+    /// Starts a worker with additional arguments.
     ///
     /// # Panics
     /// As [`start`](Self::start).
     #[must_use]
-    pub fn start_with(scratch: &Path, name: &str, config: &str, words: &[&str]) -> Self {
+    pub fn start_with_arguments(scratch: &Path, name: &str, config: &str, arguments: &[&str]) -> Self {
         let command = Command::new(program("faceoff"));
-        Self::start_by(command, scratch, name, config, words)
+        Self::start_with_command(command, scratch, name, config, arguments)
     }
 
-    /// Likewise, by a command that becomes the program when it is given the program's words.
+    /// Starts a worker by a command to which the program's arguments are added.
     ///
     /// # Panics
     /// As [`start`](Self::start).
     #[must_use]
-    pub fn start_by(
+    pub fn start_with_command(
         mut command: Command,
         scratch: &Path,
         name: &str,
         config: &str,
-        words: &[&str],
+        arguments: &[&str],
     ) -> Self {
         let folder = scratch.join(name);
         fs::create_dir_all(&folder).expect("a scratch folder can be made");
@@ -58,7 +58,7 @@ impl Worker {
             .arg(&file)
             .arg("--scratch-dir")
             .arg(folder.join("scratch"))
-            .args(words)
+            .args(arguments)
             .stdin(Stdio::null())
             .stdout(Stdio::null())
             .stderr(Stdio::piped())
@@ -68,48 +68,48 @@ impl Worker {
         Self { process, log }
     }
 
-    /// Waits until its log has `words`, `times` times.
+    /// Waits until the log contains `text` this many times.
     ///
     /// # Panics
-    /// After [`PATIENCE`](crate::server::PATIENCE), with the log.
-    pub fn wait_for_log(&self, words: &str, times: usize) {
-        self.log.wait_for(words, times);
+    /// After [`TIMEOUT`](crate::server::TIMEOUT), with the log.
+    pub fn wait_for_log(&self, text: &str, times: usize) {
+        self.log.wait_for(text, times);
     }
 
-    /// What it has logged so far.
+    /// The log so far.
     ///
     /// # Panics
-    /// If the thread that reads the log did.
+    /// If the thread that reads the log has panicked.
     #[must_use]
     pub fn log(&self) -> String {
-        self.log.so_far()
+        self.log.text()
     }
 
-    /// Asks it to end, and waits until it has.
+    /// Asks the worker to stop (SIGTERM), and waits until it has.
     ///
     /// # Panics
     /// If it ends with an error.
-    pub fn end(self) {
-        self.ask_to_end();
-        self.ends();
+    pub fn stop(self) {
+        self.request_stop();
+        self.wait_for_exit();
     }
 
-    /// Asks it to end (SIGTERM).
+    /// Asks the worker to stop (SIGTERM).
     ///
     /// # Panics
     /// If it was reaped.
-    pub fn ask_to_end(&self) {
+    pub fn request_stop(&self) {
         let id = rustix::process::Pid::from_child(&self.process.0);
         rustix::process::kill_process(id, rustix::process::Signal::TERM)
             .expect("a child can be signalled");
     }
 
-    /// Waits until it has ended by itself.
+    /// Waits until the worker has ended without a further signal.
     ///
     /// # Panics
     /// If it ends with an error.
-    pub fn ends(mut self) {
+    pub fn wait_for_exit(mut self) {
         let status = self.process.0.wait().expect("a child can be reaped");
-        assert!(status.success(), "{status}:\n{}", self.log.so_far());
+        assert!(status.success(), "{status}:\n{}", self.log.text());
     }
 }

@@ -1,11 +1,11 @@
 #!/bin/sh
-# The script of the replay pages. `build` makes web/client/dist anew; `test` checks the sources, makes it beside, and compares
-# it byte by byte with what is committed, which is what the program embeds: a machine without Node needs none.
+# Builds the script of the replay pages. `build` rebuilds web/client/dist; `test` checks the sources, builds into a temporary
+# folder, and compares the result byte by byte with the committed files. The program embeds those, so that Node is optional.
 set -eu
 cd "$(dirname "$0")"
 if ! node -e 'const [major, minor] = process.versions.node.split(".").map(Number);
               process.exit(major > 20 || (major === 20 && minor >= 19) ? 0 : 1)' 2>/dev/null; then
-    echo "web/client: no Node.js of at least 20.19; the committed script is used as it is" >&2
+    echo "web/client: Node.js 20.19 or newer not found; using the committed script" >&2
     exit 0
 fi
 npm ci --no-audit --no-fund --loglevel=error
@@ -18,7 +18,7 @@ case ${1:-} in
         npm run build -- --outDir "$made" --emptyOutDir
         for file in dist/*; do
             cmp "$file" "$made/${file#dist/}" || {
-                echo "web/client/$file is not what its sources make: run \`make web\` and commit it" >&2
+                echo "web/client/$file differs from the build of its sources: run \`make web\` and commit it" >&2
                 exit 1
             }
         done ;;

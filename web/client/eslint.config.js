@@ -13,7 +13,7 @@ export default defineConfig(
     ],
     languageOptions: { parserOptions: { projectService: true, tsconfigRootDir: import.meta.dirname } },
     rules: {
-      // Messages and picture labels are made of numbers; a conversion by hand says nothing more.
+      // Messages and labels contain numbers; an explicit conversion would add nothing.
       "@typescript-eslint/restrict-template-expressions": ["error", { allowNumber: true }],
     },
   },

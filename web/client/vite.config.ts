@@ -3,7 +3,7 @@ import { defineConfig } from "vitest/config";
 
 const LICENSED = ["three"];
 
-/** The licences of what is bundled, beside the bundle, as they ask for. */
+/** Emits the licences of bundled packages, which the licences require. */
 function licences() {
   return {
     name: "licences",
@@ -24,7 +24,7 @@ function licences() {
   };
 }
 
-// One file with a plain name: the server embeds it and adds the hash of its bytes to the address.
+// One file with a fixed name: the server embeds it and adds the hash of its content to the address.
 export default defineConfig({
   publicDir: false,
   build: {

@@ -1,23 +1,23 @@
-//! Stopping an incoming puck: where it crosses a line before the goal, the mallet is, and gives way a little.
+//! Stops an incoming puck: the mallet waits at the point where the puck crosses a line in front of the goal.
 
 use striker::arm::Posture;
 use striker::field::Vec2;
 use striker::motion::Target;
-use striker::scene::{Order, Scene};
+use striker::scene::{MalletCommand, Scene};
 
 use crate::guard::guard;
 
-/// Where the puck is met, metres.
+/// x of the interception, metres.
 const LINE_X: f64 = -0.56;
-/// How far ahead the crossing is looked for, seconds.
+/// Prediction horizon for the crossing, seconds.
 const HORIZON: f64 = 2.0;
-/// The plan is made this long before the contact and then kept, seconds.
+/// Within this time before the contact the plan is kept, seconds.
 const PLAN_TIME: f64 = 0.6;
-/// Share of the puck's speed with which the mallet gives way.
-const GIVE: f64 = 0.0;
+/// Speed of the mallet's retreat as a share of the puck's speed.
+const RETREAT_SHARE: f64 = 0.0;
 
 #[derive(Debug, Clone, Copy)]
-struct Meeting {
+struct Interception {
     time: f64,
     mallet: Vec2,
     velocity: Vec2,
@@ -25,28 +25,28 @@ struct Meeting {
 
 #[derive(Debug, Clone)]
 pub struct Defend {
-    meeting: Option<Meeting>,
+    interception: Option<Interception>,
 }
 
 impl Defend {
     pub fn new() -> Self {
-        Self { meeting: None }
+        Self { interception: None }
     }
 
-    /// The order for this control step.
-    pub fn decide(&mut self, scene: &Scene<'_>) -> Order {
+    /// The command for this control step.
+    pub fn decide(&mut self, scene: &Scene<'_>) -> MalletCommand {
         let kept = self
-            .meeting
+            .interception
             .filter(|m| m.time - scene.time < PLAN_TIME && m.time - scene.time > -0.06);
-        self.meeting = kept.or_else(|| crossing(scene));
-        let Some(m) = self.meeting else {
+        self.interception = kept.or_else(|| find_crossing(scene));
+        let Some(m) = self.interception else {
             return guard(scene);
         };
         let left = m.time - scene.time;
         if left < 0.5 * scene.dt {
-            return Order::coast(scene, m.velocity, Posture::Free);
+            return MalletCommand::coast(scene, m.velocity, Posture::Free);
         }
-        Order::new(
+        MalletCommand::new(
             Target {
                 pos: m.mallet,
                 vel: m.velocity,
@@ -57,8 +57,8 @@ impl Defend {
     }
 }
 
-/// Where and when the puck comes to the line.
-fn crossing(scene: &Scene<'_>) -> Option<Meeting> {
+/// Position and time at which the puck crosses the line.
+fn find_crossing(scene: &Scene<'_>) -> Option<Interception> {
     let mut puck = scene.puck;
     let mut left = 0.0;
     while left < HORIZON {
@@ -69,10 +69,10 @@ fn crossing(scene: &Scene<'_>) -> Option<Meeting> {
         if puck.pos.x < LINE_X + scene.field.contact() {
             let speed = puck.vel.norm();
             let mallet = puck.pos + scene.field.contact() * puck.vel / speed.max(1e-3);
-            return Some(Meeting {
+            return Some(Interception {
                 time: scene.time + left,
                 mallet: scene.field.clamp_mallet(mallet),
-                velocity: GIVE * puck.vel,
+                velocity: RETREAT_SHARE * puck.vel,
             });
         }
     }

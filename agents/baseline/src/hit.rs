@@ -1,15 +1,15 @@
-//! Striking the puck at the other goal: one line through puck and goal, one motion along it.
+//! Strikes the puck at the opponent's goal: one line through puck and goal, one motion along it.
 
 use striker::arm::Posture;
 use striker::field::Vec2;
 use striker::motion::{Pace, Target};
-use striker::scene::{Order, Scene, around, lean};
+use striker::scene::{MalletCommand, Scene, waypoint, lean_side};
 
 /// Speed of the mallet at the contact, m/s.
 const SPEED: f64 = 0.84;
 /// Length of the run-up, metres.
 const RUN_UP: f64 = 0.14;
-/// The mallet is behind the puck when it is this near to the start of the run-up, metres.
+/// The strike begins when the mallet is this close to the start of the run-up, metres.
 const BEHIND: f64 = 0.01;
 /// Time for the mallet to stop after the contact, seconds.
 const STOP_TIME: f64 = 0.3;
@@ -40,13 +40,13 @@ impl Hit {
         }
     }
 
-    /// True while a strike must not be interrupted.
-    pub fn committed(&self) -> bool {
+    /// Whether a strike is running that must not be interrupted.
+    pub fn is_committed(&self) -> bool {
         matches!(self.phase, Phase::Strike { .. } | Phase::Stop { .. })
     }
 
-    /// The order for this control step.
-    pub fn decide(&mut self, scene: &Scene<'_>) -> Order {
+    /// The command for this control step.
+    pub fn decide(&mut self, scene: &Scene<'_>) -> MalletCommand {
         match self.phase {
             Phase::Approach => self.approach(scene),
             Phase::Strike {
@@ -64,22 +64,22 @@ impl Hit {
                     vel: Vec2::zeros(),
                     time: left.max(scene.dt),
                 };
-                Order::new(target, Posture::Ready(lean(pos)))
+                MalletCommand::new(target, Posture::Ready(lean_side(pos)))
             }
         }
     }
 
-    fn approach(&mut self, scene: &Scene<'_>) -> Order {
+    fn approach(&mut self, scene: &Scene<'_>) -> MalletCommand {
         let field = scene.field;
         let goal = Vec2::new(field.half_length, 0.0);
-        // Where it will be struck, if the run-up begins now.
+        // Position of the puck at contact if the run-up begins now.
         let time = 2.0 * RUN_UP / SPEED;
         let mut puck = scene.puck;
         puck.advance(field, time);
         let direction = (goal - puck.pos).normalize();
         let mallet = puck.pos - field.contact() * direction;
         let start = field.clamp_mallet(mallet - RUN_UP * direction);
-        let goal = around(scene, start, field.contact() + 0.015);
+        let goal = waypoint(scene, start, field.contact() + 0.015);
         if goal == start && (scene.mallet.pos - start).norm() < BEHIND {
             self.phase = Phase::Strike {
                 contact: scene.time + 2.0 * (mallet - start).norm().max(0.02) / SPEED,
@@ -87,12 +87,12 @@ impl Hit {
                 velocity: SPEED * direction,
             };
         }
-        let mut order = Order::stop(scene, goal, Pace::QUICK);
-        order.posture = Posture::Ready(lean(start));
-        order
+        let mut command = MalletCommand::stop(scene, goal, Pace::QUICK);
+        command.posture = Posture::Ready(lean_side(start));
+        command
     }
 
-    fn strike(&mut self, scene: &Scene<'_>, contact: f64, mallet: Vec2, velocity: Vec2) -> Order {
+    fn strike(&mut self, scene: &Scene<'_>, contact: f64, mallet: Vec2, velocity: Vec2) -> MalletCommand {
         let left = contact - scene.time;
         if left < 0.5 * scene.dt {
             let pos = scene.mallet.pos + 0.5 * STOP_TIME * scene.mallet.vel;
@@ -100,17 +100,17 @@ impl Hit {
                 until: scene.time + STOP_TIME,
                 pos: scene.field.clamp_mallet(pos),
             };
-            return Order::coast(scene, scene.mallet.vel, Posture::Free);
+            return MalletCommand::coast(scene, scene.mallet.vel, Posture::Free);
         }
-        let mut order = Order::new(
+        let mut command = MalletCommand::new(
             Target {
                 pos: mallet,
                 vel: velocity,
                 time: left,
             },
-            Posture::Strike(lean(mallet)),
+            Posture::Strike(lean_side(mallet)),
         );
-        order.acceleration = 30.0;
-        order
+        command.acceleration = 30.0;
+        command
     }
 }

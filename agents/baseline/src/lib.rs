@@ -1,10 +1,9 @@
 //! A rule-based opponent of about the strength of the 2023 challenge's baseline agent.
 //!
-//! The paper describes that agent as typical approaches, planning and optimisation, that do well in the ideal
-//! simulator and struggle beside it. So does this one, which shares nothing with it but that description: it
-//! predicts the puck, chooses a tactic by rules, plans one motion for it and carries it out without looking
-//! again. It refuses what makes [`striker`] strong: corrections of a running strike, the choice among many
-//! shots, and cushioning.
+//! The paper describes that agent as typical approaches, planning and optimisation, that work well in the
+//! ideal simulator and badly elsewhere. This agent shares only that description: it predicts the puck, chooses
+//! a tactic by rules, plans one motion for it and carries it out without corrections. It does not have the
+//! strengths of [`striker`]: corrections of a running strike, the choice among many shots, and cushioning.
 
 mod defend;
 mod guard;
@@ -24,7 +23,7 @@ pub struct Baseline {
 }
 
 impl Baseline {
-    /// An agent for `task` in the environment that the evaluator described.
+    /// An agent for `task` and the environment in `hello`.
     #[must_use]
     pub fn new(task: Task, env: &Env) -> Self {
         Self {
@@ -42,8 +41,8 @@ impl Policy for Baseline {
     }
 
     fn act(&mut self, observation: &[f64]) -> Result<Action, WrongLength> {
-        let order = self.tactics.decide(&self.body.observe(observation)?);
-        Ok(self.body.follow(&order))
+        let command = self.tactics.decide(&self.body.observe(observation)?);
+        Ok(self.body.follow(&command))
     }
 
     fn describe(&self) -> String {

@@ -1,27 +1,27 @@
-//! Moving a puck off the rim: pushes from all sides are tried on the puck's model, and the best is made.
+//! Moves a puck off the rim: simulates pushes from all sides with the puck model, and makes the best one.
 
 use striker::arm::Posture;
 use striker::field::{Field, Vec2};
 use striker::motion::{Pace, Target};
 use striker::puck::Puck;
-use striker::scene::{Order, Scene, around};
+use striker::scene::{MalletCommand, Scene, waypoint};
 
 use crate::guard::guard;
 
-/// Directions of a push that are tried.
+/// Number of directions of a push.
 const DIRECTIONS: usize = 8;
-/// Its speed, m/s.
+/// Speed of the mallet in a push, m/s.
 const SPEED: f64 = 0.5;
-/// How long a pushed puck is looked after, seconds.
+/// Prediction horizon of a pushed puck, seconds.
 const HORIZON: f64 = 4.0;
 /// A puck slower than this may be pushed, m/s.
 const SLOW: f64 = 0.06;
-/// Within this |y| and between these x it lies well, metres.
+/// |y| and range of x in which the puck is well placed, metres.
 const GOOD_Y: f64 = 0.37;
 const GOOD_X: (f64, f64) = (-0.76, -0.24);
 /// Time of the run-up, seconds.
 const RUN_UP_TIME: f64 = 0.25;
-/// How long it watches what a push came to before the next one, seconds.
+/// Waiting time between two pushes, seconds.
 const WATCH_TIME: f64 = 0.3;
 /// Time for the mallet to stop after the push, seconds.
 const STOP_TIME: f64 = 0.12;
@@ -53,13 +53,13 @@ impl Prepare {
         Self { phase: Phase::Look }
     }
 
-    /// True while a push must not be interrupted.
-    pub fn committed(&self) -> bool {
+    /// Whether a push is running that must not be interrupted.
+    pub fn is_committed(&self) -> bool {
         matches!(self.phase, Phase::Run { .. } | Phase::Away { .. })
     }
 
-    /// The order for this control step.
-    pub fn decide(&mut self, scene: &Scene<'_>) -> Order {
+    /// The command for this control step.
+    pub fn decide(&mut self, scene: &Scene<'_>) -> MalletCommand {
         match self.phase {
             Phase::Look => self.look(scene),
             Phase::Approach { normal, puck } => self.approach(scene, normal, puck),
@@ -77,10 +77,10 @@ impl Prepare {
         }
     }
 
-    fn look(&mut self, scene: &Scene<'_>) -> Order {
+    fn look(&mut self, scene: &Scene<'_>) -> MalletCommand {
         let puck = &scene.puck;
         if puck.vel.norm() < SLOW
-            && !lies_well(puck)
+            && !is_well_placed(puck)
             && let Some(normal) = best_push(scene.field, puck)
         {
             self.phase = Phase::Approach {
@@ -91,7 +91,7 @@ impl Prepare {
         guard(scene)
     }
 
-    fn approach(&mut self, scene: &Scene<'_>, normal: Vec2, planned: Vec2) -> Order {
+    fn approach(&mut self, scene: &Scene<'_>, normal: Vec2, planned: Vec2) -> MalletCommand {
         let field = scene.field;
         if (scene.puck.pos - planned).norm() > 0.03 {
             self.phase = Phase::Look;
@@ -99,7 +99,7 @@ impl Prepare {
         }
         let mallet = scene.puck.pos - field.contact() * normal;
         let start = field.clamp_mallet(mallet - 0.5 * RUN_UP_TIME * SPEED * normal);
-        let way = around(scene, start, field.contact() + 0.015);
+        let way = waypoint(scene, start, field.contact() + 0.015);
         if way == start
             && (scene.mallet.pos - start).norm() < 0.012
             && scene.mallet.vel.norm() < 0.1
@@ -111,10 +111,10 @@ impl Prepare {
             };
         }
         let near = (scene.mallet.pos - start).norm() < 0.15;
-        Order::stop(scene, way, if near { Pace::CALM } else { Pace::QUICK })
+        MalletCommand::stop(scene, way, if near { Pace::CALM } else { Pace::QUICK })
     }
 
-    fn run(&mut self, scene: &Scene<'_>, normal: Vec2, mallet: Vec2, contact: f64) -> Order {
+    fn run(&mut self, scene: &Scene<'_>, normal: Vec2, mallet: Vec2, contact: f64) -> MalletCommand {
         let left = contact - scene.time;
         if left > 0.5 * scene.dt {
             let target = Target {
@@ -122,7 +122,7 @@ impl Prepare {
                 vel: SPEED * normal,
                 time: left,
             };
-            return Order::new(target, Posture::Free);
+            return MalletCommand::new(target, Posture::Free);
         }
         let rest = STOP_TIME + left;
         if rest < scene.dt {
@@ -136,17 +136,16 @@ impl Prepare {
             vel: Vec2::zeros(),
             time: rest,
         };
-        Order::new(target, Posture::Free)
+        MalletCommand::new(target, Posture::Free)
     }
 }
 
-fn lies_well(puck: &Puck) -> bool {
+fn is_well_placed(puck: &Puck) -> bool {
     let p = puck.pos;
     p.y.abs() < GOOD_Y && p.x > GOOD_X.0 && p.x < GOOD_X.1
 }
 
-/// The direction, mallet to puck, of the push after which the puck comes nearest to the middle line of the
-/// own half, slowly.
+/// The direction, mallet to puck, of the push with the highest value; `None` if no push is possible.
 fn best_push(field: &Field, puck: &Puck) -> Option<Vec2> {
     let mut best: Option<(Vec2, f64)> = None;
     for k in 0..DIRECTIONS {
@@ -156,16 +155,16 @@ fn best_push(field: &Field, puck: &Puck) -> Option<Vec2> {
         if (mallet - field.clamp_mallet(mallet)).norm() > 1e-9 {
             continue;
         }
-        let worth = worth(field, *puck, mallet, SPEED * normal);
-        if best.is_none_or(|(_, w)| worth > w) {
-            best = Some((normal, worth));
+        let value = push_value(field, *puck, mallet, SPEED * normal);
+        if best.is_none_or(|(_, v)| value > v) {
+            best = Some((normal, value));
         }
     }
     best.map(|(normal, _)| normal)
 }
 
-/// What a push comes to: 1 over the middle line where it is wanted, less the further away it ends.
-fn worth(field: &Field, mut puck: Puck, mallet: Vec2, velocity: Vec2) -> f64 {
+/// Value of a push: up to 1 if the puck crosses the middle line in the target range, less the farther it ends.
+fn push_value(field: &Field, mut puck: Puck, mallet: Vec2, velocity: Vec2) -> f64 {
     puck.strike(mallet, velocity);
     let side = puck.pos.y.signum();
     let mut time = 0.0;

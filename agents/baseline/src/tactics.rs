@@ -1,25 +1,25 @@
-//! Which skill plays when.
+//! Chooses the skill for each control step.
 
 use striker::Task;
-use striker::scene::{Order, Scene};
+use striker::scene::{MalletCommand, Scene};
 
 use crate::defend::Defend;
 use crate::guard::guard;
 use crate::hit::Hit;
 use crate::prepare::Prepare;
 
-/// A puck that comes faster than this is defended against, m/s.
+/// A puck approaching faster than this is stopped, m/s.
 const INCOMING: f64 = 0.35;
 /// A puck slower than this can be struck, m/s.
 const SLOW: f64 = 0.3;
-/// Beyond this |y| a puck lies too near to the rim for a shot, metres.
+/// Beyond this |y| a puck is too close to the rim for a shot, metres.
 const NEAR_RIM: f64 = 0.38;
-/// Beyond this x it is out of reach, metres.
+/// Beyond this x a puck is out of reach, metres.
 const OUT_OF_REACH: f64 = -0.16;
-/// Behind this x there is no room for a run-up, metres.
+/// Behind this x a run-up does not fit, metres.
 const NEAR_END: f64 = -0.78;
 
-/// What it is at.
+/// The active skill.
 #[derive(Debug, Clone)]
 enum Skill {
     Wait,
@@ -28,7 +28,7 @@ enum Skill {
     Prepare(Prepare),
 }
 
-/// The memory of an episode or rally.
+/// State of an episode or rally.
 #[derive(Debug, Clone)]
 pub struct Tactics {
     task: Task,
@@ -43,14 +43,14 @@ impl Tactics {
         }
     }
 
-    /// The order for this control step.
-    pub fn decide(&mut self, scene: &Scene<'_>) -> Order {
-        let busy = match &self.skill {
-            Skill::Hit(hit) => hit.committed(),
-            Skill::Prepare(prepare) => prepare.committed(),
+    /// The command for this control step.
+    pub fn decide(&mut self, scene: &Scene<'_>) -> MalletCommand {
+        let is_busy = match &self.skill {
+            Skill::Hit(hit) => hit.is_committed(),
+            Skill::Prepare(prepare) => prepare.is_committed(),
             Skill::Wait | Skill::Defend(_) => false,
         };
-        if !busy {
+        if !is_busy {
             self.choose(scene);
         }
         match &mut self.skill {
@@ -61,7 +61,7 @@ impl Tactics {
         }
     }
 
-    /// Goes on with the skill if it is still the right one, or begins another.
+    /// Continues with the present skill if it is still suitable, or begins another.
     fn choose(&mut self, scene: &Scene<'_>) {
         let puck = &scene.puck;
         let cornered = puck.pos.y.abs() > NEAR_RIM || puck.pos.x < NEAR_END;

@@ -1,9 +1,9 @@
-//! Plays games in process and prints what counts. For development only; `faceoff play` plays the real thing.
+//! Plays games in this process and prints scores. For development only; real games are run by `faceoff play`.
 //!
 //! `cargo run --release -p striker --example game -- striker hold [steps] [profile] [games] [first seed]`
 //!
 //! A player is `striker`, `hold`, or the folder of a bundle whose actions are positions and velocities
-//! (interpolation 3), which is started as it is, without a sandbox.
+//! (interpolation 3), which is started without a sandbox.
 //!
 //! With `TRACE=from:to` the control steps between these of each game are printed, with `LIST=1` the end of each
 //! rally and each step at which a constraint was first broken in its window.

@@ -1,5 +1,5 @@
-//! Plays episodes in process, without pipes and sandbox, and prints what counts: success, penalty
-//! points by kind, and how close to the limits the arm came. For development only.
+//! Runs episodes in this process, without pipes and sandbox, and prints success, penalty points by
+//! kind, and how close to its limits the arm came. For development only.
 //!
 //! `cargo run -p striker --example tune -- hit,defend,prepare 100 [profile] [seasons] [first seed]`
 //!

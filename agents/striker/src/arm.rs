@@ -1,8 +1,8 @@
-//! From a mallet motion to joint commands: redundancy, limits, and the model's errors.
+//! Converts mallet motions to joint commands: redundancy, limits and correction of model errors.
 //!
-//! The arm keeps a *reference*: joint angles and speeds that follow the wanted mallet motion exactly
+//! The arm keeps a *reference*: joint angles and speeds that follow the desired mallet motion exactly
 //! at constant height. The command sent is the reference plus a slowly learnt *correction*, because
-//! the real arm is heavier or lighter than its controller believes and hangs up to a centimetre low.
+//! the real arm's mass differs from its controller's model: it sags by up to a centimetre.
 
 use nalgebra::Vector3;
 
@@ -31,7 +31,7 @@ const CORRECTION_RATE: f64 = 4.0;
 /// Bound of the correction; static errors of the plant stay well below it, radians.
 const CORRECTION_MAX: f64 = 0.04;
 
-/// What the arm prefers to do with its four free degrees of freedom.
+/// Preference for the arm's four free degrees of freedom.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Posture {
     /// Ready to strike: the family of [`Arm::strike_posture`].
@@ -39,7 +39,7 @@ pub enum Posture {
     /// Striking: as `Ready`, and the joints share the motion so that the fastest is as slow as
     /// possible.
     Strike(Side),
-    /// Leave it as it is.
+    /// No preference.
     Free,
 }
 
@@ -71,9 +71,9 @@ pub struct Arm {
     correction: Joints,
 }
 
-/// Where the reference got to in a control step (base frame).
+/// The reference of the mallet after a control step (base frame).
 #[derive(Debug, Clone, Copy)]
-pub struct Reached {
+pub struct ReferenceState {
     /// Mallet position, metres.
     pub position: Vec2,
     /// Mallet velocity, m/s.
@@ -97,7 +97,7 @@ impl Arm {
         }
     }
 
-    /// Starts from rest at the observed joint angles. What was learnt about the plant stays.
+    /// Starts at rest at the observed joint angles, without a correction.
     pub fn reset(&mut self, q: &Joints) {
         self.q = *q;
         self.dq = Joints::zeros();
@@ -116,9 +116,9 @@ impl Arm {
         }
     }
 
-    /// Moves the reference on by one control step so that the mallet is at `position` with
-    /// `velocity` (base frame, metres, m/s), as far as the joint speed limits allow.
-    pub fn advance(&mut self, position: Vec2, velocity: Vec2, posture: Posture) -> Reached {
+    /// Advances the reference by one control step towards a mallet at `position` with `velocity`
+    /// (base frame, metres, m/s), within the joint speed limits.
+    pub fn advance(&mut self, position: Vec2, velocity: Vec2, posture: Posture) -> ReferenceState {
         let preferred = self.posture_rate(posture, position);
         let velocity = Vector3::new(velocity.x, velocity.y, 0.0);
         // Striking begins at rest, where the two ways to share a motion agree, and fades out after it.
@@ -128,7 +128,7 @@ impl Arm {
         };
         let expected = forward(&(self.q + self.dt * self.dq));
         let (dq, share) = self.resolve(&expected.jacobian, &velocity, &preferred);
-        // Even acceleration over the step: what the cubic interpolation then does between its ends.
+        // Constant acceleration over the step, as in the cubic interpolation between its ends.
         let mut q = self.q + 0.5 * self.dt * (self.dq + dq);
         let end = forward(&q);
         let goal = if share < 1.0 {
@@ -136,10 +136,10 @@ impl Arm {
         } else {
             Vector3::new(position.x, position.y, self.height)
         };
-        // What is still missing is small unless a reference jumped; a jump must not reach the joints.
-        let missing = goal - end.tip;
-        let missing = missing * (NUDGE_MAX_M / missing.norm().max(NUDGE_MAX_M));
-        q += least_change(&end.jacobian, &missing, &self.speed_max);
+        // The remaining error is small unless a reference jumped; a jump must not reach the joints.
+        let error = goal - end.tip;
+        let error = error * (NUDGE_MAX_M / error.norm().max(NUDGE_MAX_M));
+        q += least_change(&end.jacobian, &error, &self.speed_max);
         for i in 0..JOINTS {
             q[i] = q[i].clamp(-self.angle_max[i], self.angle_max[i]);
         }
@@ -147,7 +147,7 @@ impl Arm {
         self.dq = dq;
         let end = forward(&q);
         let velocity = end.jacobian * dq;
-        Reached {
+        ReferenceState {
             position: end.tip.xy(),
             velocity: velocity.xy(),
         }
@@ -198,7 +198,7 @@ impl Arm {
 
     /// Speed towards the preferred posture, changing no faster than the acceleration bound.
     fn posture_rate(&mut self, posture: Posture, position: Vec2) -> Joints {
-        let wish = match posture {
+        let desired = match posture {
             Posture::Free => Joints::zeros(),
             // A strike is over before the posture could follow.
             Posture::Strike(_) => Joints::zeros(),
@@ -207,13 +207,13 @@ impl Arm {
         let step = POSTURE_ACCELERATION * self.dt;
         for i in 0..JOINTS {
             let cap = POSTURE_SHARE * self.speed_max[i];
-            self.drift[i] += (wish[i].clamp(-cap, cap) - self.drift[i]).clamp(-step, step);
+            self.drift[i] += (desired[i].clamp(-cap, cap) - self.drift[i]).clamp(-step, step);
         }
         self.drift
     }
 
     /// The posture for striking at `position` (base frame): elbow up and the hand turned out of the
-    /// arm's plane, so that all six joints share the work of a radial swing. Found by maximising the
+    /// arm's plane, so that all six joints share a radial swing. Found by maximising the
     /// radial speed within the joint speed limits at each reach; joints 5 and 6 come out nearly
     /// linear in the reach and joint 3 near zero, and the other three follow from the position.
     fn strike_posture(&self, position: Vec2, side: Side) -> Joints {
@@ -248,17 +248,17 @@ impl Arm {
         Joints::from([azimuth, shoulder, 0.0, shoulder - forearm, lean, wrist, 0.0])
     }
 
-    /// How long the free joints need at least to be ready for a strike from `position`, seconds.
+    /// Minimum time in which the free joints reach the posture for a strike from `position`, seconds.
     pub fn ready_time(&self, position: Vec2, side: Side) -> f64 {
-        let way = self.strike_posture(position, side) - self.q;
-        // Most of the way at full rate, the last part fading.
-        let share = way.component_div(&self.speed_max);
+        let change = self.strike_posture(position, side) - self.q;
+        // Most of the motion is at full rate, the last part slower.
+        let share = change.component_div(&self.speed_max);
         let longest = share[4].abs().max(share[5].abs());
         longest / POSTURE_SHARE + if longest > 0.05 { 0.15 } else { 0.0 }
     }
 
-    /// The speed that the mallet can have at `position` along `direction` (a unit vector, base frame)
-    /// in the posture for striking, m/s.
+    /// Maximum speed of the mallet at `position` along `direction` (a unit vector, base frame) in the
+    /// posture for striking, m/s.
     pub fn strike_speed(&self, position: Vec2, direction: Vec2, side: Side) -> f64 {
         let pose = forward(&self.strike_posture(position, side));
         let unit = Vector3::new(direction.x, direction.y, 0.0);

@@ -1,4 +1,4 @@
-//! The agent's body: what it senses, and how its mallet follows orders. Who decides is elsewhere.
+//! Sensing and motion of an agent, without decisions: estimates, and a mallet that follows commands.
 
 use crate::arm::Arm;
 use crate::env::{Env, Joints};
@@ -7,7 +7,7 @@ use crate::field::{Field, Vec2};
 use crate::keeper::Keeper;
 use crate::kinematics::forward;
 use crate::motion::Motion;
-use crate::scene::{Order, Scene};
+use crate::scene::{MalletCommand, Scene};
 use crate::task::{Action, Task, WrongLength};
 
 /// Estimates, the arm's reference and the mallet's.
@@ -24,7 +24,7 @@ pub struct Body {
 }
 
 impl Body {
-    /// A body in the environment that the evaluator described.
+    /// A body for the environment in `hello`.
     #[must_use]
     pub fn new(task: Task, env: &Env) -> Self {
         let field = Field::new(env);
@@ -33,7 +33,7 @@ impl Body {
             dt: env.dt,
             arm: Arm::new(env),
             estimator: Estimator::new(&field, env.dt),
-            keeper: Keeper::Nobody,
+            keeper: Keeper::Unseen,
             mallet: Motion::rest(Vec2::zeros()),
             step: 0,
             field,
@@ -43,11 +43,11 @@ impl Body {
     /// Starts a new episode or rally.
     pub fn reset(&mut self) {
         self.estimator.reset();
-        self.keeper = Keeper::Nobody;
+        self.keeper = Keeper::Unseen;
         self.step = 0;
     }
 
-    /// Takes in an observation of 20 or 23 numbers (robot base frame).
+    /// Updates the estimates with an observation of 20 or 23 numbers (robot base frame).
     ///
     /// # Errors
     /// If the observation has another length.
@@ -96,16 +96,16 @@ impl Body {
         })
     }
 
-    /// Moves the references on by one control step: the action.
-    pub fn follow(&mut self, order: &Order) -> Action {
+    /// Advances the references by one control step and returns the action.
+    pub fn follow(&mut self, command: &MalletCommand) -> Action {
         let before = self.mallet;
-        let mut next = before.towards(&order.target, self.dt);
-        next.limit(&before, self.dt, order.acceleration);
+        let mut next = before.towards(&command.target, self.dt);
+        next.limit(&before, self.dt, command.acceleration);
         next.confine(&before, self.dt, &self.field);
         let reached = self
             .arm
-            .advance(self.field.to_base(next.pos), next.vel, order.posture);
-        // Where limits cut the motion, go on from what is possible.
+            .advance(self.field.to_base(next.pos), next.vel, command.posture);
+        // Where limits shortened the motion, continue from the state that was reached.
         if (reached.velocity - next.vel).norm() > 0.02 {
             next.vel = reached.velocity;
             next.acc = Vec2::zeros();

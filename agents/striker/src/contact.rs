@@ -1,7 +1,7 @@
 //! The puck at the millisecond scale: the soft contacts of rims and mallet, resolved in substeps.
 //!
-//! `puck.rs` replaces a contact by an impulse, which is wrong where two contacts overlap: a puck
-//! beside the rim that the mallet presses against it. Strikes at such pucks are tried out here.
+//! `puck.rs` models a contact as an impulse, which is wrong where two contacts overlap: a mallet that
+//! presses a puck against the rim. This model simulates strikes at such pucks.
 
 use crate::field::{Field, Vec2};
 use crate::puck::Puck;
@@ -21,34 +21,34 @@ const POST: f64 = 0.005;
 
 /// Parameters of a soft contact: impedance at the surface and at depth, damping, stiffness,
 /// softness, friction.
-struct Law {
+struct ContactLaw {
     surface: f64,
     depth: f64,
     damping: f64,
     stiffness: f64,
     softness: f64,
     friction: f64,
-    /// Inverse mass of what the puck meets, 1/kg.
-    other: f64,
+    /// Inverse mass of the other body, 1/kg.
+    inverse_mass: f64,
 }
 
-const RIM: Law = Law {
+const RIM: ContactLaw = ContactLaw {
     surface: 0.99,
     depth: 0.999,
     damping: 2.0 / (0.999 * 0.0075),
     stiffness: 1.0 / (0.999 * 0.999 * 0.0075 * 0.0075 * 0.1 * 0.1),
     softness: 200.0 / 3.0,
     friction: 1e4,
-    other: 0.0,
+    inverse_mass: 0.0,
 };
-const MALLET: Law = Law {
+const MALLET: ContactLaw = ContactLaw {
     surface: 0.9,
     depth: 0.95,
     damping: 2.0 / (0.95 * 0.02),
     stiffness: 1.0 / (0.95 * 0.95 * 0.02 * 0.02 * 0.3 * 0.3),
     softness: 200.0 / 3.0 + 1.07,
     friction: 1.0,
-    other: 1.0,
+    inverse_mass: 1.0,
 };
 
 /// Force and torque that accumulate over the contacts of a substep.
@@ -57,7 +57,7 @@ struct Wrench {
     torque: f64,
 }
 
-/// Moves the puck on by one substep, with the mallet at `mallet` moving with `velocity`.
+/// Advances the puck by one substep, with the mallet at `mallet` moving with `velocity`.
 pub fn substep(puck: &mut Puck, field: &Field, mallet: Vec2, velocity: Vec2) {
     let free = Wrench {
         force: -DAMPING * puck.vel,
@@ -70,7 +70,7 @@ pub fn substep(puck: &mut Puck, field: &Field, mallet: Vec2, velocity: Vec2) {
     let offset = puck.pos - mallet;
     let distance = offset.norm();
     if distance < field.contact() && distance > 1e-9 {
-        press(
+        add_contact(
             puck,
             field,
             &MALLET,
@@ -83,7 +83,7 @@ pub fn substep(puck: &mut Puck, field: &Field, mallet: Vec2, velocity: Vec2) {
     }
     let side = puck.pos.y.abs() - field.puck_y();
     if side > 0.0 {
-        press(
+        add_contact(
             puck,
             field,
             &RIM,
@@ -97,7 +97,7 @@ pub fn substep(puck: &mut Puck, field: &Field, mallet: Vec2, velocity: Vec2) {
     let end = puck.pos.x.abs() - field.puck_x();
     if end > 0.0 {
         if puck.pos.y.abs() > field.half_goal + POST {
-            press(
+            add_contact(
                 puck,
                 field,
                 &RIM,
@@ -116,7 +116,7 @@ pub fn substep(puck: &mut Puck, field: &Field, mallet: Vec2, velocity: Vec2) {
             let distance = offset.norm();
             let depth = field.puck + POST - distance;
             if depth > 0.0 && distance > 1e-9 {
-                press(
+                add_contact(
                     puck,
                     field,
                     &RIM,
@@ -134,16 +134,16 @@ pub fn substep(puck: &mut Puck, field: &Field, mallet: Vec2, velocity: Vec2) {
     puck.pos += SUBSTEP * puck.vel;
 }
 
-/// Adds one contact's force. Contacts that overlap are solved one by one, which is close enough for
+/// Adds the force of one contact. Overlapping contacts are solved one by one, accurate enough for
 /// planning.
 #[expect(
     clippy::too_many_arguments,
     reason = "one equation's terms; a struct would be built for this call only"
 )]
-fn press(
+fn add_contact(
     puck: &Puck,
     field: &Field,
-    law: &Law,
+    law: &ContactLaw,
     free: &Wrench,
     depth: f64,
     normal: Vec2,
@@ -168,10 +168,10 @@ fn press(
     let free_tangent = free.force.dot(&tangent) / MASS - free.torque / INERTIA * r;
     let push = (-law.damping * relative.dot(&normal) + law.stiffness * impedance * depth
         - free_normal)
-        / (1.0 / MASS + law.other + softness);
+        / (1.0 / MASS + law.inverse_mass + softness);
     let push = push.max(0.0);
     let grip = (-law.damping * slip - free_tangent)
-        / (1.0 / MASS + r * r / INERTIA + law.other + softness);
+        / (1.0 / MASS + r * r / INERTIA + law.inverse_mass + softness);
     let grip = grip.clamp(-law.friction * push, law.friction * push);
     sum.force += push * normal + grip * tangent;
     sum.torque -= grip * r;

@@ -1,4 +1,4 @@
-//! What of the protocol's `env` the arm needs, as vectors.
+//! Limits from the protocol's `env`, as vectors.
 
 pub use faceoff_agent::{BaseFrame, Env, JOINTS, RadiusInfo, RobotInfo, TableInfo};
 use nalgebra::SVector;
@@ -12,15 +12,15 @@ pub const LIMIT_SHARE: f64 = 0.95;
 /// Largest allowed joint speeds, radians per second.
 #[must_use]
 pub fn joint_speed_max(robot: &RobotInfo) -> Joints {
-    allowed(&robot.joint_vel_limit)
+    allowed_max(&robot.joint_vel_limit)
 }
 
 /// Largest allowed joint angles (the ranges are symmetric), radians.
 #[must_use]
 pub fn joint_angle_max(robot: &RobotInfo) -> Joints {
-    allowed(&robot.joint_pos_limit)
+    allowed_max(&robot.joint_pos_limit)
 }
 
-fn allowed([lower, upper]: &[[f64; JOINTS]; 2]) -> Joints {
+fn allowed_max([lower, upper]: &[[f64; JOINTS]; 2]) -> Joints {
     Joints::from_fn(|i, _| LIMIT_SHARE * upper[i].min(-lower[i]))
 }

@@ -1,9 +1,9 @@
-//! Where the puck really is: a Kalman filter over noisy, sometimes missing observations.
+//! Estimates the puck's state: a Kalman filter over noisy, sometimes missing observations.
 //!
 //! Per axis the state is position, velocity and the acceleration that the air flow causes; the flow
-//! decays with its own time constant, so that what it did in the last steps informs the next. Rims
-//! are part of the prediction. The mallet is too, but a contact is far less certain, so it opens up
-//! the velocity's covariance and lets the next observations decide.
+//! decays with its own time constant, so past steps inform the next. Rims are
+//! part of the prediction, and so is the mallet. Contacts with it are much less certain, so they widen
+//! the velocity's covariance, and the next observations determine the velocity.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -20,7 +20,7 @@ const SPIN_NOISE: f64 = 0.1;
 pub const FLOW_TIME: f64 = 0.2;
 /// Stationary standard deviation of the flow's acceleration per speed, 1/s.
 pub const FLOW_PER_SPEED: f64 = 0.4;
-/// An observation further than this many standard deviations off means an unforeseen contact.
+/// An observation with a larger error than this many standard deviations implies an unexpected contact.
 const SURPRISE: f64 = 5.0;
 /// Longest documented loss of tracking, control steps.
 const LOSS_MAX: u32 = 20;
@@ -69,13 +69,13 @@ impl Axis {
         self.cov -= gain * column.transpose();
     }
 
-    /// The velocity may have changed by about `amount`.
-    fn open(&mut self, amount: f64) {
+    /// Adds an uncertainty of `amount`, m/s, to the velocity.
+    fn widen_velocity(&mut self, amount: f64) {
         self.cov[(1, 1)] += amount * amount;
     }
 }
 
-/// What the mallet does at the time of an observation, for contacts.
+/// State of the mallet at the time of an observation, for contacts.
 #[derive(Debug, Clone, Copy)]
 pub struct MalletState {
     /// Position, field frame, metres.
@@ -84,7 +84,7 @@ pub struct MalletState {
     pub vel: Vec2,
 }
 
-/// The puck as observed: pose and velocity in the field frame.
+/// An observation of the puck: pose and velocity in the field frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PuckObservation {
     pub pose: [f64; 3],
@@ -104,7 +104,7 @@ pub struct Estimator {
 }
 
 impl Estimator {
-    /// A filter without any observation yet.
+    /// A filter before the first observation.
     pub fn new(field: &Field, dt: f64) -> Self {
         Self {
             field: field.clone(),
@@ -128,15 +128,15 @@ impl Estimator {
         })
     }
 
-    /// Takes in the observation of this control step and returns the estimate.
-    pub fn observe(&mut self, seen: &PuckObservation, mallet: MalletState) -> Puck {
-        let lost = self.is_lost(seen);
-        self.last = Some(*seen);
-        let [vx, vy, spin] = seen.velocity;
+    /// Updates the filter with the observation of this control step and returns the estimate.
+    pub fn observe(&mut self, observed: &PuckObservation, mallet: MalletState) -> Puck {
+        let lost = self.is_lost(observed);
+        self.last = Some(*observed);
+        let [vx, vy, spin] = observed.velocity;
         let Some(mut axes) = self.axes else {
             self.axes = Some([
-                Axis::new(seen.pose[0], vx, VELOCITY_NOISE),
-                Axis::new(seen.pose[1], vy, VELOCITY_NOISE),
+                Axis::new(observed.pose[0], vx, VELOCITY_NOISE),
+                Axis::new(observed.pose[1], vy, VELOCITY_NOISE),
             ]);
             self.spin = spin;
             self.spin_var = SPIN_NOISE * SPIN_NOISE;
@@ -147,15 +147,15 @@ impl Estimator {
         if !lost {
             for (axis, (position, velocity)) in axes
                 .iter_mut()
-                .zip([(seen.pose[0], vx), (seen.pose[1], vy)])
+                .zip([(observed.pose[0], vx), (observed.pose[1], vy)])
             {
                 let surprise = position - axis.mean[0];
                 if surprise.abs()
                     > SURPRISE * (axis.cov[(0, 0)] + POSITION_NOISE * POSITION_NOISE).sqrt()
                 {
-                    // Something pushed it: trust position at once and velocity soon.
+                    // An unexpected contact: trust the position at once and the velocity soon.
                     axis.cov[(0, 0)] += surprise * surprise;
-                    axis.open((surprise.abs() / self.dt).min(3.0));
+                    axis.widen_velocity((surprise.abs() / self.dt).min(3.0));
                 }
                 axis.update(0, position, POSITION_NOISE);
                 axis.update(1, velocity, VELOCITY_NOISE);
@@ -177,10 +177,10 @@ impl Estimator {
         }
     }
 
-    /// A lost puck is reported where it was, bit for bit, with exactly no velocity. A puck at rest
-    /// without noise looks the same, where treating it as seen does no harm.
-    fn is_lost(&self, seen: &PuckObservation) -> bool {
-        let repeated = self.last.is_some_and(|l| l.pose == seen.pose) && seen.velocity == [0.0; 3];
+    /// A lost puck is reported at its last position, bit for bit, with zero velocity. A puck at rest
+    /// without noise looks the same; it may be treated as seen.
+    fn is_lost(&self, observed: &PuckObservation) -> bool {
+        let repeated = self.last.is_some_and(|l| l.pose == observed.pose) && observed.velocity == [0.0; 3];
         repeated && self.lost < LOSS_MAX && self.estimate().vel.norm() > 0.005
     }
 
@@ -209,16 +209,16 @@ impl Estimator {
             axis.mean = Vector3::new(puck.pos[i], puck.vel[i], flow[i] * fade);
             let bounced = matches!((rim, i), (Some(Rim::Short), 0) | (Some(Rim::Long), 1));
             if bounced {
-                // Where in the millisecond it arrives decides between 0.69 and 1.03 of the speed.
-                axis.open(0.12 * before.vel[i].abs());
+                // The time of arrival within the millisecond determines a factor of 0.69 to 1.03 on the speed.
+                axis.widen_velocity(0.12 * before.vel[i].abs());
                 axis.cov[(0, 0)] += (0.5 * dt * 0.12 * before.vel[i]).powi(2);
                 axis.cov[(0, 1)] = 0.0;
                 axis.cov[(1, 0)] = 0.0;
             } else if rim.is_some() {
-                axis.open(0.05 * speed);
+                axis.widen_velocity(0.05 * speed);
             }
             if touched || gap < 0.01 {
-                axis.open(0.03 + 0.6 * closing);
+                axis.widen_velocity(0.03 + 0.6 * closing);
             }
         }
         self.spin = puck.spin;

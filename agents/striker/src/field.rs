@@ -1,4 +1,4 @@
-//! The playing field seen from our side: origin at the table's centre, our goal at −x, metres.
+//! The field frame, from the agent's side: origin at the table's centre, own goal at −x, metres.
 
 use nalgebra::Vector2;
 
@@ -24,7 +24,7 @@ pub struct Field {
     pub base: f64,
 }
 
-/// Distance that mallet references keep from the evaluator's bounds, for tracking errors.
+/// Margin of mallet references to the evaluator's bounds, for tracking errors.
 const MARGIN: f64 = 0.012;
 
 impl Field {
@@ -65,23 +65,23 @@ impl Field {
         self.half_width - self.puck
     }
 
-    /// Smallest x that a mallet reference may take.
+    /// Smallest x allowed for a mallet reference.
     pub fn mallet_x_min(&self) -> f64 {
         -self.half_length + self.mallet + MARGIN
     }
 
-    /// Largest distance from the robot's base that a mallet reference may have: the arm is nearly
+    /// Largest distance from the robot's base allowed for a mallet reference; the arm is nearly
     /// stretched there.
     pub fn reach_max(&self) -> f64 {
         1.36
     }
 
-    /// Largest |y| that a mallet reference may take.
+    /// Largest |y| allowed for a mallet reference.
     pub fn mallet_y_max(&self) -> f64 {
         self.half_width - self.mallet - MARGIN
     }
 
-    /// Lowest and highest coordinates that a mallet reference may take; the reach bounds it further.
+    /// Lowest and highest coordinates allowed for a mallet reference; the reach is another bound.
     pub fn mallet_bounds(&self) -> (Vec2, Vec2) {
         let y = self.mallet_y_max();
         (
@@ -90,7 +90,7 @@ impl Field {
         )
     }
 
-    /// The nearest point where a mallet reference may be.
+    /// The nearest point allowed for a mallet reference.
     pub fn clamp_mallet(&self, p: Vec2) -> Vec2 {
         let (low, high) = self.mallet_bounds();
         let p = Vec2::new(p.x.clamp(low.x, high.x), p.y.clamp(low.y, high.y));

@@ -1,23 +1,23 @@
-//! Who may be in a shot's way: the pendulum of `hit`, or the other side of a game.
+//! The opponent's mallet as an obstacle for shots: the pendulum of `hit`, or the opponent in a game.
 
 use crate::field::{Field, Vec2};
 use crate::opponent::Opponent;
 
-/// Time over which its usual place is averaged, seconds.
+/// Averaging time of the mallet's position, seconds.
 const MEMORY: f64 = 0.6;
-/// Standard deviation of its place on arrival of a shot even if it never moved so far, metres.
+/// Standard deviation of the mallet's position at the arrival of a shot if it has not moved so far, metres.
 const REACTION: f64 = 0.004;
 
-/// Mean and spread of the places where the other mallet was seen lately.
+/// Mean and spread of recent positions of the opponent's mallet.
 #[derive(Debug, Clone, Copy)]
 pub struct Rival {
-    /// Its usual place, field frame.
+    /// Mean position, field frame.
     pub pos: Vec2,
     variance: f64,
 }
 
 impl Rival {
-    /// Seen for the first time.
+    /// A mallet seen for the first time.
     pub fn new(seen: Vec2) -> Self {
         Self {
             pos: seen,
@@ -25,37 +25,37 @@ impl Rival {
         }
     }
 
-    /// Takes in where it is seen, `dt` seconds after the last time.
+    /// Updates mean and spread with a position, `dt` seconds after the last one.
     pub fn observe(&mut self, dt: f64, seen: Vec2) {
         let share = dt / MEMORY;
-        let way = seen - self.pos;
-        self.pos += share * way;
-        self.variance += share * (way.norm_squared() - self.variance);
+        let offset = seen - self.pos;
+        self.pos += share * offset;
+        self.variance += share * (offset.norm_squared() - self.variance);
     }
 
-    /// Standard deviation of where it will stand, metres.
+    /// Standard deviation of its future position, metres.
     pub fn deviation(&self) -> f64 {
         REACTION.hypot(self.variance.sqrt())
     }
 }
 
-/// Who keeps the other goal.
+/// The mallet in front of the opponent's goal.
 #[derive(Debug, Clone)]
 pub enum Keeper {
-    /// Nobody on the table, or not seen yet.
-    Nobody,
+    /// No opponent on the table, or not seen yet.
+    Unseen,
     /// The pendulum of `hit`.
     Pendulum(Opponent),
-    /// The other side of a game, which is no pendulum.
+    /// The opponent in a game, whose motion is unknown.
     Rival(Rival),
 }
 
 impl Keeper {
-    /// Takes in the other mallet, seen at `time` seconds after the start.
+    /// Updates the state with the opponent's mallet, seen `time` seconds after the start.
     pub fn observe(&mut self, field: &Field, in_game: bool, time: f64, dt: f64, seen: Vec2) {
         match self {
-            Self::Nobody if in_game => *self = Self::Rival(Rival::new(seen)),
-            Self::Nobody => {
+            Self::Unseen if in_game => *self = Self::Rival(Rival::new(seen)),
+            Self::Unseen => {
                 let mut opponent = Opponent::new(field);
                 opponent.observe(time, seen);
                 *self = Self::Pendulum(opponent);

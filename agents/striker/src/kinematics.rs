@@ -55,7 +55,7 @@ fn mounting(joint: usize) -> Matrix3<f64> {
     }
 }
 
-/// Positions that matter, for one joint configuration.
+/// Positions and Jacobian for one joint configuration.
 #[derive(Debug, Clone, Copy)]
 pub struct Pose {
     /// End effector, metres.

@@ -1,9 +1,9 @@
 //! Striker: a reference agent for Robot Air Hockey.
 //!
-//! Model based, no learning: a Kalman filter estimates the puck, a skill decides where the mallet
-//! shall be and how fast it shall move there, a quintic makes that smooth, and inverse kinematics
-//! with a learnt correction turns it into joint commands within the evaluator's limits. The library
-//! is free of clocks and I/O; `main.rs` adds the protocol.
+//! Model based, no learning: a Kalman filter estimates the puck, a skill chooses the mallet's target
+//! position and velocity, a quintic makes the motion smooth, and inverse kinematics with an online
+//! correction converts it to joint commands within the evaluator's limits. The library has no clock
+//! and no I/O; `main.rs` adds the protocol.
 
 pub mod arm;
 mod body;
@@ -24,7 +24,7 @@ mod task;
 #[cfg(test)]
 mod testing;
 
-use scene::{Order, Scene};
+use scene::{MalletCommand, Scene};
 use skills::{Defend, Hit, Prepare, Tournament};
 
 pub use body::Body;
@@ -50,7 +50,7 @@ impl Skill {
         }
     }
 
-    fn decide(&mut self, scene: &Scene<'_>) -> Order {
+    fn decide(&mut self, scene: &Scene<'_>) -> MalletCommand {
         match self {
             Self::Hit(s) => s.decide(scene),
             Self::Defend(s) => s.decide(scene),
@@ -69,7 +69,7 @@ pub struct Agent {
 }
 
 impl Agent {
-    /// An agent for `task` in the environment that the evaluator described.
+    /// An agent for `task` and the environment in `hello`.
     #[must_use]
     pub fn new(task: Task, env: &Env) -> Self {
         Self {
@@ -87,8 +87,8 @@ impl Policy for Agent {
     }
 
     fn act(&mut self, observation: &[f64]) -> Result<Action, WrongLength> {
-        let order = self.skill.decide(&self.body.observe(observation)?);
-        Ok(self.body.follow(&order))
+        let command = self.skill.decide(&self.body.observe(observation)?);
+        Ok(self.body.follow(&command))
     }
 
     fn describe(&self) -> String {

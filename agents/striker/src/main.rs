@@ -1,4 +1,4 @@
-//! Speaks the agent protocol over standard input and output.
+//! Runs the agent over standard input and output.
 
 use std::process::ExitCode;
 

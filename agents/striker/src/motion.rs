@@ -16,7 +16,7 @@ pub struct Motion {
     pub acc: Vec2,
 }
 
-/// Where the mallet shall be, how fast it shall move there, and in what time.
+/// Target of a mallet motion: position, velocity and time of arrival.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Target {
     /// Position, metres.
@@ -28,7 +28,7 @@ pub struct Target {
 }
 
 impl Target {
-    /// A place to stop at, reached as soon as is comfortable.
+    /// A target to stop at, reached within the limits of `pace`.
     pub fn stop(from: &Motion, pos: Vec2, pace: Pace) -> Self {
         let brake = from.vel.norm() / pace.acceleration;
         let distance = (pos - from.pos).norm();
@@ -43,7 +43,7 @@ impl Target {
     }
 }
 
-/// How fast an unhurried motion may be.
+/// Limits of a positioning motion.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pace {
     /// Peak speed, m/s.
@@ -53,12 +53,12 @@ pub struct Pace {
 }
 
 impl Pace {
-    /// Positioning without hurry.
+    /// Slow positioning.
     pub const CALM: Self = Self {
         speed: 0.7,
         acceleration: 3.0,
     };
-    /// Getting somewhere in time.
+    /// Fast positioning.
     pub const QUICK: Self = Self {
         speed: 1.3,
         acceleration: 8.0,
@@ -96,8 +96,8 @@ impl Motion {
         }
     }
 
-    /// Peak speed, peak acceleration and whether the path stays where the mallet may be.
-    pub fn cost(&self, target: &Target, field: &Field) -> Effort {
+    /// Peak speed and acceleration on the way to `target`, and how far the path leaves the allowed area.
+    pub fn effort(&self, target: &Target, field: &Field) -> Effort {
         let mut effort = Effort {
             speed: 0.0,
             acceleration: 0.0,
@@ -114,21 +114,21 @@ impl Motion {
         effort
     }
 
-    /// Bounds the change of velocity since `before`, `dt` seconds ago: a plan that was changed at the
-    /// last moment may ask for more than the arm can follow.
+    /// Limits the change of velocity since `before`, `dt` seconds ago: a late change of plan may require
+    /// more than the arm can follow.
     pub fn limit(&mut self, before: &Self, dt: f64, acceleration: f64) {
         let change = self.vel - before.vel;
-        let most = acceleration * dt;
-        if change.norm() > most {
-            let change = change * (most / change.norm());
+        let max = acceleration * dt;
+        if change.norm() > max {
+            let change = change * (max / change.norm());
             self.vel = before.vel + change;
             self.pos = before.pos + 0.5 * dt * (before.vel + self.vel);
             self.acc = change / dt;
         }
     }
 
-    /// Keeps the reference where the mallet may be: it approaches a bound only as fast as it can
-    /// still stop before it.
+    /// Keeps the reference in the allowed area: it approaches a bound only as fast as it can still stop
+    /// before it.
     pub fn confine(&mut self, before: &Self, dt: f64, field: &Field) {
         let (low, high) = field.mallet_bounds();
         for i in 0..2 {
@@ -137,9 +137,9 @@ impl Motion {
             } else {
                 before.pos[i] - low[i]
             };
-            let most = (2.0 * BOUND_BRAKE * room.max(0.0)).sqrt();
-            if self.vel[i].abs() > most {
-                self.vel[i] = most * self.vel[i].signum();
+            let max = (2.0 * BOUND_BRAKE * room.max(0.0)).sqrt();
+            if self.vel[i].abs() > max {
+                self.vel[i] = max * self.vel[i].signum();
                 self.pos[i] = before.pos[i] + dt * self.vel[i];
                 self.acc[i] = 0.0;
             }
@@ -149,8 +149,8 @@ impl Motion {
         let radius = field.to_base(self.pos);
         let outward = radius / radius.norm();
         let room = field.reach_max() - field.to_base(before.pos).norm();
-        let most = (2.0 * BOUND_BRAKE * room.max(0.0)).sqrt();
-        let excess = self.vel.dot(&outward) - most;
+        let max = (2.0 * BOUND_BRAKE * room.max(0.0)).sqrt();
+        let excess = self.vel.dot(&outward) - max;
         if excess > 0.0 {
             self.vel -= excess * outward;
             self.pos = before.pos + dt * self.vel;
@@ -160,13 +160,13 @@ impl Motion {
     }
 }
 
-/// What a motion asks of the arm.
+/// Demands of a motion on the arm.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Effort {
     /// Peak speed, m/s.
     pub speed: f64,
     /// Peak acceleration, m/s².
     pub acceleration: f64,
-    /// Furthest that the path leaves the allowed area, metres.
+    /// Largest distance of the path from the allowed area, metres.
     pub excess: f64,
 }

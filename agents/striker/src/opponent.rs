@@ -1,4 +1,4 @@
-//! Where the opponent's mallet will be: in `hit` it swings from side to side like a pendulum.
+//! Predicts the opponent's mallet in `hit`, where it swings from side to side like a pendulum.
 
 use crate::field::{Field, Vec2};
 use nalgebra::{Matrix2, Vector2};
@@ -21,7 +21,7 @@ pub struct Opponent {
 }
 
 impl Opponent {
-    /// The published motion, before anything is seen. The opponent's +y is our −y.
+    /// The published motion, before the first observation. The opponent's +y is the agent's −y.
     pub fn new(field: &Field) -> Self {
         let prior = Vector2::new(-AMPLITUDE * PHASE.cos(), AMPLITUDE * PHASE.sin());
         Self {
@@ -31,7 +31,7 @@ impl Opponent {
         }
     }
 
-    /// Takes in the end effector seen at `time` seconds after the start.
+    /// Updates the fit with the end effector, seen `time` seconds after the start.
     pub fn observe(&mut self, time: f64, seen: Vec2) {
         let basis = Vector2::new((FREQUENCY * time).cos(), (FREQUENCY * time).sin());
         self.normal += basis * basis.transpose();

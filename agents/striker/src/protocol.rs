@@ -2,14 +2,14 @@
 
 use std::process::ExitCode;
 
-use faceoff_agent::{About, Action, Agent, Failure, Interpolation, Observation};
+use faceoff_agent::{AgentInfo, Action, Agent, Failure, Interpolation, Observation};
 
 use crate::{Env, Policy, Task};
 
-/// A policy as the conversation knows it.
-struct Speaking<P>(P);
+/// Adapter from a [`Policy`] to the protocol loop's [`Agent`].
+struct PolicyAgent<P>(P);
 
-impl<P: Policy> Agent for Speaking<P> {
+impl<P: Policy> Agent for PolicyAgent<P> {
     fn reset(&mut self) {
         self.0.reset();
     }
@@ -21,16 +21,16 @@ impl<P: Policy> Agent for Speaking<P> {
     }
 }
 
-/// Lets the policy that `make` makes answer the evaluator over standard input and output. `name` and `version` are
-/// what the program calls itself.
+/// Runs the policy that `make_policy` creates over standard input and output. `name` and `version` identify the
+/// program.
 pub fn run<P: Policy>(
     [name, version]: [&'static str; 2],
-    make: impl Fn(Task, &Env) -> P,
+    make_policy: impl Fn(Task, &Env) -> P,
 ) -> ExitCode {
-    let about = About {
+    let info = AgentInfo {
         name,
         version,
         interpolation: Interpolation::Cubic,
     };
-    faceoff_agent::run(about, |hello| Speaking(make(hello.task, &hello.env)))
+    faceoff_agent::run(info, |hello| PolicyAgent(make_policy(hello.task, &hello.env)))
 }

@@ -1,23 +1,23 @@
-//! How the puck moves: sliding with viscous drag, bouncing off rims, struck by a mallet.
+//! Motion of the puck: sliding with viscous drag, bouncing off rims, struck by a mallet.
 //!
-//! A coarse, closed-form counterpart of the simulator's contact law, good for planning a second or
-//! two ahead at negligible cost. The numbers are means over the real, softer contacts.
+//! A coarse, closed-form counterpart of the simulator's contact law, accurate enough to plan one or
+//! two seconds ahead at negligible cost. The numbers are means over the real, softer contacts.
 
 use crate::field::{Field, Vec2};
 
 /// Velocity decay of the sliding puck, 1/s.
 pub const DRAG: f64 = 0.5;
-/// Mean share of the normal speed that a rim gives back.
+/// Mean coefficient of restitution of the rims.
 pub const RIM_RESTITUTION: f64 = 0.75;
 /// Share of the slip between puck and rim that one bounce removes (one or two substeps' contact).
 const RIM_GRIP: f64 = 0.37;
-/// Share of the normal speed that the mallet gives back.
+/// Mean coefficient of restitution of the mallet.
 pub const MALLET_RESTITUTION: f64 = 0.44;
 /// Share of the slip that a mallet contact removes.
 const MALLET_GRIP: f64 = 0.8;
 /// Decay of the yaw rate, 1/s.
 const SPIN_DRAG: f64 = 0.4;
-/// Share of a removed slip that ends up in the puck's velocity: 1/(1 + m r²/I), the rest is spin.
+/// Share of a removed slip that changes the puck's velocity: 1/(1 + m r²/I); the rest changes its spin.
 const SLIP_TO_VELOCITY: f64 = 1.0 / (1.0 + 0.01 * 0.031_65 * 0.031_65 / 5e-6);
 
 /// State of the puck in the field frame.
@@ -31,14 +31,14 @@ pub struct Puck {
     pub spin: f64,
 }
 
-/// Which boundary the puck reaches.
+/// The boundary that a puck reaches.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Rim {
     /// A short side: the normal is along x.
     Short,
     /// A long side: the normal is along y.
     Long,
-    /// A goal mouth; the puck is gone.
+    /// A goal mouth, where the puck leaves the table.
     Goal,
 }
 
@@ -51,7 +51,7 @@ impl Puck {
         self.spin *= (-SPIN_DRAG * time).exp();
     }
 
-    /// Time until the next rim and which, if it gets there at all.
+    /// Time until the next rim and that rim; `None` if the puck stops before.
     pub fn next_rim(&self, field: &Field) -> Option<(f64, Rim)> {
         let arrival = |pos: f64, vel: f64, bound: f64| {
             let distance = if vel > 0.0 { bound - pos } else { bound + pos };
@@ -64,7 +64,7 @@ impl Puck {
             (Some(s), Some(l)) if l < s => Some((l, Rim::Long)),
             (Some(s), _) => {
                 let y = self.pos.y + self.vel.y * (1.0 - (-DRAG * s).exp()) / DRAG;
-                // A puck whose edge just grazes the rounded post still slips in.
+                // A puck that just grazes the rounded post still enters the goal.
                 let rim = if y.abs() < field.half_goal - 0.7 * field.puck {
                     Rim::Goal
                 } else {
@@ -98,7 +98,7 @@ impl Puck {
         true
     }
 
-    /// The velocity after touching a rim.
+    /// Applies the contact with a rim.
     pub fn bounce(&mut self, rim: Rim) {
         let normal = match rim {
             Rim::Short => Vec2::new(-self.vel.x.signum(), 0.0),
@@ -108,8 +108,8 @@ impl Puck {
         self.collide(normal, Vec2::zeros(), RIM_RESTITUTION, RIM_GRIP);
     }
 
-    /// The velocity after being struck by a mallet at `mallet` moving with `velocity`; unchanged if
-    /// they separate already.
+    /// Applies a strike by a mallet at `mallet` moving with `velocity`; nothing changes if they already
+    /// separate.
     pub fn strike(&mut self, mallet: Vec2, velocity: Vec2) {
         let offset = self.pos - mallet;
         let distance = offset.norm();
@@ -118,7 +118,7 @@ impl Puck {
         }
     }
 
-    /// Impulse along `normal` (into the puck) and friction against a body moving with `other`.
+    /// Applies the impulse along `normal` (into the puck) and the friction of a body moving with `other`.
     fn collide(&mut self, normal: Vec2, other: Vec2, restitution: f64, grip: f64) {
         let relative = self.vel - other;
         let approach = relative.dot(&normal);

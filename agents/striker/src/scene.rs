@@ -1,4 +1,4 @@
-//! What every skill sees, and what it may order.
+//! Input and output of the skills: the scene, and the command for the mallet.
 
 use crate::arm::{Arm, Posture, Side};
 use crate::field::{Field, Vec2};
@@ -6,7 +6,7 @@ use crate::keeper::Keeper;
 use crate::motion::{Motion, Pace, Target};
 use crate::puck::Puck;
 
-/// What a skill sees at a control step. All in the field frame.
+/// Estimated state at a control step, in the field frame.
 #[derive(Debug)]
 pub struct Scene<'a> {
     pub field: &'a Field,
@@ -18,16 +18,16 @@ pub struct Scene<'a> {
     /// Standard deviation of its velocity components, m/s.
     pub puck_speed_deviation: Vec2,
     pub mallet: Motion,
-    /// The arm, for what it can do.
+    /// The arm, for its possible speeds.
     pub arm: &'a Arm,
-    /// Who may be in a shot's way.
+    /// The opponent's mallet, an obstacle for shots.
     pub keeper: &'a Keeper,
 }
 
-/// What a skill wants the mallet to do next.
+/// A skill's command for the mallet.
 #[derive(Debug, Clone, Copy)]
-pub struct Order {
-    /// Where to, how fast on arrival, in what time.
+pub struct MalletCommand {
+    /// Position, velocity and time of arrival.
     pub target: Target,
     /// Preference for the free degrees of freedom.
     pub posture: Posture,
@@ -38,8 +38,8 @@ pub struct Order {
 /// Largest acceleration of references outside strikes, m/s².
 const ACCELERATION: f64 = 14.0;
 
-impl Order {
-    /// An order with the usual bound on the acceleration.
+impl MalletCommand {
+    /// A command with the default limit of the acceleration.
     pub fn new(target: Target, posture: Posture) -> Self {
         Self {
             target,
@@ -48,16 +48,16 @@ impl Order {
         }
     }
 
-    /// Go to a point and stop there.
+    /// Moves to a point and stops there.
     pub fn stop(scene: &Scene<'_>, pos: Vec2, pace: Pace) -> Self {
         let pos = scene.field.clamp_mallet(pos);
         Self::new(
             Target::stop(&scene.mallet, pos, pace),
-            Posture::Ready(lean(pos)),
+            Posture::Ready(lean_side(pos)),
         )
     }
 
-    /// Slow down along the present direction.
+    /// Slows down along the present direction.
     pub fn brake(scene: &Scene<'_>) -> Self {
         let time = 0.1 + 0.1 * scene.mallet.vel.norm();
         let pos = scene
@@ -69,11 +69,11 @@ impl Order {
                 vel: Vec2::zeros(),
                 time,
             },
-            Posture::Ready(lean(pos)),
+            Posture::Ready(lean_side(pos)),
         )
     }
 
-    /// Keep the present velocity.
+    /// Continues with `velocity`.
     pub fn coast(scene: &Scene<'_>, velocity: Vec2, posture: Posture) -> Self {
         let time = 0.1;
         Self::new(
@@ -87,8 +87,8 @@ impl Order {
     }
 }
 
-/// The side to lean to for strikes from `pos` towards the middle of the other goal.
-pub fn lean(pos: Vec2) -> Side {
+/// The elbow's side for strikes from `pos` towards the centre of the opponent's goal.
+pub fn lean_side(pos: Vec2) -> Side {
     if pos.y >= 0.0 {
         Side::Right
     } else {
@@ -96,19 +96,19 @@ pub fn lean(pos: Vec2) -> Side {
     }
 }
 
-/// A way to `goal` that keeps the mallet's centre `clearance` away from the puck: `goal` itself, or
-/// a point beside the puck first.
-pub fn around(scene: &Scene<'_>, goal: Vec2, clearance: f64) -> Vec2 {
+/// The next point of a path to `goal` that keeps the mallet's centre `clearance` away from the puck:
+/// `goal` itself, or a point beside the puck.
+pub fn waypoint(scene: &Scene<'_>, goal: Vec2, clearance: f64) -> Vec2 {
     let from = scene.mallet.pos;
     let puck = scene.puck.pos + 0.1 * scene.puck.vel;
-    // A goal closer to the puck than that is approached as closely as it lies itself.
+    // If the goal is closer to the puck, its own distance is the clearance.
     let clearance = clearance.min((goal - puck).norm() - 1e-3);
-    let way = goal - from;
-    let length = way.norm();
+    let path = goal - from;
+    let length = path.norm();
     if length < 1e-6 {
         return goal;
     }
-    let direction = way / length;
+    let direction = path / length;
     let along = (puck - from).dot(&direction);
     let nearest = from + direction * along.clamp(0.0, length);
     let away = nearest - puck;
@@ -116,7 +116,7 @@ pub fn around(scene: &Scene<'_>, goal: Vec2, clearance: f64) -> Vec2 {
     if distance >= clearance || along <= 0.0 {
         return goal;
     }
-    // Pass on the side where the straight way already lies, unless the rim is there.
+    // Pass on the side of the straight path, unless the rim is there.
     let normal = Vec2::new(-direction.y, direction.x);
     let mut side = if away.dot(&normal) >= 0.0 {
         normal

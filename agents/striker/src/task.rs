@@ -1,4 +1,4 @@
-//! What is asked of an agent, and what it answers.
+//! Interface of a policy: task, action and errors.
 
 use crate::env::JOINTS;
 pub use faceoff_agent::{Task, WrongLength};
@@ -17,6 +17,6 @@ pub trait Policy {
     /// If the observation has another length.
     fn act(&mut self, observation: &[f64]) -> Result<Action, WrongLength>;
 
-    /// What it is doing, for a log.
+    /// The policy's internal state as text, for development logs.
     fn describe(&self) -> String;
 }

@@ -1,10 +1,10 @@
 use crate::env::JOINTS;
 use serde::{Serialize, Serializer};
 
-/// Numbers of a larger magnitude are refused by the evaluator.
+/// The evaluator refuses numbers of a larger magnitude.
 const LARGEST_NUMBER: f64 = 1e4;
 
-/// What an agent's actions mean (protocol, "Actions").
+/// Meaning of an agent's actions (protocol, "Actions").
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Interpolation {
     /// 1: position, reached along a line.
@@ -24,8 +24,8 @@ pub enum Interpolation {
 }
 
 impl Interpolation {
-    /// As the protocol writes it.
-    const fn number(self) -> Option<i8> {
+    /// The code in the protocol; `None` is `null`.
+    const fn code(self) -> Option<i8> {
         match self {
             Self::Linear => Some(1),
             Self::Quadratic => Some(2),
@@ -40,11 +40,11 @@ impl Interpolation {
 
 impl Serialize for Interpolation {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        self.number().serialize(serializer)
+        self.code().serialize(serializer)
     }
 }
 
-/// What the arm shall do in the next control step: angles in rad, velocities in rad/s, accelerations in rad/s².
+/// Command for the next control step: angles in rad, velocities in rad/s, accelerations in rad/s².
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(untagged)]
 pub enum Action {
@@ -54,15 +54,15 @@ pub enum Action {
     PositionVelocity([[f64; JOINTS]; 2]),
     /// Positions, velocities, accelerations.
     PositionVelocityAcceleration([[f64; JOINTS]; 3]),
-    /// The same for each of the step's 20 milliseconds.
+    /// Positions, velocities, accelerations for each of the step's 20 milliseconds.
     Trajectory(Box<[[[f64; JOINTS]; 3]; 20]>),
 }
 
 impl Action {
-    /// Why the evaluator would refuse it from an agent that agreed on `interpolation`; none if it would not.
-    pub(crate) fn objection(&self, interpolation: Interpolation) -> Option<String> {
+    /// The reason for which the evaluator would refuse the action under `interpolation`; `None` if it is valid.
+    pub(crate) fn refusal(&self, interpolation: Interpolation) -> Option<String> {
         use Interpolation as I;
-        let fits = match self {
+        let has_shape = match self {
             Self::Position(_) => matches!(interpolation, I::Linear | I::Quadratic),
             Self::PositionVelocity(_) => {
                 matches!(interpolation, I::Cubic | I::Quartic | I::LinearBoth)
@@ -70,17 +70,17 @@ impl Action {
             Self::PositionVelocityAcceleration(_) => interpolation == I::Quintic,
             Self::Trajectory(_) => interpolation == I::Trajectory,
         };
-        if !fits {
+        if !has_shape {
             return Some(format!(
                 "the action {self:.60?} does not fit the interpolation {interpolation:?}"
             ));
         }
-        let refused = |number: &f64| !number.is_finite() || number.abs() > LARGEST_NUMBER;
+        let is_refused = |number: &f64| !number.is_finite() || number.abs() > LARGEST_NUMBER;
         let (index, number) = self
             .numbers()
             .iter()
             .enumerate()
-            .find(|(_, n)| refused(n))?;
+            .find(|(_, n)| is_refused(n))?;
         Some(format!(
             "expected numbers within ±{LARGEST_NUMBER} in an action, got {number} for joint {} in row {}",
             index % JOINTS + 1,

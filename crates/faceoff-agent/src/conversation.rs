@@ -10,36 +10,36 @@ use std::{
     process::ExitCode,
 };
 
-/// The protocol version that this crate speaks.
+/// The protocol version of this crate.
 const VERSION: u32 = 1;
 
-/// What an agent may fail with.
+/// Error of an agent's policy.
 pub type Failure = Box<dyn Error + Send + Sync>;
 
 /// A policy: everything between an observation and an action.
 pub trait Agent {
-    /// Before each episode, and before each rally of a game. At most 10 s.
+    /// Called before each episode, and before each rally of a game. At most 10 s.
     fn reset(&mut self);
 
-    /// The action for an observation: costs points from 20 ms on.
+    /// The action for an observation. An answer costs points from 20 ms on.
     ///
     /// # Errors
-    /// Whatever keeps the agent from acting. It goes to the log and ends the program, which is a fault.
+    /// Any error is logged and ends the program, which is an agent fault.
     fn act(&mut self, observation: &Observation) -> Result<Action, Failure>;
 }
 
-/// What the program says of itself in `ready`.
+/// What the agent sends in `ready`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-pub struct About {
-    /// Of the program.
+pub struct AgentInfo {
+    /// Name of the program.
     pub name: &'static str,
-    /// Of the program.
+    /// Version of the program.
     pub version: &'static str,
-    /// What its actions mean.
+    /// Meaning of its actions.
     pub interpolation: Interpolation,
 }
 
-/// Which behaviour is asked for.
+/// The task of a session.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Task {
@@ -53,20 +53,20 @@ pub enum Task {
     Tournament,
 }
 
-/// What the evaluator says first.
+/// The first message of the evaluator.
 #[derive(Debug, Clone, Deserialize)]
 pub struct Hello {
     protocol: u32,
-    /// What is asked for.
+    /// The task of this session.
     pub task: Task,
     /// 1 or 2: which robot of the table is the agent's own.
-    #[serde(default = "first")]
+    #[serde(default = "first_agent_id")]
     pub agent_id: u32,
     /// Table, robot and limits.
     pub env: Box<Env>,
 }
 
-const fn first() -> u32 {
+const fn first_agent_id() -> u32 {
     1
 }
 
@@ -88,7 +88,7 @@ enum Answer {
         step: u64,
         action: Action,
     },
-    /// No answer to any question: the evaluator takes it as a fault and shows the line to the team.
+    /// Not a valid answer: the evaluator counts it as an agent fault and shows the line to the team.
     Error {
         error: String,
     },
@@ -100,128 +100,128 @@ enum Ready {
     Hello {
         protocol: u32,
         #[serde(flatten)]
-        about: About,
+        info: AgentInfo,
     },
     Reset {
         episode: u64,
     },
 }
 
-/// Why a conversation ended before its `bye`.
+/// Reason why a conversation ended before `bye`.
 #[derive(Debug, thiserror::Error)]
 pub enum ConversationError {
-    /// A line that is no message of the protocol.
-    #[error("understand the message {line:.200}")]
-    NotUnderstood {
-        /// What came.
+    /// A line that is not a message of the protocol.
+    #[error("expected a message of the protocol, got {line:.200}")]
+    InvalidMessage {
+        /// The received line.
         line: String,
-        /// What is wrong with it.
+        /// The cause from the JSON parser.
         source: serde_json::Error,
     },
-    /// The evaluator speaks another version.
-    #[error("expected protocol {VERSION}, the evaluator speaks {0}")]
-    OtherProtocol(u32),
-    /// A question before `hello`.
+    /// The evaluator uses another version.
+    #[error("expected protocol {VERSION}, got {0} from the evaluator")]
+    UnsupportedProtocol(u32),
+    /// A message before `hello`.
     #[error("expected hello before {0}")]
-    NoHello(&'static str),
-    /// The agent could not act.
+    HelloMissing(&'static str),
+    /// The agent's policy returned an error.
     #[error("step {step}: {failure}")]
-    Failed {
+    ActFailed {
         /// The control step, from 0.
         step: u64,
-        /// What the agent said.
+        /// The error of the policy.
         failure: Failure,
     },
     /// An action that the evaluator would refuse.
-    #[error("step {step}: {objection}")]
-    Refused {
+    #[error("step {step}: {reason}")]
+    InvalidAction {
         /// The control step, from 0.
         step: u64,
-        /// What is wrong with it.
-        objection: String,
+        /// Why the evaluator would refuse it.
+        reason: String,
     },
-    /// The pipe broke.
-    #[error("speak with the evaluator")]
-    Pipe(#[from] io::Error),
+    /// Reading from or writing to the evaluator failed.
+    #[error("expected a connection to the evaluator")]
+    Io(#[from] io::Error),
 }
 
-/// Lets the agent that `make` makes answer the evaluator over standard input and output, until `bye` or the end of
-/// the input. An error goes to standard error, which is the agent's log, and to the evaluator.
-pub fn run<A: Agent>(about: About, make: impl FnOnce(&Hello) -> A) -> ExitCode {
+/// Runs the agent that `make_agent` creates over standard input and output, until `bye` or the end of the input. An
+/// error goes to standard error, which is the agent's log, and to the evaluator.
+pub fn run<A: Agent>(info: AgentInfo, make_agent: impl FnOnce(&Hello) -> A) -> ExitCode {
     let mut output = io::stdout().lock();
-    let Err(error) = serve(about, make, io::stdin().lock(), &mut output) else {
+    let Err(error) = serve(info, make_agent, io::stdin().lock(), &mut output) else {
         return ExitCode::SUCCESS;
     };
-    let words = with_causes(&error);
-    // There is nobody else to tell if the log or the evaluator is gone.
-    let _logged = writeln!(io::stderr(), "error: {words}");
-    let _said = say(&mut output, &Answer::Error { error: words });
+    let message = error_chain(&error);
+    // If the log or the evaluator is gone, the error cannot be reported anywhere else.
+    let _logged = writeln!(io::stderr(), "error: {message}");
+    let _sent = write_answer(&mut output, &Answer::Error { error: message });
     ExitCode::FAILURE
 }
 
-/// As [`run`], with any input and output.
+/// Like [`run`], with any input and output.
 ///
 /// # Errors
-/// [`ConversationError`].
+/// See [`ConversationError`].
 pub fn serve<A: Agent>(
-    about: About,
-    make: impl FnOnce(&Hello) -> A,
+    info: AgentInfo,
+    make_agent: impl FnOnce(&Hello) -> A,
     input: impl BufRead,
     mut output: impl Write,
 ) -> Result<(), ConversationError> {
-    let mut make = Some(make);
+    let mut make_agent = Some(make_agent);
     let mut agent: Option<A> = None;
     for line in input.lines() {
         let line = line?;
         let message = serde_json::from_str(&line)
-            .map_err(|source| ConversationError::NotUnderstood { line, source })?;
+            .map_err(|source| ConversationError::InvalidMessage { line, source })?;
         let answer = match message {
             Message::Hello(hello) => {
                 if hello.protocol != VERSION {
-                    return Err(ConversationError::OtherProtocol(hello.protocol));
+                    return Err(ConversationError::UnsupportedProtocol(hello.protocol));
                 }
-                agent = make.take().map(|make| make(&hello));
+                agent = make_agent.take().map(|make_agent| make_agent(&hello));
                 Answer::Ready(Ready::Hello {
                     protocol: VERSION,
-                    about,
+                    info,
                 })
             }
             Message::Reset { episode } => {
                 let agent = agent.as_mut();
-                agent.ok_or(ConversationError::NoHello("reset"))?.reset();
+                agent.ok_or(ConversationError::HelloMissing("reset"))?.reset();
                 Answer::Ready(Ready::Reset { episode })
             }
             Message::Step { step, obs } => {
-                let agent = agent.as_mut().ok_or(ConversationError::NoHello("step"))?;
+                let agent = agent.as_mut().ok_or(ConversationError::HelloMissing("step"))?;
                 let action = agent
                     .act(&obs)
-                    .map_err(|failure| ConversationError::Failed { step, failure })?;
-                if let Some(objection) = action.objection(about.interpolation) {
-                    return Err(ConversationError::Refused { step, objection });
+                    .map_err(|failure| ConversationError::ActFailed { step, failure })?;
+                if let Some(reason) = action.refusal(info.interpolation) {
+                    return Err(ConversationError::InvalidAction { step, reason });
                 }
                 Answer::Act { step, action }
             }
             Message::End {} => continue,
             Message::Bye {} => return Ok(()),
         };
-        say(&mut output, &answer)?;
+        write_answer(&mut output, &answer)?;
     }
     Ok(())
 }
 
-fn say(output: &mut impl Write, answer: &Answer) -> io::Result<()> {
+fn write_answer(output: &mut impl Write, answer: &Answer) -> io::Result<()> {
     let mut line = serde_json::to_vec(answer)?;
     line.push(b'\n');
     output.write_all(&line)?;
     output.flush()
 }
 
-fn with_causes(error: &dyn Error) -> String {
-    let mut words = error.to_string();
+fn error_chain(error: &dyn Error) -> String {
+    let mut message = error.to_string();
     let mut cause = error.source();
     while let Some(error) = cause {
-        words = format!("{words}: {error}");
+        message = format!("{message}: {error}");
         cause = error.source();
     }
-    words
+    message
 }

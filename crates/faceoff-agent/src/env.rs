@@ -3,7 +3,7 @@ use serde::Deserialize;
 /// Number of driven joints.
 pub const JOINTS: usize = 7;
 
-/// The `env` of `hello`, as far as agents have used it; other fields are ignored. Constants of the nominal robot.
+/// The fields of `env` in `hello` that agents use; other fields are ignored. Constants of the nominal robot.
 #[derive(Debug, Clone, Deserialize)]
 pub struct Env {
     /// Control period in seconds.
@@ -36,7 +36,7 @@ pub struct RadiusInfo {
     pub radius: f64,
 }
 
-/// Limits and placement of the agent's own arm.
+/// Limits and placement of the agent's robot.
 #[derive(Debug, Clone, Deserialize)]
 pub struct RobotInfo {
     /// Height of the end effector in the robot's base frame, metres.
@@ -45,12 +45,12 @@ pub struct RobotInfo {
     pub joint_pos_limit: [[f64; JOINTS]; 2],
     /// Lower and upper joint velocity limits, radians per second; constraints are tested at 95 % of them.
     pub joint_vel_limit: [[f64; JOINTS]; 2],
-    /// `table_from_robot` as row-major 4×4, one per robot, own first.
+    /// `table_from_robot` as row-major 4×4, one per robot, the agent's own first.
     pub base_frame: Vec<BaseFrame>,
 }
 
 impl RobotInfo {
-    /// Distance of the own base from the table's centre along x, metres; none without a base frame.
+    /// Distance of the agent's base from the table's centre along x, metres; `None` without a base frame.
     #[must_use]
     pub fn base_distance_m(&self) -> Option<f64> {
         self.base_frame.first().map(BaseFrame::distance_m)

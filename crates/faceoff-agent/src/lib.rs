@@ -1,10 +1,10 @@
-//! The agent's side of the protocol, for agents in Rust: messages, answers, and the loop between them.
+//! The agent's side of the protocol, for agents in Rust: messages, answers and their loop.
 //!
 //! An agent implements [`Agent`] and calls [`run`] in its `main`. `faceoff new --lang rust` copies this crate into
-//! the new project, so it depends on nothing of Faceoff. It decides nothing: no policy, no kinematics, no clock.
+//! the new project, so it depends on no other crate of Faceoff. It has no policy, no kinematics and no clock.
 //!
 //! ```no_run
-//! use faceoff_agent::{About, Action, Agent, Failure, Interpolation, Observation, run};
+//! use faceoff_agent::{Action, Agent, AgentInfo, Failure, Interpolation, Observation, run};
 //!
 //! struct Hold(Option<[f64; 7]>);
 //!
@@ -20,8 +20,8 @@
 //! }
 //!
 //! fn main() -> std::process::ExitCode {
-//!     let about = About { name: "hold", version: "1.0", interpolation: Interpolation::Cubic };
-//!     run(about, |_hello| Hold(None))
+//!     let info = AgentInfo { name: "hold", version: "1.0", interpolation: Interpolation::Cubic };
+//!     run(info, |_hello| Hold(None))
 //! }
 //! ```
 
@@ -33,6 +33,6 @@ mod env;
 mod observation;
 
 pub use action::{Action, Interpolation};
-pub use conversation::{About, Agent, ConversationError, Failure, Hello, Task, run, serve};
+pub use conversation::{AgentInfo, Agent, ConversationError, Failure, Hello, Task, run, serve};
 pub use env::{BaseFrame, Env, JOINTS, RadiusInfo, RobotInfo, TableInfo};
 pub use observation::{Observation, WrongLength};

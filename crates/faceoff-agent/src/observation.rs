@@ -1,13 +1,13 @@
 use crate::env::JOINTS;
 use serde::Deserialize;
 
-/// What the robot perceives at a control step, in its own base frame: 20 numbers, 23 with an opponent on the table.
+/// Observation of a control step in the robot's base frame: 20 numbers, 23 with an opponent on the table.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(try_from = "Vec<f64>")]
 pub struct Observation(Vec<f64>);
 
 impl Observation {
-    /// x, y (m), yaw (rad), and their rates (m/s, rad/s).
+    /// The puck's x, y (m), yaw (rad) and their rates (m/s, rad/s).
     #[must_use]
     pub fn puck(&self) -> [f64; 6] {
         self.numbers(0)
@@ -25,7 +25,7 @@ impl Observation {
         self.numbers(6 + JOINTS)
     }
 
-    /// x, y, z of the other mallet, m, if there is an opponent on the table.
+    /// x, y, z of the opponent's mallet, m; `None` without an opponent on the table.
     #[must_use]
     pub fn opponent(&self) -> Option<[f64; 3]> {
         (self.0.len() == 23).then(|| self.numbers(20))
@@ -53,7 +53,7 @@ impl TryFrom<Vec<f64>> for Observation {
     }
 }
 
-/// An observation of a length that the protocol does not know.
+/// An observation whose length is not one of the protocol's.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("expected an observation of 20 or 23 numbers, got {0}")]
 pub struct WrongLength(pub usize);

@@ -1,8 +1,8 @@
-//! The types of the API: what clients send ([`requests`]) and what they are answered ([`views`]), with where its
-//! resources are and what its secrets look like.
+//! The types of the HTTP API: request bodies and queries ([`requests`]), response bodies ([`views`]), the paths of
+//! resources and the format of secrets.
 //!
-//! Server and command line share them. It knows no web server and no database: how an answer is made is
-//! `faceoff-service`'s.
+//! The server and the command line share them. This crate depends on no web server and no database; `faceoff-service`
+//! builds the responses.
 
 #![warn(missing_docs)]
 

@@ -1,7 +1,7 @@
-//! What the API calls an object comes as an object.
+//! Refuses JSON arrays in place of objects.
 //!
-//! Types that are derived also read an array, by the position of their fields. No document says so, positions change
-//! with the code, and `[null, null]` would be a change of nothing that is answered as done.
+//! Structs with a derived `Deserialize` also accept an array, field by position. The API document does not promise
+//! that, positions change with the code, and `[null, null]` would pass as a request that changes nothing.
 
 use serde::{
     Deserialize,
@@ -14,7 +14,7 @@ use serde::{
 use serde_json::{Error, Map, Value, map};
 use std::slice;
 
-/// Refuses a value that fits a type but for an array in the place of an object, at any depth.
+/// Refuses a value that fits `T` except that it has an array in place of an object, at any depth.
 pub fn check<'de, T: Deserialize<'de>>(
     value: &'de Value,
 ) -> Result<(), serde_path_to_error::Error<Error>> {
@@ -38,7 +38,7 @@ impl<'de> Deserializer<'de> for Objects<'de> {
     fn deserialize_any<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Error> {
         match self.0 {
             Value::Array(items) => visitor.visit_seq(Items(items.iter())),
-            Value::Object(fields) => visitor.visit_map(Fields::of(fields)),
+            Value::Object(fields) => visitor.visit_map(Fields::new(fields)),
             plain => plain.deserialize_any(visitor),
         }
     }
@@ -77,7 +77,7 @@ impl<'de> Deserializer<'de> for Objects<'de> {
         visitor: V,
     ) -> Result<V::Value, Error> {
         match self.0 {
-            Value::Object(fields) if fields.len() == 1 => visitor.visit_enum(Fields::of(fields)),
+            Value::Object(fields) if fields.len() == 1 => visitor.visit_enum(Fields::new(fields)),
             plain => plain.deserialize_enum(name, variants, visitor),
         }
     }
@@ -113,7 +113,7 @@ struct Fields<'de> {
 }
 
 impl<'de> Fields<'de> {
-    fn of(fields: &'de Map<String, Value>) -> Self {
+    fn new(fields: &'de Map<String, Value>) -> Self {
         Self {
             rest: fields.iter(),
             value: &Value::Null,
@@ -141,7 +141,7 @@ impl<'de> MapAccess<'de> for Fields<'de> {
     }
 }
 
-/// A variant with content: its name is the only field.
+/// Externally tagged: the variant's name is the only field.
 impl<'de> EnumAccess<'de> for Fields<'de> {
     type Error = Error;
     type Variant = Self;
@@ -156,7 +156,7 @@ impl<'de> EnumAccess<'de> for Fields<'de> {
 impl<'de> VariantAccess<'de> for Fields<'de> {
     type Error = Error;
 
-    /// A name without content is a text, never a field of null.
+    /// A unit variant is a string, never an object with a null field.
     fn unit_variant(self) -> Result<(), Error> {
         Err(Error::invalid_type(Unexpected::Map, &"a text"))
     }
@@ -184,7 +184,7 @@ mod tests {
     use serde_json::json;
 
     #[derive(Debug, Deserialize)]
-    #[expect(dead_code, reason = "what is read is not looked at")]
+    #[expect(dead_code, reason = "only deserialised")]
     struct Outer {
         inner: Option<Inner>,
         pair: (f64, f64),
@@ -192,14 +192,14 @@ mod tests {
     }
 
     #[derive(Debug, Deserialize)]
-    #[expect(dead_code, reason = "what is read is not looked at")]
+    #[expect(dead_code, reason = "only deserialised")]
     struct Inner {
         name: String,
     }
 
     #[derive(Debug, Deserialize)]
     #[serde(rename_all = "snake_case")]
-    #[expect(dead_code, reason = "what is read is not looked at")]
+    #[expect(dead_code, reason = "only deserialised")]
     enum Kind {
         Plain,
         Counted(u32),
@@ -207,7 +207,7 @@ mod tests {
     }
 
     #[test]
-    fn an_array_is_no_object_at_any_depth() {
+    fn array_in_place_of_object_is_refused_at_any_depth() {
         let fits = [
             json!({"inner": {"name": "a"}, "pair": [1, 2.5], "kind": "plain"}),
             json!({"inner": null, "pair": [1, 2], "kind": {"counted": 3}}),
@@ -217,7 +217,7 @@ mod tests {
             check::<Outer>(&value).unwrap();
         }
         let is_refused = |value: Value, place: &str| {
-            // The derived type itself takes it, or this check would not be needed.
+            // The derived implementation accepts it; otherwise this check would not be needed.
             serde_json::from_value::<Outer>(value.clone()).unwrap();
             let error = check::<Outer>(&value).unwrap_err();
             assert_eq!(error.path().to_string(), place, "{error}");

@@ -1,8 +1,8 @@
-//! Where the API's resources are, for answers that lead to them.
+//! Paths of API resources, for links in responses.
 
 use faceoff_types::{EvaluationId, GameId, SubmissionId, TournamentId};
 
-/// Where the API lives.
+/// Prefix of all API paths.
 pub const API_BASE: &str = "/api/v1";
 
 /// The path of a submission.
@@ -25,5 +25,5 @@ pub fn game(id: GameId) -> String {
     format!("{API_BASE}/games/{id}")
 }
 
-/// Where the process says that it lives.
+/// Path of the liveness probe.
 pub const LIVE_PATH: &str = "/livez";

@@ -1,30 +1,30 @@
-//! What clients send to the API.
+//! Request bodies and query parameters of the API.
 
 mod boards;
 mod episodes;
-mod field_by_field;
-mod left_out;
+mod merge_patch;
+mod double_option;
 mod links;
-mod people;
+mod users;
 mod tournaments;
 mod webhooks;
 
 pub use boards::*;
 pub use episodes::*;
 pub use links::*;
-pub use people::*;
+pub use users::*;
 pub use tournaments::*;
 pub use webhooks::*;
 
 use crate::objects_only;
 use faceoff_archive::Edition;
 use faceoff_types::{
-    DayDeadline, EvaluationId, PerturbationSettings, Profile, Publishes, Retention, Runtimes,
-    Schedule, StageId, StageLimits, StageUploads, Standings, SubmissionId, Task, TaskWeights,
+    DayDeadline, EvaluationId, PerturbationSettings, Profile, Publication, Retention, Runtimes,
+    Schedule, StageId, StageLimits, StageUploadLimits, CountingResult, SubmissionId, Task, TaskWeights,
     TeamId, TierBounds, Zone,
 };
 use jiff::{Timestamp, civil::Date};
-use left_out::{given, given_or_null};
+use double_option::{deserialize_some, serialize_option};
 use serde::{Deserialize, Deserializer, Serialize};
 use utoipa::{
     IntoParams, ToSchema,
@@ -35,27 +35,27 @@ use utoipa::{
 #[derive(Debug, Clone, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct NewTeam {
-    /// 1 to 40 letters, digits, spaces and . _ -
+    /// 1 to 40 characters: letters, digits, spaces and . _ -
     pub name: String,
 }
 
-/// What of a comparison.
+/// Query of a comparison.
 #[derive(Debug, Clone, Copy, Default, Serialize, Deserialize, IntoParams)]
 #[serde(deny_unknown_fields)]
 #[into_params(parameter_in = Query)]
 pub struct ComparisonQuery {
-    /// Also which episodes were solved by both, by one and by neither.
+    /// Also return which episodes both agents, one of them, or neither solved.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     #[param(required = false)]
     pub episodes: bool,
 }
 
-/// Which archive of the season.
+/// Query of the season archive.
 #[derive(Debug, Clone, Copy, Default, Serialize, Deserialize, IntoParams)]
 #[serde(deny_unknown_fields)]
 #[into_params(parameter_in = Query)]
 pub struct ArchiveQuery {
-    /// For whom: `public`, or `organiser` (which it is without this).
+    /// `public` leaves out what only organisers may see; `organiser` is complete. Default: `organiser`.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[param(schema_with = editions, required = false)]
     pub edition: Option<Edition>,
@@ -69,242 +69,253 @@ fn editions() -> Object {
         .build()
 }
 
-/// A day to be played after all.
+/// A missed evaluation day to start.
 #[derive(Debug, Clone, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct MissedDay {
-    /// Its date in the stage's zone, one that has passed.
+    /// The day's date in the stage's time zone; in the past.
     pub day: Date,
-    /// Everybody may read it; 1 to 500 characters.
+    /// Public. 1 to 500 characters.
     pub reason: String,
 }
 
-/// One more evaluation of a day.
+/// One more evaluation of a team for a day.
 #[derive(Debug, Clone, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
-pub struct ExtraTurn {
-    /// Whose.
+pub struct NewExtraEvaluation {
+    /// The team to evaluate.
     pub team: TeamId,
-    /// Everybody may read it; 1 to 500 characters.
+    /// Public. 1 to 500 characters.
     pub reason: String,
-    /// The team's name, if a result of the day that counts is to be replaced. Without it nothing is done then.
+    /// The team's name. Required if the evaluation replaces a result of the day that counts; without it the request
+    /// changes nothing and the response describes the effects.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub confirm: Option<String>,
 }
 
-/// Which of the log.
+/// Filter and page of the event log.
 #[derive(Debug, Clone, Default, Serialize, Deserialize, IntoParams)]
 #[serde(default, deny_unknown_fields)]
 #[into_params(parameter_in = Query)]
 pub struct EventsQuery {
-    /// Only events before the one with this id: `next_before` of the page before.
+    /// Return only events with a smaller id: the `next_before` of the previous page.
     pub before: Option<i64>,
-    /// Events of a page: 1 to 1000; 100 without it.
+    /// Events per page, 1 to 1000. Default: 100.
     pub limit: Option<u32>,
-    /// Who caused it: `organiser` (the host), `person:ID`, `team:ID`, `visitor`, `schedule`, `worker:NAME`, `server`;
-    /// `person`, `team` and `worker` name all of them.
+    /// Return only events with this actor: `organiser` (the host), `person:ID`, `team:ID`, `visitor`, `schedule`,
+    /// `worker:NAME` or `server`. `person`, `team` and `worker` without an id match all of the kind.
     pub actor: Option<String>,
-    /// What it is about: `season`, `stage:ID`, `day:STAGE/2026-03-01`, `team:ID`, `submission:ID`, `evaluation:ID`, `ablation:ID`,
-    /// `person:ID`, `registration:ID`, `announcement:ID`, `question:ID`, `proposal:ID`, `tournament:ID` or `game:ID`.
+    /// Return only events about this subject: `season`, `stage:ID`, `day:STAGE/2026-03-01`, `team:ID`, `submission:ID`,
+    /// `evaluation:ID`, `ablation:ID`, `person:ID`, `registration:ID`, `announcement:ID`, `question:ID`, `proposal:ID`,
+    /// `tournament:ID` or `game:ID`.
     pub subject: Option<String>,
-    /// What happened, e.g. `day_started`.
+    /// Return only events of this kind, e.g. `day_started`.
     pub kind: Option<String>,
 }
 
-/// What of the season is followed.
+/// Filter of the event stream.
 #[derive(Debug, Clone, Default, Serialize, Deserialize, IntoParams)]
 #[serde(default, deny_unknown_fields)]
 #[into_params(parameter_in = Query)]
 pub struct FollowQuery {
-    /// What fits one of these, separated by commas: topics (`board`, `queue`, `season`, …), subjects (`stage:ID`, `team:ID`,
-    /// `tournament:ID`, …) or names of events (`day_released`). Without it everything that the caller may know of.
+    /// Comma-separated filters; an event is sent if it matches one of them. Topics (`board`, `queue`, `season`, …),
+    /// subjects (`stage:ID`, `team:ID`, `tournament:ID`, …) or event kinds (`day_released`). Default: all events that
+    /// the caller may see.
     pub about: Option<String>,
 }
 
-/// Which day is to start.
+/// The evaluation day to start.
 #[derive(Debug, Clone, Default, Serialize, Deserialize, ToSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct StartDay {
-    /// Of which stage; may be left out while one is open.
+    /// The day's stage. Default: the open stage, if there is only one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub stage: Option<StageId>,
 }
 
-/// A stage to make: what is left out is as in the stage that is open, or in the nearest.
+/// A stage to create. Fields that are left out are copied from the open stage, or from the stage nearest in time,
+/// unless their description says otherwise.
 #[derive(Debug, Clone, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct NewStage {
-    /// 1 to 40 letters, digits, spaces and . _ -
+    /// 1 to 40 characters: letters, digits, spaces and . _ -
     pub name: String,
-    /// From then on its days start; left out, now.
+    /// When its first evaluation day may start. Default: now.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub opens_at: Option<Timestamp>,
-    /// From then on none of its days starts; left out, it has no end yet.
+    /// From then on no evaluation day starts. Default: no end.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub closes_at: Option<Timestamp>,
-    /// Its days are dates there, and its schedule is of its clocks.
+    /// Time zone of its days and its schedule.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub zone: Option<Zone>,
-    /// The perturbations.
+    /// Perturbation profile of the simulator.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub profile: Option<Profile>,
-    /// In the order of play; at least one, none twice.
+    /// Tasks in the order in which they run; at least one, without duplicates.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub tasks: Option<Vec<Task>>,
-    /// Episodes of each task that a team plays on a day.
+    /// Episodes of each task per evaluation.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub episodes_per_task: Option<u32>,
-    /// More agent faults than this end an evaluation without a score.
+    /// An evaluation with more agent faults than this fails, without a score.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub max_faults: Option<u32>,
-    /// What each task's success rate weighs in the overall score.
+    /// Weight of each task's success rate in the overall score.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub weights: Option<TaskWeights>,
-    /// Penalty points per episode up to which an agent is in a tier.
+    /// Highest penalty points per episode of each tier.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub tier_bounds: Option<TierBounds>,
-    /// Magnitudes of the perturbations that the profile switches on; what of it is left out is the ruleset's.
+    /// Magnitudes of the perturbations that the profile switches on. Fields that are left out have the ruleset's
+    /// values.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub perturbations: Option<Box<PerturbationSettings>>,
-    /// What agents are held to; what of it is left out is as the server's configuration has it.
+    /// Resource limits of agents. Fields that are left out have the values of the server's configuration.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub limits: Option<Box<StageLimits>>,
-    /// The runtimes that its agents may use, of those that the server offers; null: all of them.
+    /// Runtimes that agents may use, out of those that the server offers; null: all of them.
     #[serde(
         default,
         skip_serializing_if = "Option::is_none",
-        deserialize_with = "given",
-        serialize_with = "given_or_null"
+        deserialize_with = "deserialize_some",
+        serialize_with = "serialize_option"
     )]
     #[schema(value_type = Option<Runtimes>)]
     pub runtimes: Option<Option<Runtimes>>,
-    /// What each team may upload meanwhile; likewise.
+    /// Upload limits per team while the stage is open. Fields that are left out have the values of the server's
+    /// configuration.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub uploads: Option<StageUploads>,
-    /// When its days start; left out, when the organiser starts them.
+    pub uploads: Option<StageUploadLimits>,
+    /// When its evaluation days start. Default: an organiser starts them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub schedule: Option<Schedule>,
-    /// Episodes of each task and profile of the ablation of every submission that the schedule starts; left out,
-    /// none.
+    /// Episodes per task and profile of the ablation that a scheduled day starts for each submission. Default: 0, no
+    /// ablation.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub ablation_episodes: Option<u32>,
-    /// Episodes of one unit of work.
+    /// Episodes per job.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub episodes_per_shard: Option<u32>,
-    /// Until when a day may be played: "next_cut", "never" or {"hours":30}; left out, until the next cut.
+    /// Until when the evaluations of a day may run: "next_cut" (the next cutoff), "never" or {"hours":30}. Default: the
+    /// next cutoff.
     #[serde(
         default,
         skip_serializing_if = "Option::is_none",
         deserialize_with = "deadline"
     )]
     pub day_deadline: Option<DayDeadline>,
-    /// Are its scores hidden from everybody but the organiser? Left out, they are not.
+    /// Whether only organisers see its scores. Default: false.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub blind: Option<bool>,
-    /// When its datasets are there for everybody; left out, at its close.
+    /// When its datasets become public. Default: when the stage closes.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub publishes: Option<Publishes>,
-    /// What a team's row on its board is made of; left out, its newest evaluation.
+    pub publishes: Option<Publication>,
+    /// Which of a team's evaluations count for its board row. Default: the newest one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub standings: Option<Standings>,
-    /// What is kept of its files; left out, everything.
+    pub standings: Option<CountingResult>,
+    /// Which of its files are kept. Default: all.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub retention: Option<Retention>,
 }
 
-/// What of a stage is to be another; what is left out stays as it is.
+/// Changes of a stage. Fields that are left out stay as they are.
 #[derive(Debug, Clone, Default, Serialize, Deserialize, ToSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct StageChange {
-    /// 1 to 40 letters, digits, spaces and . _ -
+    /// 1 to 40 characters: letters, digits, spaces and . _ -
     #[serde(skip_serializing_if = "Option::is_none")]
     pub name: Option<String>,
-    /// Of a stage that has not opened.
+    /// Only while the stage has not opened.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub opens_at: Option<Timestamp>,
-    /// Of a stage that has not closed; null: it has no end yet.
+    /// Only while the stage has not closed; null: no end.
     #[serde(
         skip_serializing_if = "Option::is_none",
-        deserialize_with = "given",
-        serialize_with = "given_or_null"
+        deserialize_with = "deserialize_some",
+        serialize_with = "serialize_option"
     )]
     #[schema(value_type = Option<Timestamp>)]
     pub closes_at: Option<Option<Timestamp>>,
-    /// Of a stage none of whose days has had its cut.
+    /// Only before the stage's first cutoff.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub zone: Option<Zone>,
-    /// The perturbations.
+    /// Perturbation profile of the simulator.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub profile: Option<Profile>,
-    /// In the order of play; at least one, none twice.
+    /// Tasks in the order in which they run; at least one, without duplicates.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub tasks: Option<Vec<Task>>,
-    /// Episodes of each task that a team plays on a day.
+    /// Episodes of each task per evaluation.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub episodes_per_task: Option<u32>,
-    /// More agent faults than this end an evaluation without a score.
+    /// An evaluation with more agent faults than this fails, without a score.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub max_faults: Option<u32>,
-    /// What each task's success rate weighs in the overall score.
+    /// Weight of each task's success rate in the overall score.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub weights: Option<TaskWeights>,
-    /// Penalty points per episode up to which an agent is in a tier.
+    /// Highest penalty points per episode of each tier.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub tier_bounds: Option<TierBounds>,
-    /// Magnitudes of the perturbations that the profile switches on, all of them anew: what of it is left out is the
-    /// ruleset's.
+    /// Magnitudes of the perturbations that the profile switches on. Replaces all of them: fields that are left out get
+    /// the ruleset's values.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub perturbations: Option<Box<PerturbationSettings>>,
-    /// What agents are held to, all of it anew: what of it is left out is as the server's configuration has it.
+    /// Resource limits of agents. Replaces all of them: fields that are left out get the values of the server's
+    /// configuration.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub limits: Option<Box<StageLimits>>,
-    /// The runtimes that its agents may use, of those that the server offers; null: all of them.
+    /// Runtimes that agents may use, out of those that the server offers; null: all of them.
     #[serde(
         skip_serializing_if = "Option::is_none",
-        deserialize_with = "given",
-        serialize_with = "given_or_null"
+        deserialize_with = "deserialize_some",
+        serialize_with = "serialize_option"
     )]
     #[schema(value_type = Option<Runtimes>)]
     pub runtimes: Option<Option<Runtimes>>,
-    /// What each team may upload meanwhile, all of it anew.
+    /// Upload limits per team while the stage is open. Replaces all of them.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub uploads: Option<StageUploads>,
-    /// When its days start; null: when the organiser starts them.
+    pub uploads: Option<StageUploadLimits>,
+    /// When its evaluation days start; null: an organiser starts them.
     #[serde(
         skip_serializing_if = "Option::is_none",
-        deserialize_with = "given",
-        serialize_with = "given_or_null"
+        deserialize_with = "deserialize_some",
+        serialize_with = "serialize_option"
     )]
     #[schema(value_type = Option<Schedule>)]
     pub schedule: Option<Option<Schedule>>,
-    /// Episodes of each task and profile of the ablation of every submission that the schedule starts; 0: none.
+    /// Episodes per task and profile of the ablation that a scheduled day starts for each submission; 0: no ablation.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub ablation_episodes: Option<u32>,
-    /// Episodes of one unit of work.
+    /// Episodes per job.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub episodes_per_shard: Option<u32>,
-    /// Until when a day may be played: "next_cut", "never" or {"hours":30}; days that are under way follow.
+    /// Until when the evaluations of a day may run: "next_cut" (the next cutoff), "never" or {"hours":30}. Applies to
+    /// running days, too.
     #[serde(skip_serializing_if = "Option::is_none", deserialize_with = "deadline")]
     pub day_deadline: Option<DayDeadline>,
-    /// False opens a blind stage, for good once it has scores, also after its close; true only before it has any.
+    /// `false` reveals the scores of a blind stage, also after it has closed; once there are scores this is final.
+    /// `true` only before the stage has scores.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub blind: Option<bool>,
-    /// When its datasets are there for everybody; after its close only sooner than it was.
+    /// When its datasets become public. After the stage has closed only an earlier time is accepted.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub publishes: Option<Publishes>,
-    /// What a team's row on its board is made of.
+    pub publishes: Option<Publication>,
+    /// Which of a team's evaluations count for its board row.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub standings: Option<Standings>,
-    /// What is kept of its files, all of it anew; `{}`: everything. Also after its close and its sign-off.
+    pub standings: Option<CountingResult>,
+    /// Which of its files are kept. Replaces the whole setting; `{}` keeps all. Also accepted after the stage has
+    /// closed or is signed off.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub retention: Option<Retention>,
-    /// The stage's name, if other rules or standings are to begin while it is open (its board begins anew then, or is
-    /// ordered anew), or if another retention would remove something.
+    /// The stage's name. Required if the change starts a new revision of an open stage, reorders its board, or removes
+    /// files.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub confirm: Option<String>,
 }
 
-/// By way of a value, so that what is no deadline is told as a wrong value and not as wrong JSON.
+/// Deserialises by way of a JSON value, so that a wrong deadline is reported as a wrong value and not as invalid JSON.
 fn deadline<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<DayDeadline>, D::Error> {
     let value = Option::<serde_json::Value>::deserialize(deserializer)?;
     let Some(value) = value else { return Ok(None) };
@@ -313,98 +324,99 @@ fn deadline<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<DayDead
     parsed.map(Some).map_err(serde::de::Error::custom)
 }
 
-/// What is to be tried without counting.
+/// A trial to start: an evaluation that does not count.
 #[derive(Debug, Clone, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Trial {
-    /// A valid one; left out, what every team has active.
+    /// A valid submission. Default: the active submission of every team.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub submission: Option<SubmissionId>,
-    /// Kept in the log; 1 to 500 characters.
+    /// Written to the log. 1 to 500 characters.
     pub reason: String,
 }
 
-/// What is to be played again beside what counts: either `evaluation` or `day`.
+/// A re-evaluation to propose. Exactly one of `evaluation` and `day` is given.
 #[derive(Debug, Clone, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct NewProposal {
-    /// One that counts.
+    /// An evaluation that counts.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub evaluation: Option<EvaluationId>,
-    /// All of a day that count: its date.
+    /// The date of a day; proposes all of its evaluations that count.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub day: Option<Date>,
-    /// By the stage's newest rules, for the board of these; of a day only.
+    /// Use the stage's newest rules, and add the results to the board of that revision. Only with `day`.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub new_rules: bool,
-    /// Everybody may read it once it is applied; 1 to 500 characters.
+    /// Public once the proposal is applied. 1 to 500 characters.
     pub reason: String,
 }
 
-/// What a team says of a submission; what is left out stays as it is, null takes it away.
+/// Label and note of a submission. A field that is left out stays as it is; null removes the text.
 #[derive(Debug, Clone, Default, Serialize, Deserialize, ToSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct SubmissionChange {
-    /// What it calls it; 1 to 80 characters.
+    /// The team's name for the submission. 1 to 80 characters.
     #[serde(
         skip_serializing_if = "Option::is_none",
-        deserialize_with = "given",
-        serialize_with = "given_or_null"
+        deserialize_with = "deserialize_some",
+        serialize_with = "serialize_option"
     )]
     #[schema(value_type = Option<String>)]
     pub label: Option<Option<String>>,
-    /// What it writes about it, on any number of lines; 1 to 2000 characters.
+    /// The team's notes, any number of lines. 1 to 2000 characters.
     #[serde(
         skip_serializing_if = "Option::is_none",
-        deserialize_with = "given",
-        serialize_with = "given_or_null"
+        deserialize_with = "deserialize_some",
+        serialize_with = "serialize_option"
     )]
     #[schema(value_type = Option<String>)]
     pub note: Option<Option<String>>,
 }
 
-/// That the archive of a submission is to be removed for good.
+/// Deletes the bundle of a submission for good.
 #[derive(Debug, Clone, Default, Serialize, Deserialize, ToSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct DeleteSubmission {
-    /// The name of its archive. Without it nothing is done, and the answer says what would be.
+    /// The bundle's file name. Without it the request changes nothing and the response describes the effects.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub confirm: Option<String>,
-    /// The team reads it; 1 to 500 characters. An organiser gives one, a team may.
+    /// Shown to the team. 1 to 500 characters. Required from an organiser, optional from the team.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub reason: Option<String>,
 }
 
-/// Why an evaluation is stopped.
+/// Cancels an evaluation.
 #[derive(Debug, Clone, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Cancellation {
-    /// Shown to the team; 1 to 500 characters.
+    /// Shown to the team. 1 to 500 characters.
     pub reason: String,
 }
 
-/// A decision of the organiser's that cannot be undone, or hits a team at once.
+/// An organiser's decision that cannot be undone, or that affects a team at once.
 #[derive(Debug, Clone, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Decision {
-    /// Everybody may read it; 1 to 500 characters.
+    /// Public. 1 to 500 characters.
     pub reason: String,
-    /// The name of the team, or the date of the day, that it is about. Without it nothing is done, and the answer says
-    /// what would be.
+    /// The name of the team, or the date of the day, that the decision affects. Without it the request changes nothing
+    /// and the response describes the effects.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub confirm: Option<String>,
 }
 
-/// That something is meant as it was asked.
+/// Confirms a request that cannot be undone.
 #[derive(Debug, Clone, Default, Serialize, Deserialize, ToSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Confirmation {
-    /// The name of what it is about. Without it nothing is done, and the answer says what would be.
+    /// The name of the affected resource. Without it the request changes nothing and the response describes the
+    /// effects.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub confirm: Option<String>,
 }
 
-/// Why something is undone.
+/// The reason for a decision.
 #[derive(Debug, Clone, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Reason {
@@ -412,18 +424,18 @@ pub struct Reason {
     pub reason: String,
 }
 
-/// What the ablation shall play. All fields may be left out.
+/// An ablation to start. All fields are optional.
 #[derive(Debug, Clone, Default, Serialize, Deserialize, ToSchema)]
 #[serde(default, deny_unknown_fields)]
-pub struct OrderAblation {
-    /// Episodes of each task in each of the six profiles; 100 unless given.
+pub struct NewAblation {
+    /// Episodes per task in each of the six profiles. Default: 100.
     pub episodes_per_task: Option<u32>,
 }
 
-/// The wish to close the season.
+/// Closes the season.
 #[derive(Debug, Clone, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CloseSeason {
-    /// The season's name, to show that this is no slip: closing cannot be undone.
+    /// The season's name. Closing cannot be undone.
     pub confirm: String,
 }

@@ -1,23 +1,22 @@
-//! Tokens and codes.
+//! Tokens, session cookies and invitation codes.
 //!
-//! Each is 256 random bits behind a readable prefix. Only its BLAKE3 hash is kept: nobody can try
-//! out 2^256 tokens, so the slow, salted hashes that protect guessable passwords would only make
-//! every request slow.
+//! Each is 256 random bits behind a readable prefix. The server stores only the BLAKE3 hash. 2^256 values cannot be
+//! tried out, so a slow, salted hash as for passwords would only slow every request down.
 
 use std::fmt;
 
-/// What a secret is for; readable in its prefix, so that leak scanners and people can tell.
+/// What a secret is for. Its prefix shows it to leak scanners and to readers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum SecretKind {
-    /// A team's token.
+    /// A team's API token.
     Team,
-    /// The host's token.
+    /// The host's API token.
     Admin,
-    /// A person's token.
-    Person,
-    /// The cookie of whoever has signed in.
+    /// A user's API token.
+    User,
+    /// The session cookie of a signed-in browser.
     Session,
-    /// The code of a link by which somebody joins.
+    /// The code of an invitation link.
     Invitation,
 }
 
@@ -26,34 +25,34 @@ impl SecretKind {
         match self {
             Self::Team => "fo_team_",
             Self::Admin => "fo_admin_",
-            Self::Person => "fo_person_",
+            Self::User => "fo_person_",
             Self::Session => "fo_session_",
             Self::Invitation => "fo_invite_",
         }
     }
 }
 
-/// A new token or code in the clear, to be handed out once.
+/// A new secret in clear text, shown once.
 pub struct Secret(String);
 
 impl Secret {
-    /// Draws a new token from the operating system's generator.
+    /// Draws a new secret from the operating system's random generator.
     ///
     /// # Errors
-    /// The operating system has no randomness to give.
+    /// The operating system provides no randomness.
     pub fn generate(kind: SecretKind) -> Result<Self, getrandom::Error> {
         let mut bytes = [0; 32];
         getrandom::fill(&mut bytes)?;
         Ok(Self(format!("{}{}", kind.prefix(), hex::encode(bytes))))
     }
 
-    /// The token itself.
+    /// The secret in clear text.
     #[must_use]
     pub fn as_str(&self) -> &str {
         &self.0
     }
 
-    /// What is stored.
+    /// The hash that the server stores.
     #[must_use]
     pub fn hash(&self) -> [u8; 32] {
         hash_token(&self.0)
@@ -66,7 +65,7 @@ impl fmt::Debug for Secret {
     }
 }
 
-/// BLAKE3 of a token's text.
+/// BLAKE3 of a secret's text.
 #[must_use]
 pub fn hash_token(token: &str) -> [u8; 32] {
     *blake3::hash(token.as_bytes()).as_bytes()
@@ -77,7 +76,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn tokens_differ_are_long_and_hide_in_debug_output() {
+    fn secrets_are_unique_and_hidden_in_debug_output() {
         let a = Secret::generate(SecretKind::Team).unwrap();
         let b = Secret::generate(SecretKind::Team).unwrap();
         assert_ne!(a.as_str(), b.as_str());

@@ -1,23 +1,23 @@
 use crate::format::FORMAT;
 use std::io;
 
-/// Why an archive was not read or written.
+/// Why an archive cannot be read or written.
 #[derive(Debug, thiserror::Error)]
 pub enum ArchiveError {
-    /// It is not what it should be; the text says what was expected and what came.
+    /// The archive is invalid; the text says what was expected and what was found.
     #[error("{0}")]
     Refused(String),
-    /// A later version of Faceoff made it.
+    /// A later version of Faceoff wrote the archive.
     #[error(
-        "the archive is of format {format} (made by {program:?}), and this program reads format {FORMAT} and older \
+        "the archive has format {format} (made by {program:?}), and this program reads format {FORMAT} and older \
          ones: use the version of Faceoff that made it, or a later one"
     )]
     Newer {
         format: u64,
-        /// What its manifest says of the program that made it.
+        /// Name and version of the program that wrote it, from the manifest.
         program: String,
     },
-    /// The disk failed us, or whoever the archive was written to went away.
+    /// The disk failed, or the receiver of the archive closed the connection.
     #[error(transparent)]
     Io(#[from] io::Error),
 }

@@ -1,2 +1,2 @@
-/// The newest format of archives that this program writes and reads.
+/// The archive format that this program writes, and the newest that it reads.
 pub const FORMAT: u32 = 1;

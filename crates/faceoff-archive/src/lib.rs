@@ -1,9 +1,8 @@
-//! The archive of a season: a `.tar.zst` with a manifest in front that names every file, its length and its hash.
+//! The archive of a season: a `.tar.zst` whose first file is a manifest with path, length and hash of all other files.
 //!
-//! [`Writer`] makes one on the way to wherever it goes and never holds more than a piece of it. [`check`] and
-//! [`unpack`] read one without trusting a byte of it: nothing but the files of its manifest, at plain relative paths,
-//! as long as they are said to be and with the hashes that they are said to have. What the files mean is not known
-//! here; `docs/archive.md` describes it.
+//! [`Writer`] streams an archive and holds only a small part of it in memory. [`check`] and [`unpack`] read untrusted
+//! archives: they accept only the files of the manifest, at plain relative paths, with the lengths and hashes of the
+//! manifest. The meaning of the files is not defined here but in `docs/archive.md`.
 
 mod error;
 mod format;

@@ -1,28 +1,28 @@
-//! What is in an archive.
+//! The manifest of an archive.
 
 use crate::{error::ArchiveError, format::FORMAT};
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
 use std::{collections::BTreeSet, fmt};
 
-/// The first file of an archive.
+/// Name of the first file of an archive.
 pub const MANIFEST_NAME: &str = "manifest.json";
 
-/// Longest manifest, in bytes: it is held in memory.
+/// Maximum length of a manifest in bytes, since it is held in memory.
 pub(crate) const MANIFEST_MAX_BYTES: u64 = 64 << 20;
-/// Most files of an archive.
+/// Maximum number of files in an archive.
 const MAX_FILES: usize = 500_000;
-/// Longest path: what a plain tar header holds whatever its parts are.
+/// Maximum length of a path that fits into a plain tar header regardless of its parts.
 const PATH_MAX_BYTES: usize = 155;
 const PART_MAX_BYTES: usize = 100;
 
-/// For whom an archive is.
+/// The readers that an archive is for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Edition {
-    /// For everybody: what a visitor without a token gets.
+    /// For the public: what a visitor without a token may read.
     Public,
-    /// For the organiser: all but secrets.
+    /// For the organiser: everything except secrets.
     Organiser,
 }
 
@@ -38,64 +38,64 @@ impl fmt::Display for Edition {
 /// The manifest of an archive.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Manifest {
-    /// [`FORMAT`] of the program that made it.
+    /// [`FORMAT`] of the program that wrote it.
     pub format: u32,
-    /// Name and version of that program.
+    /// Name and version of that program, for example `faceoff 0.1.0`.
     pub program: String,
     pub season: String,
-    /// The moment that the archive shows.
+    /// Time of the data in the archive.
     pub made_at: Timestamp,
-    /// For whom it is.
+    /// The readers that it is for.
     pub edition: Edition,
-    /// What somebody might look for in vain, in words.
+    /// Descriptions of data that readers may expect but that are not included.
     pub left_out: Vec<String>,
-    /// All other files, in their order.
+    /// All other files, in the sequence of the archive.
     pub files: Vec<Entry>,
 }
 
 /// A file of an archive.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Entry {
-    /// Relative, of ASCII letters, digits and `. _ -`, the parts separated by slashes.
+    /// Relative path of ASCII letters, digits and `. _ -`, with slashes between its parts.
     pub path: String,
     pub bytes: u64,
-    /// BLAKE3 of its content, 64 hexadecimal digits.
+    /// BLAKE3 hash of its content, 64 hexadecimal digits.
     pub blake3: String,
 }
 
 impl Manifest {
-    /// All files together, in bytes; at most `u64::MAX`.
+    /// Total length of all files in bytes, saturating.
     #[must_use]
     pub fn total_bytes(&self) -> u64 {
         let bytes = self.files.iter().map(|file| file.bytes);
         bytes.fold(0, u64::saturating_add)
     }
 
-    /// Reads a manifest that a stranger may have written.
+    /// Parses an untrusted manifest.
     pub(crate) fn parse(bytes: &[u8]) -> Result<Self, ArchiveError> {
-        // A later format may have another layout: of that, this is all that must stay.
+        // A later format may have another layout, but it keeps these fields.
         #[derive(Deserialize)]
         struct Head {
             format: u64,
             #[serde(default)]
             program: String,
         }
-        let broken = |error: serde_json::Error| {
+        let invalid = |error: serde_json::Error| {
             ArchiveError::Refused(format!(
                 "{MANIFEST_NAME} is not the manifest of a season's archive: {error}"
             ))
         };
-        let Head { format, program } = serde_json::from_slice(bytes).map_err(broken)?;
+        let Head { format, program } = serde_json::from_slice(bytes).map_err(invalid)?;
         if format > u64::from(FORMAT) {
             let program = program.chars().take(100).collect();
             return Err(ArchiveError::Newer { format, program });
         }
-        let manifest: Self = serde_json::from_slice(bytes).map_err(broken)?;
+        let manifest: Self = serde_json::from_slice(bytes).map_err(invalid)?;
         manifest.check()?;
         Ok(manifest)
     }
 
-    /// Refuses paths that could lead anywhere else, and what no hash is.
+    /// Checks the number of files, their paths and the format of the hashes.
     ///
     /// # Errors
     /// [`ArchiveError::Refused`].
@@ -106,7 +106,7 @@ impl Manifest {
                 self.files.len()
             )));
         }
-        // as it is written
+        // The length of the serialised form.
         let bytes = serde_json::to_vec_pretty(self).map_err(|error| {
             ArchiveError::Refused(format!("{MANIFEST_NAME} cannot be written: {error}"))
         })?;
@@ -119,23 +119,23 @@ impl Manifest {
         }
         let mut seen = BTreeSet::new();
         for file in &self.files {
-            let refuse = |why: &str| {
+            let refuse = |reason: &str| {
                 let shown: String = file.path.chars().take(200).collect();
                 Err(ArchiveError::Refused(format!(
-                    "{MANIFEST_NAME} names the file {shown:?}: {why}"
+                    "{MANIFEST_NAME} names the file {shown:?}: {reason}"
                 )))
             };
             if file.path == MANIFEST_NAME {
                 return refuse("the manifest does not name itself");
             }
-            if let Err(why) = check_path(&file.path) {
-                return refuse(why);
+            if let Err(reason) = check_path(&file.path) {
+                return refuse(reason);
             }
             if blake3::Hash::from_hex(&file.blake3).is_err() {
                 return refuse("its hash is not of 64 hexadecimal digits");
             }
             if !seen.insert(file.path.as_str()) {
-                return refuse("it does so twice");
+                return refuse("it is named twice");
             }
         }
         Ok(())
@@ -169,17 +169,17 @@ mod tests {
     use super::*;
 
     #[test]
-    fn only_plain_relative_paths_are_taken() {
+    fn path_must_be_plain_and_relative() {
         let deep = format!("{}/x", "a".repeat(101));
         let long = "ab/".repeat(60) + "x";
-        for good in [
+        for valid in [
             "a",
             "results/1-qualifying/board.json",
             "artifacts/d/A_b-9.zip",
         ] {
-            assert_eq!(check_path(good), Ok(()), "{good}");
+            assert_eq!(check_path(valid), Ok(()), "{valid}");
         }
-        for bad in [
+        for invalid in [
             "",
             "/etc/passwd",
             "../x",
@@ -194,7 +194,7 @@ mod tests {
             &deep,
             &long,
         ] {
-            assert!(check_path(bad).is_err(), "{bad:?}");
+            assert!(check_path(invalid).is_err(), "{invalid:?}");
         }
     }
 }

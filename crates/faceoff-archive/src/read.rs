@@ -1,4 +1,4 @@
-//! Reading an archive that a stranger may have made.
+//! Checking and unpacking untrusted archives.
 
 use crate::{
     error::ArchiveError,
@@ -16,19 +16,19 @@ use tar::EntryType;
 
 /// The first bytes of a zstd frame.
 const MAGIC: [u8; 4] = [0x28, 0xb5, 0x2f, 0xfd];
-/// How much memory unpacking may take: 2 to this power. It is what every decompressor allows.
+/// Maximum memory for decompression as a power of 2; all zstd decompressors support this window.
 const WINDOW_LOG: u32 = 27;
-/// How many times its own length an archive may unpack to …
+/// Maximum ratio of the unpacked to the packed length …
 const EXPANSION: u64 = 200;
-/// … and how many bytes more. Results and logs are text, the rest is compressed already.
+/// … plus this many bytes. Results and logs are text, other files are already compressed.
 const EXPANSION_EXTRA_BYTES: u64 = 256 << 20;
-/// Of each file, beside its content: its header and its padding.
-const BESIDE_BYTES: u64 = 1024;
-/// Behind the last file: the marks of the end, and the padding of a whole tar record.
+/// Maximum length of a file's header and padding.
+const OVERHEAD_BYTES: u64 = 1024;
+/// Maximum length of the data after the last file: end markers and padding of a whole tar record.
 const END_BYTES: u64 = 64 << 10;
-const PIECE_BYTES: usize = 256 << 10;
+const BUFFER_BYTES: usize = 256 << 10;
 
-/// Reads all of an archive and holds it against its manifest, writing nothing.
+/// Reads a whole archive and verifies it against its manifest, without writing files.
 ///
 /// # Errors
 /// As [`unpack`].
@@ -36,40 +36,41 @@ pub fn check(archive: &Path) -> Result<Manifest, ArchiveError> {
     read(archive, &|_| Ok(()), &|_| Ok(None))
 }
 
-/// Unpacks an archive into the empty folder `into`, where what is left after an error is worth nothing.
+/// Unpacks an archive into the empty folder `into`. After an error the content of the folder is invalid.
 ///
 /// # Errors
-/// [`ArchiveError::Refused`] for all that is not as its manifest says: another file, a link or a device, a path that
-/// leads elsewhere, another length or hash, a missing end, more than its length explains or than there is room for;
+/// [`ArchiveError::Refused`] if the archive differs from its manifest: another file, a link or device, a path outside of
+/// the folder, another length or hash, a missing end; or if it is too large for its packed length or the free disk space.
 /// [`ArchiveError::Newer`]; [`ArchiveError::Io`] if the disk fails.
 pub fn unpack(archive: &Path, into: &Path) -> Result<Manifest, ArchiveError> {
-    let fits = |manifest: &Manifest| {
+    let check_free_space = |manifest: &Manifest| {
         let disk = rustix::fs::statvfs(into).map_err(io::Error::from)?;
         let free_bytes = disk.f_bavail.saturating_mul(disk.f_frsize);
         let total_bytes = manifest.total_bytes();
         if total_bytes > free_bytes {
             return Err(ArchiveError::Refused(format!(
-                "the archive unpacks to {total_bytes} bytes, and {free_bytes} are free in {}: make room, or choose \
+                "the archive unpacks to {total_bytes} bytes, and {free_bytes} are free in {}: free some space, or choose \
                  a folder on another disk",
                 into.display()
             )));
         }
         Ok(())
     };
-    read(archive, &fits, &|entry| {
-        // Of plain parts, and nothing here makes a link: it stays inside.
-        let place = into.join(&entry.path);
-        if let Some(folder) = place.parent() {
+    read(archive, &check_free_space, &|entry| {
+        // The path has plain parts and no links are created, so it stays within the folder.
+        let path = into.join(&entry.path);
+        if let Some(folder) = path.parent() {
             fs::create_dir_all(folder)?;
         }
-        File::create_new(place).map(Some)
+        File::create_new(path).map(Some)
     })
 }
 
+/// Reads an archive. `accept` may refuse its manifest; `create` opens the file to write an entry to, if any.
 fn read(
     archive: &Path,
     accept: &dyn Fn(&Manifest) -> Result<(), ArchiveError>,
-    place: &dyn Fn(&Entry) -> io::Result<Option<File>>,
+    create: &dyn Fn(&Entry) -> io::Result<Option<File>>,
 ) -> Result<Manifest, ArchiveError> {
     let mut file = File::open(archive)?;
     let packed_bytes = file.metadata()?.len();
@@ -84,9 +85,9 @@ fn read(
         )));
     }
     let file = io::Cursor::new(head).chain(file);
-    let mut decoder = zstd::Decoder::with_buffer(BufReader::with_capacity(PIECE_BYTES, file))?;
+    let mut decoder = zstd::Decoder::with_buffer(BufReader::with_capacity(BUFFER_BYTES, file))?;
     decoder.window_log_max(WINDOW_LOG)?;
-    let allowed = Rc::new(Cell::new(MANIFEST_MAX_BYTES + BESIDE_BYTES + END_BYTES));
+    let allowed = Rc::new(Cell::new(MANIFEST_MAX_BYTES + OVERHEAD_BYTES + END_BYTES));
     let mut tar = tar::Archive::new(Bounded {
         inner: decoder,
         left: Rc::clone(&allowed),
@@ -94,33 +95,33 @@ fn read(
 
     let mut found: Option<Manifest> = None;
     let mut missing: BTreeMap<String, Entry> = BTreeMap::new();
-    // Raw: extensions of the format are entries like others, and refused with them.
+    // Raw: extensions of the tar format are listed as entries, and therefore refused.
     for entry in tar.entries()?.raw(true) {
-        let mut entry = entry.map_err(broken)?;
+        let mut entry = entry.map_err(read_error)?;
         let path = String::from_utf8_lossy(&entry.path_bytes()).into_owned();
         let shown: String = path.chars().take(200).collect();
         let kind = entry.header().entry_type();
         if kind != EntryType::Regular {
             return Err(ArchiveError::Refused(format!(
-                "the archive's entry {shown:?} is {}: a season's archive holds files only",
-                named(kind)
+                "the archive's entry {shown:?} is {}: a season's archive contains only files",
+                kind_label(kind)
             )));
         }
         if found.is_none() {
-            let manifest = first(&mut entry, &path)?;
+            let manifest = read_manifest(&mut entry, &path)?;
             let total_bytes = manifest.total_bytes();
-            let most = packed_bytes
+            let max_bytes = packed_bytes
                 .saturating_mul(EXPANSION)
                 .saturating_add(EXPANSION_EXTRA_BYTES);
-            if total_bytes > most {
+            if total_bytes > max_bytes {
                 return Err(ArchiveError::Refused(format!(
-                    "{MANIFEST_NAME} tells of {total_bytes} bytes, which an archive of {packed_bytes} bytes does not \
-                     explain: at most {most} are allowed"
+                    "{MANIFEST_NAME} names files with {total_bytes} bytes, too many for an archive of {packed_bytes} \
+                     bytes: at most {max_bytes} are allowed"
                 )));
             }
             accept(&manifest)?;
-            let beside = BESIDE_BYTES.saturating_mul(manifest.files.len() as u64);
-            allowed.set(total_bytes.saturating_add(beside).saturating_add(END_BYTES));
+            let overhead = OVERHEAD_BYTES.saturating_mul(manifest.files.len() as u64);
+            allowed.set(total_bytes.saturating_add(overhead).saturating_add(END_BYTES));
             missing = manifest
                 .files
                 .iter()
@@ -129,12 +130,12 @@ fn read(
             found = Some(manifest);
             continue;
         }
-        let Some(wanted) = missing.remove(&path) else {
+        let Some(expected) = missing.remove(&path) else {
             return Err(ArchiveError::Refused(format!(
-                "the archive holds {shown:?}, which {MANIFEST_NAME} does not name, or a second time"
+                "the archive contains {shown:?}, which {MANIFEST_NAME} does not name, or contains it twice"
             )));
         };
-        take(&mut entry, &wanted, place(&wanted)?)?;
+        copy_verified(&mut entry, &expected, create(&expected)?)?;
     }
     let Some(manifest) = found else {
         return Err(ArchiveError::Refused(format!(
@@ -143,17 +144,17 @@ fn read(
     };
     if let Some(path) = missing.keys().next() {
         return Err(ArchiveError::Refused(format!(
-            "the archive ends before {} of its files, {path:?} among them: it was cut off, copy or make it again",
+            "the archive ends before {} of its files, {path:?} among them: it is truncated, copy or create it again",
             missing.len()
         )));
     }
-    // The last bytes hold the sum of all.
-    io::copy(&mut tar.into_inner(), &mut io::sink()).map_err(broken)?;
+    // Read to the end, where the checksum of the zstd frame is.
+    io::copy(&mut tar.into_inner(), &mut io::sink()).map_err(read_error)?;
     Ok(manifest)
 }
 
-/// The manifest, which comes first.
-fn first(entry: &mut tar::Entry<'_, impl Read>, path: &str) -> Result<Manifest, ArchiveError> {
+/// Reads the manifest from the first entry.
+fn read_manifest(entry: &mut tar::Entry<'_, impl Read>, path: &str) -> Result<Manifest, ArchiveError> {
     if path != MANIFEST_NAME {
         let shown: String = path.chars().take(200).collect();
         return Err(ArchiveError::Refused(format!(
@@ -167,41 +168,41 @@ fn first(entry: &mut tar::Entry<'_, impl Read>, path: &str) -> Result<Manifest, 
         )));
     }
     let mut json = Vec::new();
-    entry.read_to_end(&mut json).map_err(broken)?;
+    entry.read_to_end(&mut json).map_err(read_error)?;
     Manifest::parse(&json)
 }
 
-/// Copies a file to its place, if it has one, and holds it against what is said of it.
-fn take(
+/// Copies an entry to `target`, if there is one, and verifies its length and hash.
+fn copy_verified(
     entry: &mut tar::Entry<'_, impl Read>,
-    wanted: &Entry,
+    expected: &Entry,
     mut target: Option<File>,
 ) -> Result<(), ArchiveError> {
-    if entry.size() != wanted.bytes {
+    if entry.size() != expected.bytes {
         return Err(ArchiveError::Refused(format!(
-            "{} has {} bytes in the archive: {MANIFEST_NAME} tells of {}",
-            wanted.path,
+            "{} has {} bytes in the archive, but {} in {MANIFEST_NAME}",
+            expected.path,
             entry.size(),
-            wanted.bytes
+            expected.bytes
         )));
     }
     let mut hasher = blake3::Hasher::new();
-    let mut piece = vec![0; PIECE_BYTES];
+    let mut buffer = vec![0; BUFFER_BYTES];
     loop {
-        let read = entry.read(&mut piece).map_err(broken)?;
+        let read = entry.read(&mut buffer).map_err(read_error)?;
         if read == 0 {
             break;
         }
-        hasher.update(&piece[..read]);
+        hasher.update(&buffer[..read]);
         if let Some(target) = &mut target {
-            target.write_all(&piece[..read])?;
+            target.write_all(&buffer[..read])?;
         }
     }
     let hash = hasher.finalize().to_string();
-    if hash != wanted.blake3.to_lowercase() {
+    if hash != expected.blake3.to_lowercase() {
         return Err(ArchiveError::Refused(format!(
-            "{} has the hash {hash}: {MANIFEST_NAME} tells of {}; the archive is damaged or was changed",
-            wanted.path, wanted.blake3
+            "{} has the hash {hash}, but {} in {MANIFEST_NAME}; the archive is damaged or was changed",
+            expected.path, expected.blake3
         )));
     }
     if let Some(target) = target {
@@ -210,7 +211,7 @@ fn take(
     Ok(())
 }
 
-fn named(kind: EntryType) -> &'static str {
+fn kind_label(kind: EntryType) -> &'static str {
     match kind {
         EntryType::Symlink | EntryType::Link => "a link",
         EntryType::Directory => "a folder",
@@ -221,14 +222,14 @@ fn named(kind: EntryType) -> &'static str {
     }
 }
 
-/// What goes wrong while reading is the archive's, as far as can be told.
-fn broken(error: io::Error) -> ArchiveError {
+/// An error while reading is attributed to the archive, not to the disk.
+fn read_error(error: io::Error) -> ArchiveError {
     ArchiveError::Refused(format!(
-        "the archive cannot be read to its end: {error}. It was cut off or is damaged: copy or make it again"
+        "the archive cannot be read to its end: {error}. It is truncated or damaged: copy or create it again"
     ))
 }
 
-/// Gives up to so many bytes, then an error.
+/// Reads up to `left` bytes, then fails if there are more.
 struct Bounded<R> {
     inner: R,
     left: Rc<Cell<u64>>,
@@ -240,11 +241,11 @@ impl<R: Read> Read for Bounded<R> {
         if left == 0 && !buffer.is_empty() {
             return match self.inner.read(&mut [0])? {
                 0 => Ok(0),
-                _ => Err(io::Error::other("it is longer than its manifest tells")),
+                _ => Err(io::Error::other("it is longer than its manifest says")),
             };
         }
-        let most = usize::try_from(left).map_or(buffer.len(), |left| left.min(buffer.len()));
-        let read = self.inner.read(&mut buffer[..most])?;
+        let max = usize::try_from(left).map_or(buffer.len(), |left| left.min(buffer.len()));
+        let read = self.inner.read(&mut buffer[..max])?;
         self.left.set(left - read as u64);
         Ok(read)
     }

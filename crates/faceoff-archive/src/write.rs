@@ -1,4 +1,4 @@
-//! Making an archive, piece by piece.
+//! Streaming an archive.
 
 use crate::{
     error::ArchiveError,
@@ -6,7 +6,7 @@ use crate::{
 };
 use std::io::{self, Read, Write};
 
-/// Most of an archive is compressed already.
+/// A low compression level, since most files are already compressed.
 const LEVEL: i32 = 3;
 
 /// Writes an archive's files in the order of its manifest.
@@ -17,10 +17,10 @@ pub struct Writer<W: Write> {
 }
 
 impl<W: Write> Writer<W> {
-    /// Begins with the manifest, which names all that will follow.
+    /// Writes the manifest, which lists all files that will follow.
     ///
     /// # Errors
-    /// [`ArchiveError::Refused`] if the manifest breaks its own rules; [`ArchiveError::Io`].
+    /// [`ArchiveError::Refused`] if the manifest is invalid; [`ArchiveError::Io`].
     pub fn begin(out: W, manifest: &Manifest) -> Result<Self, ArchiveError> {
         manifest.check()?;
         let mut encoder = zstd::Encoder::new(out, LEVEL)?;
@@ -36,10 +36,10 @@ impl<W: Write> Writer<W> {
         Ok(writer)
     }
 
-    /// The next file of the manifest, which `open` is asked for by its entry; false after the last one.
+    /// Writes the next file of the manifest, with the content from `open`; returns false after the last one.
     ///
     /// # Errors
-    /// [`ArchiveError::Refused`] if its content is not what the manifest says: the archive is worth nothing then.
+    /// [`ArchiveError::Refused`] if its content differs from the manifest: the archive is invalid then.
     pub fn next<R: Read>(
         &mut self,
         open: impl FnOnce(&Entry) -> io::Result<R>,
@@ -56,17 +56,17 @@ impl<W: Write> Writer<W> {
         };
         self.tar.append(&header, &mut hashed)?;
         let (bytes, hash) = (hashed.bytes, hashed.hasher.finalize().to_string());
-        let goes_on = content.read(&mut [0])? > 0;
-        if bytes != entry.bytes || goes_on || hash != entry.blake3 {
+        let has_more = content.read(&mut [0])? > 0;
+        if bytes != entry.bytes || has_more || hash != entry.blake3 {
             return Err(ArchiveError::Refused(format!(
-                "{} is not what it was when its hash was taken ({} bytes, {}): it was changed or is damaged",
+                "{} differs from the manifest ({} bytes, hash {}): it was changed or is damaged",
                 entry.path, entry.bytes, entry.blake3
             )));
         }
         Ok(true)
     }
 
-    /// Ends the archive and gives back what it was written to.
+    /// Completes the archive and returns the underlying writer.
     ///
     /// # Errors
     /// [`ArchiveError::Io`].
@@ -87,7 +87,7 @@ impl<W: Write> Writer<W> {
     }
 }
 
-/// Counts and hashes what is read through it.
+/// Counts and hashes the bytes read through it.
 struct Hashed<R> {
     content: R,
     hasher: blake3::Hasher,

@@ -4,12 +4,12 @@
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use faceoff_dataset::{Dataset, Recorder, ShardFolder, ShardReport, assemble};
-use faceoff_episode::{Answered, EpisodeStart, StepRow, StepSink};
+use faceoff_episode::{AnswerTiming, EpisodeStart, StepRow, StepSink};
 use faceoff_sim::{Episode, Interpolation, PerturbationSettings, Plant};
 use faceoff_types::{
     ComputationTime, EpisodeEnd, EpisodeOutcome, Profile, Ruleset, Seed, Task, Violations,
 };
-use faceoff_wire::work::{EvaluationMeta, ShardSpec};
+use faceoff_wire::job::{EvaluationMeta, ShardSpec};
 use std::{hint::black_box, path::Path};
 
 const EPISODES: u32 = 1000;
@@ -47,7 +47,7 @@ fn record(spec: &ShardSpec, out: &Path) {
             recorder.step(&StepRow {
                 step,
                 action: &[state.q, state.dq].concat(),
-                answered: Answered {
+                timing: AnswerTiming {
                     computation_time_s: 1e-3,
                     host_time_s: 0.0,
                     cpu_time_s: Some(5e-4),

@@ -17,7 +17,7 @@ use crate::{
 use faceoff_types::{EvaluationResult, Task};
 use faceoff_wire::{
     dataset::{CalibrationFile, DATASET_SCHEMA, DatasetManifest, FileDigest, ShardCalibration},
-    work::EvaluationMeta,
+    job::EvaluationMeta,
 };
 use fs_err as fs;
 use std::{
@@ -104,7 +104,7 @@ fn join_clips(shards: &[ShardRecording], path: &Path) -> Result<bool, RecordingE
     if packs.is_empty() {
         return Ok(false);
     }
-    let out = faceoff_replay::join(&packs, BufWriter::new(fs::File::create(path)?))?;
+    let out = faceoff_replay::join_packs(&packs, BufWriter::new(fs::File::create(path)?))?;
     let file = out.into_inner().map_err(io::IntoInnerError::into_error)?;
     file.sync_all()?;
     Ok(true)

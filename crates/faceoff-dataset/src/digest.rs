@@ -1,5 +1,5 @@
 use crate::times::nanoseconds;
-use faceoff_episode::Answered;
+use faceoff_episode::AnswerTiming;
 use faceoff_wire::dataset::FileDigest;
 use std::{
     io::{self, Write},
@@ -57,7 +57,7 @@ impl StepDigests {
     /// Adds an answered step: the action's numbers as little-endian doubles; the computation time and
     /// the CPU time in nanoseconds as little-endian 64-bit integers, −1 for a CPU time that is not
     /// known, then, if the host took some of the time, −2 and that time.
-    pub fn add(&mut self, action: &[f64], answered: &Answered) {
+    pub fn add(&mut self, action: &[f64], answered: &AnswerTiming) {
         for number in action {
             self.actions.update(&number.to_le_bytes());
         }

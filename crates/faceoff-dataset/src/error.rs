@@ -1,5 +1,5 @@
 use faceoff_replay::ReplayError;
-use faceoff_types::tells_of_full_disk;
+use faceoff_types::is_full_disk;
 use std::{error::Error, fmt::Display, io};
 
 /// A recording that could not be made or joined; never the agent's fault.
@@ -21,7 +21,7 @@ impl RecordingError {
     pub(crate) fn unusable<E: Error + 'static>(what: impl Display) -> impl FnOnce(E) -> Self {
         move |error| {
             let text = format!("{what}: {error}");
-            if tells_of_full_disk(&error) {
+            if is_full_disk(&error) {
                 Self::FullDisk(text)
             } else {
                 Self::Unusable(text)

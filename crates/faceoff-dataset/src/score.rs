@@ -11,7 +11,7 @@ use arrow_array::{
     cast::AsArray,
     types::{Float64Type, Int64Type, UInt32Type},
 };
-use faceoff_episode::Answered;
+use faceoff_episode::AnswerTiming;
 use faceoff_scoring::StepTimes;
 use faceoff_types::{
     ComputationTime, EpisodeEnd, EpisodeOutcome, EvaluationResult, Profile, Ruleset, Seed,
@@ -26,7 +26,7 @@ use std::{collections::BTreeMap, path::Path};
 /// What scoring needs of one answered step.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Measured {
-    pub answered: Answered,
+    pub answered: AnswerTiming,
     /// Joint position, joint velocity, end effector, link height; violated when above 0.
     pub constraints: [f64; 4],
 }
@@ -56,7 +56,7 @@ impl Tally {
             outcomes: Vec::new(),
             times: match layout {
                 Layout::Two => Times::FromTheShortestOn(Vec::new()),
-                Layout::Three | Layout::Four => Times::InOrderOfPlay(StepTimes::of(steps)),
+                Layout::Three | Layout::Four => Times::InOrderOfPlay(StepTimes::for_steps(steps)),
             },
             violations: Default::default(),
             slowest: (layout == Layout::Four).then(BTreeMap::new),
@@ -68,7 +68,7 @@ impl Tally {
     }
 
     pub fn add_step(&mut self, episode: u32, step: u32, measured: &Measured) {
-        let Answered {
+        let AnswerTiming {
             computation_time_s,
             host_time_s,
             cpu_time_s,
@@ -140,7 +140,7 @@ impl Tally {
         let constraints = CONSTRAINTS.map(|name| batch[name].as_primitive::<Float64Type>());
         for row in 0..batch.num_rows() {
             let measured = Measured {
-                answered: Answered {
+                answered: AnswerTiming {
                     computation_time_s: seconds(times.value(row)),
                     host_time_s: seconds(host_times.value(row)),
                     cpu_time_s: cpu_times
@@ -168,7 +168,7 @@ impl Times {
             Self::InOrderOfPlay(times) => times,
             Self::FromTheShortestOn(mut times) => {
                 times.sort_unstable_by(f64::total_cmp);
-                let mut summary = StepTimes::of(times.len() as u64);
+                let mut summary = StepTimes::for_steps(times.len() as u64);
                 times.into_iter().for_each(|time_s| summary.add(time_s));
                 summary
             }

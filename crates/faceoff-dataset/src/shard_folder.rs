@@ -9,7 +9,7 @@ use crate::{
 use faceoff_types::Ruleset;
 use faceoff_wire::{
     dataset::{FileDigest, SimulatorId},
-    work::ShardSpec,
+    job::ShardSpec,
 };
 use fs_err::{self as fs, File};
 use serde::{Deserialize, Serialize};

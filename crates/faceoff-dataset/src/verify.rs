@@ -64,7 +64,7 @@ pub fn verify(
     let mut feed = Feed::open(dataset)?;
     let mut totals = Totals::new(dataset, feed.steps_of_tasks());
     let manifest = dataset.manifest();
-    let arena = Arena::by(
+    let arena = Arena::with_ruleset(
         ruleset,
         manifest.profile,
         &manifest.variation.perturbations,

@@ -1,8 +1,8 @@
 use faceoff_sim::{Bounds, Episode, Game, GameSetup, PerturbationSettings, Plant};
 use faceoff_types::{Factors, Interpolation, Profile, Ruleset, Seed, Task};
 
-/// What all episodes of an evaluation share, or all rallies of a game: the rules, the perturbations, the season's plant and the
-/// seed that theirs derive from.
+/// Common settings of all episodes of an evaluation or all rallies of a game: rules, perturbations, the season's plant and
+/// the seed from which the seeds of episodes and rallies are derived.
 #[derive(Debug, Clone)]
 pub struct Arena {
     bounds: Bounds,
@@ -13,17 +13,17 @@ pub struct Arena {
 }
 
 impl Arena {
-    /// By the current ruleset, with its magnitudes.
+    /// An arena with the current ruleset and its magnitudes.
     #[must_use]
     pub fn new(profile: Profile, seed: Seed, mismatch_seed: Seed) -> Self {
         let magnitudes = PerturbationSettings::default();
-        Self::by(Ruleset::CURRENT, profile, &magnitudes, seed, mismatch_seed)
+        Self::with_ruleset(Ruleset::CURRENT, profile, &magnitudes, seed, mismatch_seed)
     }
 
-    /// By a ruleset, with magnitudes of the factors that the profile switches on. Draws the plant, which takes
-    /// milliseconds: make one, play many.
+    /// An arena with a ruleset, and magnitudes for the factors of the profile. Drawing the plant takes milliseconds, so use an
+    /// arena for many episodes.
     #[must_use]
-    pub fn by(
+    pub fn with_ruleset(
         ruleset: Ruleset,
         profile: Profile,
         magnitudes: &PerturbationSettings,
@@ -40,13 +40,13 @@ impl Arena {
         }
     }
 
-    /// The same within other bounds than the ruleset's.
+    /// Replaces the ruleset's bounds on the simulated world.
     #[must_use]
-    pub fn within(self, bounds: Bounds) -> Self {
+    pub fn with_bounds(self, bounds: Bounds) -> Self {
         Self { bounds, ..self }
     }
 
-    /// An episode's own seed; `index` counts within the evaluation.
+    /// The seed of an episode; `index` is its index within the evaluation.
     pub(crate) fn seed(&self, task: Task, index: u32) -> Seed {
         self.seed.episode(task, index)
     }
@@ -65,7 +65,7 @@ impl Arena {
         .within(self.bounds)
     }
 
-    /// A game at the start of its first rally; the seed is the game's own.
+    /// A game at the start of its first rally. The arena's seed must be the game's.
     #[must_use]
     pub fn game(&self, interpolation: [Interpolation; 2]) -> Game {
         Game::new(GameSetup {

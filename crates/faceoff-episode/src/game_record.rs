@@ -1,100 +1,100 @@
-//! What goes into a game from outside, and what is recorded of it. Pairs are the first side's first.
+//! Inputs of a game, and its recording. In pairs, the first side comes first.
 
-use crate::record::{Answered, Nowhere, RecordError};
+use crate::record::{AnswerTiming, NullSink, RecordError};
 use faceoff_sim::{ConstraintValues, GameState, Impact, RallyEnd};
 use faceoff_types::{AgentFault, AgentFaultKind, Interpolation, Side};
 
-/// What a side did wrong, before anybody has said where.
+/// A fault of a side, without its position in the game.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SideFault {
     pub kind: AgentFaultKind,
-    /// The offending line, cut, where there was one.
+    /// The offending line, if there was one, shortened.
     pub line: Option<String>,
 }
 
-/// What came of a side's getting ready for a rally. Times are its own, in seconds; a start-up is there only
-/// if it had to be started.
+/// The result of a side's getting ready for a rally. Times are in seconds, without those of the opponent. The start-up time
+/// is present if the agent had to be started.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Entry {
-    Plays {
+pub enum RallyEntry {
+    Ready {
         startup_s: Option<f64>,
-        /// What its actions mean.
+        /// Interpolation of its actions.
         interpolation: Interpolation,
         reset_s: f64,
     },
-    /// It did not start: its arm holds.
-    FailedToStart {
-        /// Until it was given up.
+    /// The agent did not start, so its arm holds.
+    StartFailed {
+        /// Time until the failure.
         startup_s: f64,
         fault: SideFault,
     },
-    /// It did not get ready: its arm holds.
-    FailedToReset {
+    /// The agent did not answer `reset` correctly, so its arm holds.
+    ResetFailed {
         startup_s: Option<f64>,
-        /// What its actions would have meant.
+        /// Interpolation stated by the agent.
         interpolation: Interpolation,
-        /// Until it was given up.
+        /// Time until the failure.
         reset_s: f64,
         fault: SideFault,
     },
 }
 
-impl Entry {
-    /// All of its time, in seconds.
+impl RallyEntry {
+    /// Total time, in seconds.
     #[must_use]
     pub fn time_s(&self) -> f64 {
         match self {
-            Self::Plays {
+            Self::Ready {
                 startup_s, reset_s, ..
             }
-            | Self::FailedToReset {
+            | Self::ResetFailed {
                 startup_s, reset_s, ..
             } => startup_s.unwrap_or_default() + reset_s,
-            Self::FailedToStart { startup_s, .. } => *startup_s,
+            Self::StartFailed { startup_s, .. } => *startup_s,
         }
     }
 
-    /// What its actions mean, if it got as far as to say.
+    /// The interpolation, if the agent stated one.
     #[must_use]
     pub const fn interpolation(&self) -> Option<Interpolation> {
         match self {
-            Self::Plays { interpolation, .. } | Self::FailedToReset { interpolation, .. } => {
+            Self::Ready { interpolation, .. } | Self::ResetFailed { interpolation, .. } => {
                 Some(*interpolation)
             }
-            Self::FailedToStart { .. } => None,
+            Self::StartFailed { .. } => None,
         }
     }
 }
 
-/// What came from a side in a control step.
+/// A side's response in a control step.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Response<'a> {
-    /// An answer, in time or not.
+    /// An answer, possibly late.
     Answer {
-        /// Row-major, of the interpolation's length, finite.
+        /// Row-major, finite, with the length of the interpolation.
         action: &'a [f64],
-        /// How long it took.
-        answered: Answered,
+        /// Times of the answer.
+        timing: AnswerTiming,
     },
-    /// No answer that is one: from now on its arm holds, to the rally's end.
+    /// No valid answer: its arm holds until the end of the rally.
     Fault {
         fault: SideFault,
-        /// For how long it was waited for.
-        answered: Answered,
+        /// Times until the fault.
+        timing: AnswerTiming,
     },
-    /// It was not asked: its arm holds since an earlier fault in this rally.
+    /// No answer was due, since its arm holds after an earlier fault in this rally.
     Held,
 }
 
-/// Which command took effect in a control step.
+/// The effect of a response in a control step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Effect {
     InTime,
-    /// The answer came too late: the previous position, at rest.
+    /// The answer was late: the arm holds its previous position.
     Late,
-    /// There was no answer: the previous position, at rest.
+    /// There was no valid answer: the arm holds its previous position.
     Fault,
-    /// There was no question: the previous position, at rest.
+    /// No answer was due: the arm holds its previous position.
     Held,
 }
 
@@ -112,17 +112,17 @@ impl Effect {
     }
 }
 
-/// How a rally begins.
+/// The start of a rally.
 #[derive(Debug, Clone, Copy)]
 pub struct RallyStart<'a> {
-    /// From 0.
+    /// Number of the rally, from 0.
     pub rally: u32,
-    /// Control steps that the game has played before.
+    /// Control steps of the game before the rally.
     pub game_step: u32,
-    /// On whose side the puck lies.
+    /// The side on which the puck lies.
     pub serves: Side,
-    /// What came of getting ready.
-    pub entries: &'a [Entry; 2],
+    /// How the sides got ready.
+    pub entries: &'a [RallyEntry; 2],
     /// The true initial state.
     pub state: &'a GameState,
 }
@@ -130,38 +130,37 @@ pub struct RallyStart<'a> {
 /// A side's part in a control step.
 #[derive(Debug, Clone, Copy)]
 pub struct SideStep<'a> {
-    /// Which command took effect.
+    /// The effect of its response.
     pub effect: Effect,
-    /// What it answered, if it did, also too late.
+    /// The action of its answer, even if late.
     pub action: Option<&'a [f64]>,
-    /// How long it was waited for, if it was asked.
-    pub answered: Option<Answered>,
-    /// Its robot's constraints after the step; violated when above 0.
+    /// Times of the response, if an answer was due.
+    pub timing: Option<AnswerTiming>,
+    /// Constraint values of its robot after the step; violated if above 0.
     pub constraints: ConstraintValues,
 }
 
-/// A control step; the observations were given before.
+/// A control step. Its observations were passed to [`GameSink::observe`] before.
 #[derive(Debug, Clone, Copy)]
 pub struct GameStepRow<'a> {
     /// The game's control step, from 0.
     pub game_step: u32,
     pub rally: u32,
-    /// The rally's control step, from 0: the one that agents are told.
+    /// Control step within the rally, from 0, as in the messages to agents.
     pub step: u32,
-    /// What each side did.
     pub sides: [SideStep<'a>; 2],
     /// The true state after the step.
     pub state: &'a GameState,
-    /// Had tracking lost the puck after the step, for both?
+    /// Had tracking lost the puck after the step, for both sides?
     pub puck_lost: bool,
-    /// The contacts of the puck that began in the step.
+    /// Contacts of the puck that began in the step.
     pub impacts: &'a [Impact],
 }
 
-/// Why a rally is over.
+/// Why a rally ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum RallyEnding {
-    /// By what happened on the table.
+    /// An event on the table.
     Table(RallyEnd),
     /// The game is over.
     GameOver,
@@ -180,7 +179,7 @@ impl RallyEnding {
         }
     }
 
-    /// The side that scored or fouled.
+    /// The side that scored or committed the foul.
     #[must_use]
     pub fn by(self) -> Option<Side> {
         match self {
@@ -190,35 +189,35 @@ impl RallyEnding {
     }
 }
 
-/// A rally that is over.
+/// A finished rally.
 #[derive(Debug, Clone, Copy)]
 pub struct RallyRow<'a> {
-    /// From 0.
+    /// Number of the rally, from 0.
     pub rally: u32,
     pub steps: u32,
-    /// Why it is over.
+    /// Why it ended.
     pub ending: RallyEnding,
-    /// The fault of each side in it; there is at most one.
+    /// The fault of each side in the rally; at most one per side.
     pub faults: [Option<&'a AgentFault>; 2],
-    /// The final score so far, points for fouls included.
+    /// The score after the rally, including points for fouls.
     pub score: [u32; 2],
 }
 
-/// Where a game's course goes.
+/// Receives the rallies and steps of a game, e.g. to record them.
 pub trait GameSink {
-    /// A rally begins.
+    /// Starts a rally.
     ///
     /// # Errors
-    /// It could not be recorded; so of the others.
+    /// If the recording could not be written.
     fn begin_rally(&mut self, start: &RallyStart<'_>) -> Result<(), RecordError>;
-    /// What both sides observe before the step, whether they are asked or not.
+    /// The observations of both sides before the step, even if a side has no answer due.
     fn observe(&mut self, observations: [&[f64]; 2]);
-    /// The step that followed.
+    /// The step after the observations.
     ///
     /// # Errors
     /// As [`Self::begin_rally`].
     fn step(&mut self, row: &GameStepRow<'_>) -> Result<(), RecordError>;
-    /// The rally is over.
+    /// Ends the rally.
     ///
     /// # Errors
     /// As [`Self::begin_rally`].
@@ -240,7 +239,7 @@ impl<S: GameSink + ?Sized> GameSink for &mut S {
     }
 }
 
-impl GameSink for Nowhere {
+impl GameSink for NullSink {
     fn begin_rally(&mut self, _: &RallyStart<'_>) -> Result<(), RecordError> {
         Ok(())
     }

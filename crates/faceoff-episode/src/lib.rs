@@ -1,24 +1,24 @@
-//! Plays episodes and games from answers, wherever they come from: a process, a recording, a program in the same
-//! address space. What an episode or a game leads to and what is recorded of it is decided here, once.
+//! Runs episodes and games from answers, which may come from a process, a recording or a function. The effects of answers
+//! and the content of recordings are decided here, and only here.
 //!
 //! This crate starts no process, opens no file and reads no clock.
 
 mod arena;
-mod course;
-mod game_course;
+mod running_episode;
+mod running_game;
 mod game_record;
-mod game_side;
+mod running_side;
 mod record;
 mod time_sum;
-mod why;
+mod end_description;
 
 pub use arena::Arena;
-pub use course::{Course, NotFinite, Question};
-pub use game_course::{FinishedGame, GameCourse};
+pub use running_episode::{RunningEpisode, NonFiniteObservation, Question};
+pub use running_game::{FinishedGame, RunningGame};
 pub use game_record::{
-    Effect, Entry, GameSink, GameStepRow, RallyEnding, RallyRow, RallyStart, Response, SideFault,
+    Effect, RallyEntry, GameSink, GameStepRow, RallyEnding, RallyRow, RallyStart, Response, SideFault,
     SideStep,
 };
-pub use record::{Answered, EpisodeStart, Nowhere, RecordError, StepRow, StepSink};
+pub use record::{AnswerTiming, EpisodeStart, NullSink, RecordError, StepRow, StepSink};
 pub use time_sum::TimeSum;
-pub use why::why_it_ended;
+pub use end_description::describe_end;

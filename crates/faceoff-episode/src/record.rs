@@ -1,55 +1,55 @@
-//! What is recorded of an episode, and where it goes.
+//! Recording of episodes.
 
 use faceoff_sim::{ConstraintValues, EpisodeState, Impact};
 use faceoff_types::{EpisodeOutcome, Interpolation, Seed};
 
-/// The measurements of one answered step.
+/// Measured times of one answer.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Answered {
-    /// What counts: wall time from the first attempt to write the question to the last byte of the answer
-    /// read, less what the host took, in seconds.
+pub struct AnswerTiming {
+    /// Computation time in seconds: wall time from the first attempt to write the observation to the last byte of the answer,
+    /// minus host interference.
     pub computation_time_s: f64,
-    /// What the host took of the wall time, in seconds.
+    /// Part of the wall time due to host interference, in seconds.
     pub host_time_s: f64,
-    /// CPU time that the agent's process tree used meanwhile, in seconds, where the host tells.
+    /// CPU time of the agent's process tree in that time, in seconds, if the host reports it.
     pub cpu_time_s: Option<f64>,
 }
 
-/// How an episode begins.
+/// The start of an episode.
 #[derive(Debug, Clone, Copy)]
 pub struct EpisodeStart<'a> {
     /// Index within the evaluation.
     pub episode: u32,
     /// The episode's own seed.
     pub seed: Seed,
-    /// `None` when the agent did not get as far as to say.
+    /// `None` if the agent failed before it stated one.
     pub interpolation: Option<Interpolation>,
     /// The true initial state.
     pub state: &'a EpisodeState,
 }
 
-/// One answered control step; the observation was given before.
+/// An answered control step. Its observation was passed to [`StepSink::observe`] before.
 #[derive(Debug, Clone, Copy)]
 pub struct StepRow<'a> {
     /// The control step, from 0.
     pub step: u32,
     /// The agent's action, row-major.
     pub action: &'a [f64],
-    /// How long the answer took.
-    pub answered: Answered,
+    /// Times of the answer.
+    pub timing: AnswerTiming,
     /// The true state after the step.
     pub state: &'a EpisodeState,
-    /// The constraints at that state; violated when above 0.
+    /// Constraint values after the step; violated if above 0.
     pub constraints: ConstraintValues,
     /// The observation after the step.
     pub next_observation: &'a [f64],
-    /// Had tracking lost the puck after the step? Its observation then repeats an earlier place.
+    /// Had tracking lost the puck after the step? Then the observation repeats an earlier pose.
     pub puck_lost: bool,
-    /// The contacts of the puck that began in the step.
+    /// Contacts of the puck that began in the step.
     pub impacts: &'a [Impact],
 }
 
-/// A recording that could not be written; never the agent's fault.
+/// A failure to write a recording; never an agent fault.
 #[derive(Debug, thiserror::Error)]
 #[error("{what}: {source}")]
 pub struct RecordError {
@@ -57,18 +57,18 @@ pub struct RecordError {
     pub source: Box<dyn std::error::Error + Send + Sync>,
 }
 
-/// Where an episode's course goes.
+/// Receives the start, the steps and the end of episodes, e.g. to record them.
 pub trait StepSink {
-    /// Begins an episode. What was begun before and has not ended is dropped: it is played again.
+    /// Starts an episode. A previous one without an end is discarded, since it is repeated.
     fn begin(&mut self, start: EpisodeStart<'_>);
-    /// The observation that the agent was given, before the step.
+    /// The observation for the agent, before the step.
     fn observe(&mut self, observation: &[f64]);
-    /// The step that followed.
+    /// The step after the observation.
     fn step(&mut self, row: &StepRow<'_>);
-    /// Ends it; `host_noise_reruns` tries were dropped before this one.
+    /// Ends the episode. `host_noise_reruns` is the number of discarded tries before this one.
     ///
     /// # Errors
-    /// The recording could not be written.
+    /// If the recording could not be written.
     fn end(&mut self, outcome: &EpisodeOutcome, host_noise_reruns: u32) -> Result<(), RecordError>;
 }
 
@@ -87,10 +87,11 @@ impl<S: StepSink + ?Sized> StepSink for &mut S {
     }
 }
 
+/// Discards everything.
 #[derive(Debug, Clone, Copy)]
-pub struct Nowhere;
+pub struct NullSink;
 
-impl StepSink for Nowhere {
+impl StepSink for NullSink {
     fn begin(&mut self, _: EpisodeStart<'_>) {}
     fn observe(&mut self, _: &[f64]) {}
     fn step(&mut self, _: &StepRow<'_>) {}

@@ -1,6 +1,6 @@
 use faceoff_types::ComputationTime;
 
-/// Computation times of one episode, summed up.
+/// Sum, maximum and number of computation times.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct TimeSum {
     sum_s: f64,
@@ -35,7 +35,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn times_are_summed_up_as_they_were() {
+    fn time_sum_has_mean_and_maximum() {
         let mut times = TimeSum::default();
         assert_eq!(times.summary(), ComputationTime::default());
         times.add(0.03);

@@ -1,5 +1,4 @@
-//! How many requests are answered at a time, and which are refused when there are too many: quickly, and those first that
-//! only look on.
+//! Limits the requests in flight. Under overload requests are refused at once, and those that only read are refused first.
 
 use axum::{
     extract::{Request, State},
@@ -17,59 +16,59 @@ use std::{
 };
 use tokio::sync::Semaphore;
 
-/// With fewer than this under way nobody is refused, however long they wait: it is then not for their number.
-const FEW: usize = 64;
-/// Who has waited longer than this for the others that are ready would get its answer late, and make more wait.
-const LONGEST_WAIT: Duration = Duration::from_millis(20);
+/// With fewer requests in flight none is refused for its waiting time: their number is then not the cause.
+const MIN_CROWD: usize = 64;
+/// A request that waits longer than this for the other ready ones would be answered late, and would delay more of them.
+const MAX_WAIT: Duration = Duration::from_millis(20);
 
 /// Requests that are being answered.
 #[derive(Debug, Clone)]
 pub(crate) struct InFlight {
     app: Arc<AppState>,
-    places: Arc<Semaphore>,
+    permits: Arc<Semaphore>,
 }
 
 impl InFlight {
     pub(crate) fn new(app: &Arc<AppState>) -> Self {
         Self {
             app: Arc::clone(app),
-            places: Arc::new(Semaphore::new(app.config.limits.requests)),
+            permits: Arc::new(Semaphore::new(app.config.limits.requests)),
         }
     }
 
-    fn are_many(&self) -> bool {
-        let most = self.app.config.limits.requests;
-        most.saturating_sub(self.places.available_permits()) >= FEW
+    fn is_crowded(&self) -> bool {
+        let limit = self.app.config.limits.requests;
+        limit.saturating_sub(self.permits.available_permits()) >= MIN_CROWD
     }
 
-    fn refuse(&self, because: &'static str) -> Response {
-        self.app.config.metrics.web().refused(because);
+    fn refuse(&self, cause: &'static str) -> Response {
+        self.app.config.metrics.web().record_refusal(cause);
         Problem::new(
             ProblemKind::Busy,
-            "the server answers as many requests as it may at once; try again in 2 s",
+            "the server is at its limit of requests in flight; try again in 2 s",
         )
         .into_response()
     }
 }
 
-/// Answers `Busy` where there is no place, and to whoever changes nothing where too many are ready to be answered.
+/// Answers `Busy` when the limit is reached. Requests that only read are also refused when too many others are ready.
 pub(crate) async fn limit(
     State(in_flight): State<InFlight>,
     request: Request,
     next: Next,
 ) -> Response {
-    // A server that has much to do is not dead.
+    // A busy server is alive.
     if request.uri().path() == LIVE_PATH {
         return next.run(request).await;
     }
-    let Ok(_place) = in_flight.places.try_acquire() else {
+    let Ok(_permit) = in_flight.permits.try_acquire() else {
         return in_flight.refuse("in_flight");
     };
     if request.method().is_safe() {
-        // All that are ready have their turn before this one goes on: they are counted, and how long they take is measured.
-        let began = Instant::now();
+        // All other ready requests run before this one continues, so the elapsed time is the delay that they cause.
+        let started = Instant::now();
         tokio::task::yield_now().await;
-        if began.elapsed() > LONGEST_WAIT && in_flight.are_many() {
+        if started.elapsed() > MAX_WAIT && in_flight.is_crowded() {
             return in_flight.refuse("late");
         }
     }

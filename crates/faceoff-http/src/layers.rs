@@ -1,4 +1,4 @@
-//! What surrounds every request: id, log line, security headers, patience, and a net for panics.
+//! Layers around every request: id, log line, rate limit, cache, compression, security headers, and a handler for panics.
 
 use crate::{
     in_flight::{self, InFlight},
@@ -16,9 +16,9 @@ use faceoff_pages::Embeddable;
 use faceoff_service::{
     app::AppState,
     conditions::Conditions,
-    kept_answers,
+    answer_cache,
     problem::Problem,
-    watched::{REQUEST_ID, watch},
+    request_log::{REQUEST_ID, log_request},
 };
 use std::{any::Any, sync::Arc};
 use tower_http::{
@@ -30,13 +30,13 @@ use tower_http::{
     request_id::{MakeRequestUuid, PropagateRequestIdLayer, SetRequestIdLayer},
 };
 
-pub(crate) fn around(site: Router, app: &Arc<AppState>) -> Router {
-    // The last layer is the outermost: the id exists before the log line, and a panic or a refusal
-    // carries the security headers as well.
-    let texts = SizeAbove::new(WORTH_COMPRESSING).and(is_text);
-    site.layer(CatchPanicLayer::custom(panicked))
-        .layer(CompressionLayer::new().compress_when(texts))
-        .layer(middleware::from_fn_with_state(Arc::clone(app), keep))
+pub(crate) fn wrap(site: Router, app: &Arc<AppState>) -> Router {
+    // The last layer is the outermost. So the id exists before the log line is written, and the response
+    // to a panic or a refused request has the security headers as well.
+    let compressible = SizeAbove::new(MIN_COMPRESSED_BYTES).and(is_compressible);
+    site.layer(CatchPanicLayer::custom(panic_response))
+        .layer(CompressionLayer::new().compress_when(compressible))
+        .layer(middleware::from_fn_with_state(Arc::clone(app), serve_cached))
         .layer(middleware::from_fn(revalidate))
         .layer(middleware::from_fn_with_state(
             InFlight::new(app),
@@ -45,20 +45,20 @@ pub(crate) fn around(site: Router, app: &Arc<AppState>) -> Router {
         .layer(middleware::from_fn_with_state(Arc::clone(app), limit_rate))
         .layer(middleware::map_response(security_headers))
         .layer(PropagateRequestIdLayer::new(REQUEST_ID))
-        .layer(middleware::from_fn_with_state(Arc::clone(app), watch))
+        .layer(middleware::from_fn_with_state(Arc::clone(app), log_request))
         .layer(SetRequestIdLayer::new(REQUEST_ID, MakeRequestUuid))
         .layer(middleware::map_request(drop_foreign_request_id))
 }
 
-/// Smaller answers gain nothing. (And what holds a secret is smaller: how far that is compressed could tell of it.)
-const WORTH_COMPRESSING: u64 = 2048;
+/// Smaller responses gain nothing. Responses with a secret are smaller too, so their compressed length reveals nothing of it.
+const MIN_COMPRESSED_BYTES: u64 = 2048;
 
-/// Archives are compressed already, streams of events are to come at once, and parts of files are parts of their bytes.
-fn is_text(_: StatusCode, _: Version, headers: &HeaderMap, _: &Extensions) -> bool {
+/// Not archives, which are compressed already; not event streams, which must not be buffered; not byte ranges of files.
+fn is_compressible(_: StatusCode, _: Version, headers: &HeaderMap, _: &Extensions) -> bool {
     let media_type = headers.get(header::CONTENT_TYPE);
     let media_type = media_type.and_then(|value| value.to_str().ok());
     let essence = media_type.and_then(|value| value.split(';').next());
-    let texts = [
+    let media_types = [
         "application/json",
         "application/problem+json",
         "image/svg+xml",
@@ -68,24 +68,24 @@ fn is_text(_: StatusCode, _: Version, headers: &HeaderMap, _: &Extensions) -> bo
         "text/javascript",
         "text/plain",
     ];
-    essence.is_some_and(|essence| texts.contains(&essence.trim()))
+    essence.is_some_and(|essence| media_types.contains(&essence.trim()))
 }
 
-/// Tells who has a board's page already that it still stands. Their condition goes no further, so that the page is made for
-/// them as for everybody, once (`kept_answers.rs`).
+/// Answers 304 to a client that already has the current page of a board. The condition is removed from the request, so the
+/// cached page (`answer_cache.rs`) serves clients with and without one.
 async fn revalidate(mut request: Request, next: Next) -> Response {
-    if !kept_answers::is_board_page(request.uri().path()) {
+    if !answer_cache::is_board_page(request.uri().path()) {
         return next.run(request).await;
     }
-    let conditions = Conditions::taken_from(request.headers_mut());
+    let conditions = Conditions::take_from(request.headers_mut());
     let response = next.run(request).await;
     let tag = response.headers().get(header::ETAG).cloned();
     match tag.filter(|_| response.status() == StatusCode::OK) {
-        Some(tag) if conditions.have(&tag) => {
+        Some(tag) if conditions.matches(&tag) => {
             let (mut parts, _) = response.into_parts();
             parts.status = StatusCode::NOT_MODIFIED;
-            for of_body in [header::CONTENT_TYPE, header::CONTENT_LENGTH] {
-                parts.headers.remove(of_body);
+            for name in [header::CONTENT_TYPE, header::CONTENT_LENGTH] {
+                parts.headers.remove(name);
             }
             Response::from_parts(parts, Body::empty())
         }
@@ -93,38 +93,38 @@ async fn revalidate(mut request: Request, next: Next) -> Response {
     }
 }
 
-/// Answers visitors from what is kept.
-async fn keep(State(app): State<Arc<AppState>>, request: Request, next: Next) -> Response {
+/// Answers visitors from the cache.
+async fn serve_cached(State(app): State<Arc<AppState>>, request: Request, next: Next) -> Response {
     let second = app.config.clock.now().as_second();
-    match kept_answers::asked(&request, &app.store, second) {
-        Some(asked) => app.kept_answers.get(asked, next.run(request)).await,
+    match answer_cache::cache_key(&request, &app.store, second) {
+        Some(key) => app.answer_cache.get(key, next.run(request)).await,
         None => next.run(request).await,
     }
 }
 
-/// Answers `TooManyRequests` to an address that asks too often.
+/// Answers `TooManyRequests` to an address that exceeds its rate limit.
 async fn limit_rate(State(app): State<Arc<AppState>>, request: Request, next: Next) -> Response {
     let peer = request.extensions().get::<Peer>();
-    let checked = match peer.and_then(|peer| peer.asks(request.headers())) {
-        Some(address) => app.rates.check_address(address),
+    let checked = match peer.and_then(|peer| peer.client_address(request.headers())) {
+        Some(address) => app.request_limiter.check_address(address),
         None => Ok(()),
     };
     match checked {
         Ok(()) => next.run(request).await,
         Err(problem) => {
-            app.config.metrics.web().refused("rate");
-            faceoff_pages::for_whom(request.uri().path(), request.headers(), problem)
+            app.config.metrics.web().record_refusal("rate");
+            faceoff_pages::problem_response(request.uri().path(), request.headers(), problem)
         }
     }
 }
 
-/// A request id comes from us alone: a foreign one could imitate another request's log lines.
+/// Request ids are made by this server only: an id set by the client could imitate another request's log lines.
 async fn drop_foreign_request_id(mut request: Request) -> Request {
     request.headers_mut().remove(REQUEST_ID);
     request
 }
 
-/// What a page may load and do, and who may hold it.
+/// The content security policy: what a page may load, and which sites may embed it.
 macro_rules! policy {
     ($ancestors:literal) => {
         concat!(
@@ -163,14 +163,14 @@ async fn security_headers(mut response: Response) -> Response {
     ] {
         headers.insert(name, HeaderValue::from_static(value));
     }
-    // Scores change and API answers belong to their caller; only the hashed assets say otherwise.
+    // Scores change, and API responses belong to their caller. Only assets with a hash in their name set another value.
     headers
         .entry(header::CACHE_CONTROL)
         .or_insert(HeaderValue::from_static("no-store"));
     response
 }
 
-fn panicked(panic: Box<dyn Any + Send + 'static>) -> Response {
+fn panic_response(panic: Box<dyn Any + Send + 'static>) -> Response {
     let message = panic
         .downcast_ref::<String>()
         .map(String::as_str)

@@ -1,28 +1,28 @@
 //! The web side of Faceoff: the REST API under `/api/v1` and the server-rendered pages, served together.
 //!
-//! What surrounds every request is here, with the connections, the probes and the files for workers elsewhere. The API is
-//! `faceoff-rest`, the pages are `faceoff-pages`, which know nothing of each other, and what both do is
-//! `faceoff-service`. It reads no clock and no environment that it was not given.
+//! This crate has the layers around every request, the connections, the probes and the file transfer of remote workers.
+//! `faceoff-rest` has the API and `faceoff-pages` the pages. They do not depend on each other; their shared logic is in
+//! `faceoff-service`. Clock and configuration are passed in; the environment is never read.
 
-mod capacity_watch;
+mod capacity_monitor;
 mod in_flight;
 mod layers;
 mod peer;
 mod probes;
 mod read_only;
 mod serve;
-mod work_files;
+mod worker_files;
 
 pub use axum::Router;
-pub use capacity_watch::{CapacityWatch, Overflow};
+pub use capacity_monitor::{CapacityMonitor, CapacityWarning};
 
 pub use faceoff_service::{
     config::{Capacity, HttpConfig, HttpLimits},
     link_key::LinkKey,
-    offer::{InventoryTeller, Offer},
-    pace::LeastRate,
+    agent_resources::{InventoryPublisher, AgentResources},
+    transfer_rate::MinTransferRate,
     problem,
-    rates::{Rate, RateLimits},
+    rate_limits::{RateLimit, RateLimits},
 };
 pub use serve::{ConnectionLimits, serve};
 
@@ -33,32 +33,32 @@ use std::sync::Arc;
 
 /// The whole site: pages at `/`, API under `/api/v1`.
 ///
-/// Every error is a problem (RFC 9457), unknown paths, wrong methods and panics included; browsers
-/// get the same as a page.
+/// Every error is a problem document (RFC 9457), also for unknown paths, wrong methods and panics. Browsers get it as a
+/// page.
 pub fn router(store: Store, config: HttpConfig) -> Router {
-    let patience = config.limits.answer;
+    let timeout = config.limits.request_timeout;
     let app = Arc::new(AppState::new(store, config));
-    let (api, document) = faceoff_rest::router(patience);
+    let (api, document) = faceoff_rest::router(timeout);
     let site = Router::new()
         .merge(api)
-        .merge(faceoff_pages::router(patience, document))
-        .merge(probes::router(patience))
-        .merge(work_files::router())
-        .fallback(faceoff_pages::unknown_path)
-        .method_not_allowed_fallback(faceoff_pages::unknown_method)
+        .merge(faceoff_pages::router(timeout, document))
+        .merge(probes::router(timeout))
+        .merge(worker_files::router())
+        .fallback(faceoff_pages::path_not_found)
+        .method_not_allowed_fallback(faceoff_pages::method_not_allowed)
         .layer(middleware::from_fn_with_state(
             Arc::clone(&app),
             read_only::refuse_changes,
         ))
         .with_state(Arc::clone(&app));
-    layers::around(site, &app)
+    layers::wrap(site, &app)
 }
 
-/// What watches the server finds it here without a token: numbers, and whether it lives and is ready. For an address of its
-/// own that strangers do not reach, beside [`router`] on the same store.
-pub fn watching_router(store: Store, config: HttpConfig) -> Router {
-    let patience = config.limits.answer;
+/// Metrics, liveness and readiness without a token. For a separate address that only the operators reach, beside
+/// [`router`] on the same store.
+pub fn monitoring_router(store: Store, config: HttpConfig) -> Router {
+    let timeout = config.limits.request_timeout;
     let app = Arc::new(AppState::new(store, config));
-    let site = probes::open_router(patience).with_state(Arc::clone(&app));
-    layers::around(site, &app)
+    let site = probes::unauthenticated_router(timeout).with_state(Arc::clone(&app));
+    layers::wrap(site, &app)
 }

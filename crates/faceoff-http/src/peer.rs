@@ -1,44 +1,44 @@
-//! Who is at the other end of a request, as far as an address tells.
+//! The client address of a request, also behind trusted proxies.
 
 use axum::http::HeaderMap;
 use std::{net::IpAddr, sync::Arc};
 
-/// Where a proxy writes who asked it: a list, to whose end each proxy adds one.
+/// The header in which proxies list client addresses: each proxy appends the address that it was called from.
 const FORWARDED_FOR: &str = "x-forwarded-for";
 
 /// The other end of a connection.
 #[derive(Debug, Clone)]
 pub(crate) struct Peer {
     pub(crate) address: IpAddr,
-    /// Addresses of proxies of ours, whose word for others' addresses is taken.
-    pub(crate) proxies: Arc<[IpAddr]>,
+    /// Addresses of our own proxies, whose `X-Forwarded-For` is believed.
+    pub(crate) trusted_proxies: Arc<[IpAddr]>,
 }
 
 impl Peer {
-    /// Who asks: the peer, or the one for whom a proxy of ours says it asks. None: the proxy's own host, or somebody of whom
-    /// the proxy says nothing.
-    pub(crate) fn asks(&self, headers: &HeaderMap) -> Option<IpAddr> {
-        let is_ours = |address: &IpAddr| self.proxies.contains(&address.to_canonical());
-        if !is_ours(&self.address) {
+    /// The address of the client: the peer, or the one that a trusted proxy forwards for. `None` if the request comes from the
+    /// proxy's own host, or if the proxy names no client.
+    pub(crate) fn client_address(&self, headers: &HeaderMap) -> Option<IpAddr> {
+        let is_trusted_proxy = |address: &IpAddr| self.trusted_proxies.contains(&address.to_canonical());
+        if !is_trusted_proxy(&self.address) {
             return Some(self.address);
         }
-        // What stands before the last proxy of ours is the visitor's own word, and may be anything.
-        let told = headers.get_all(FORWARDED_FOR).iter();
-        let told: Vec<&[u8]> = told
+        // Entries before the last trusted proxy's come from the client, and may be forged.
+        let entries = headers.get_all(FORWARDED_FOR).iter();
+        let entries: Vec<&[u8]> = entries
             .flat_map(|value| value.as_bytes().split(|byte| *byte == b','))
             .collect();
-        let address = |told: &[u8]| {
-            std::str::from_utf8(told)
+        let address = |entry: &[u8]| {
+            std::str::from_utf8(entry)
                 .ok()?
                 .trim()
                 .parse::<IpAddr>()
                 .ok()
         };
-        for told in told.into_iter().rev() {
-            match address(told) {
-                Some(address) if is_ours(&address) => {}
+        for entry in entries.into_iter().rev() {
+            match address(entry) {
+                Some(address) if is_trusted_proxy(&address) => {}
                 Some(address) => return Some(address),
-                // A proxy that says something else asks for somebody; all of these share its own address.
+                // The proxy forwards for a client that it does not name: such clients share the proxy's address.
                 None => return Some(self.address),
             }
         }
@@ -51,10 +51,10 @@ mod tests {
     use super::*;
     use axum::http::HeaderValue;
 
-    fn asks(peer: &str, forwarded: &[&str]) -> Option<String> {
+    fn client_address(peer: &str, forwarded: &[&str]) -> Option<String> {
         let peer = Peer {
             address: peer.parse().unwrap(),
-            proxies: ["127.0.0.1", "10.0.0.9"]
+            trusted_proxies: ["127.0.0.1", "10.0.0.9"]
                 .map(|address| address.parse().unwrap())
                 .into(),
         };
@@ -63,38 +63,38 @@ mod tests {
             let value = HeaderValue::from_bytes(value.as_bytes()).unwrap();
             headers.append(FORWARDED_FOR, value);
         }
-        peer.asks(&headers).map(|address| address.to_string())
+        peer.client_address(&headers).map(|address| address.to_string())
     }
 
     #[test]
-    fn a_proxy_of_ours_is_believed_and_nobody_else() {
+    fn only_trusted_proxies_are_believed() {
         let found = |address: &str| Some(address.to_owned());
-        assert_eq!(asks("192.0.2.1", &[]), found("192.0.2.1"));
-        assert_eq!(asks("192.0.2.1", &["192.0.2.7"]), found("192.0.2.1"));
-        assert_eq!(asks("127.0.0.1", &[]), None);
-        assert_eq!(asks("::ffff:127.0.0.1", &["192.0.2.7"]), found("192.0.2.7"));
-        // The visitor said 192.0.2.7, which is not to be believed.
+        assert_eq!(client_address("192.0.2.1", &[]), found("192.0.2.1"));
+        assert_eq!(client_address("192.0.2.1", &["192.0.2.7"]), found("192.0.2.1"));
+        assert_eq!(client_address("127.0.0.1", &[]), None);
+        assert_eq!(client_address("::ffff:127.0.0.1", &["192.0.2.7"]), found("192.0.2.7"));
+        // 192.0.2.7 comes from the client, and is not believed.
         assert_eq!(
-            asks("127.0.0.1", &["192.0.2.7, 192.0.2.8"]),
+            client_address("127.0.0.1", &["192.0.2.7, 192.0.2.8"]),
             found("192.0.2.8")
         );
         assert_eq!(
-            asks("127.0.0.1", &["192.0.2.7", "192.0.2.8"]),
+            client_address("127.0.0.1", &["192.0.2.7", "192.0.2.8"]),
             found("192.0.2.8")
         );
-        // Two proxies of ours, one behind the other.
+        // Two trusted proxies, one behind the other.
         assert_eq!(
-            asks("127.0.0.1", &["192.0.2.8, 10.0.0.9"]),
+            client_address("127.0.0.1", &["192.0.2.8, 10.0.0.9"]),
             found("192.0.2.8")
         );
-        // What is no address ends what is believed.
+        // An entry that is no address ends the search.
         assert_eq!(
-            asks("127.0.0.1", &["192.0.2.8, unknown"]),
+            client_address("127.0.0.1", &["192.0.2.8, unknown"]),
             found("127.0.0.1")
         );
-        // What the visitor wrote before it may be no text at all.
+        // Entries of the client need not be valid text.
         assert_eq!(
-            asks("127.0.0.1", &["\u{ff}, 192.0.2.8"]),
+            client_address("127.0.0.1", &["\u{ff}, 192.0.2.8"]),
             found("192.0.2.8")
         );
     }

@@ -1,5 +1,4 @@
-//! What watches the server asks here: does it live, is it ready, and its numbers. By the names that such programs look for,
-//! outside of the API's versions.
+//! Probes for monitoring: liveness, readiness and metrics. They have their conventional paths, outside of the API's versions.
 
 use axum::{
     Json, Router, extract::State, http::header, middleware, response::IntoResponse, routing::get,
@@ -8,7 +7,7 @@ use faceoff_api::{
     paths::LIVE_PATH,
     views::health::{HealthView, LiveView},
 };
-use faceoff_metrics::{Disk, MEDIA_TYPE, Queue, Standing};
+use faceoff_metrics::{Disk, MEDIA_TYPE, Queue, GaugeValues};
 use faceoff_service::{
     app::{App, AppState},
     auth::Organiser,
@@ -18,73 +17,73 @@ use faceoff_service::{
 };
 use std::time::Duration;
 
-/// For everybody, but the numbers: they tell how full the disks are, and so how much teams upload.
-pub(crate) fn router(patience: Duration) -> Router<App> {
-    around(Router::new().route("/metrics", get(numbers)), patience)
+/// Public, except for the metrics: they show how full the disks are, and so how much teams upload.
+pub(crate) fn router(timeout: Duration) -> Router<App> {
+    with_probes(Router::new().route("/metrics", get(metrics)), timeout)
 }
 
-/// Where strangers do not come.
-pub(crate) fn open_router(patience: Duration) -> Router<App> {
-    around(Router::new().route("/metrics", get(open_numbers)), patience)
+/// For an address that only the operators reach: all of it without a token.
+pub(crate) fn unauthenticated_router(timeout: Duration) -> Router<App> {
+    with_probes(Router::new().route("/metrics", get(unauthenticated_metrics)), timeout)
 }
 
-fn around(router: Router<App>, patience: Duration) -> Router<App> {
+fn with_probes(router: Router<App>, timeout: Duration) -> Router<App> {
     router
-        .route(LIVE_PATH, get(alive))
+        .route(LIVE_PATH, get(live))
         .route("/readyz", get(ready))
-        .layer(middleware::from_fn_with_state(patience, timeouts::time_out))
+        .layer(middleware::from_fn_with_state(timeout,  timeouts::time_out))
 }
 
-async fn alive() -> Json<LiveView> {
+async fn live() -> Json<LiveView> {
     Json(LiveView::ALIVE)
 }
 
 async fn ready(State(app): State<App>) -> Result<Json<HealthView>, Problem> {
-    health::now(&app).await.map(Json)
+    health::check(&app).await.map(Json)
 }
 
-async fn numbers(_: Organiser, app: State<App>) -> Result<impl IntoResponse, Problem> {
-    open_numbers(app).await
+async fn metrics(_: Organiser, app: State<App>) -> Result<impl IntoResponse, Problem> {
+    unauthenticated_metrics(app).await
 }
 
-async fn open_numbers(State(app): State<App>) -> Result<impl IntoResponse, Problem> {
-    let text = app.config.metrics.text(&standing(&app).await?);
+async fn unauthenticated_metrics(State(app): State<App>) -> Result<impl IntoResponse, Problem> {
+    let text = app.config.metrics.text(&gauges(&app).await?);
     let text = text.map_err(Problem::internal)?;
     Ok(([(header::CONTENT_TYPE, MEDIA_TYPE)], text))
 }
 
-async fn standing(app: &AppState) -> Result<Standing, Problem> {
+async fn gauges(app: &AppState) -> Result<GaugeValues, Problem> {
     let now = app.config.clock.now();
-    let room = app.store.room();
-    let numbers = app.store.numbers(now).await?;
-    let waited = |since| now.duration_since(since).as_secs_f64().max(0.0);
-    let over_at = queue::outlook(app).await?.over_at(now);
-    let disks = ["data", "scratch"].into_iter().zip(room.disks());
-    Ok(Standing {
+    let free_space = app.store.free_space();
+    let gauges = app.store.gauges(now).await?;
+    let seconds_since = |since| now.duration_since(since).as_secs_f64().max(0.0);
+    let completed_at = queue::forecast(app).await?.completed_at(now);
+    let disks = ["data", "scratch"].into_iter().zip(free_space.disks());
+    Ok(GaugeValues {
         database_writable: app.store.health(now).await.database_writable,
         queue: Queue {
-            running: numbers.running,
-            waiting: numbers.waiting,
-            without_room: numbers.without_room,
-            paused: numbers.held || room.is_short(),
-            oldest_wait_s: numbers.waiting_since.map_or(0.0, waited),
-            expected_s: over_at.map_or(f64::NAN, |at| at.duration_since(now).as_secs_f64()),
+            running: gauges.running,
+            waiting: gauges.waiting,
+            out_of_space: gauges.out_of_space,
+            paused: gauges.paused || free_space.is_short(),
+            oldest_wait_s: gauges.waiting_since.map_or(0.0, seconds_since),
+            expected_s: completed_at.map_or(f64::NAN, |at| at.duration_since(now).as_secs_f64()),
         },
-        open_evaluations: numbers.open_evaluations,
+        open_evaluations: gauges.open_evaluations,
         slots: app.config.capacity.slots,
-        remote_slots: app.store.workers().slots(now),
+        remote_slots: app.store.workers().available_slots(now),
         remote_workers: app
             .store
             .workers()
             .all()
             .iter()
-            .filter(|worker| worker.is_there(now))
+            .filter(|worker| worker.is_online(now))
             .count(),
-        remote_long: workers::now(app).alarms.len(),
+        long_remote_jobs: workers::current(app).alarms.len(),
         disks: disks
-            .filter_map(|(of, space)| {
+            .filter_map(|(name, space)| {
                 space.map(|space| Disk {
-                    of,
+                    name,
                     free_bytes: space.free_bytes,
                     size_bytes: space.size_bytes,
                 })

@@ -1,18 +1,18 @@
-//! Connections: who may open how many, how long they may hold them, and how they end.
+//! Accepts connections, limits their number and duration, and closes them at shutdown.
 //!
-//! A stranger costs a descriptor and some memory before a single byte was understood. So a connection has
-//! a bounded time to say what it wants, one that is answered must take the answer, and nobody has more of
-//! them than a share; what is left of the descriptors is the evaluator's.
+//! A client costs a descriptor and some memory before its first byte is parsed. So the time to send a request is
+//! limited, responses must be read at a minimum rate, and each address has a maximum number of connections. The
+//! remaining descriptors are for the evaluator.
 
-mod addresses;
-mod paced_stream;
+mod connection_quota;
+mod min_rate_stream;
 
 use crate::peer::Peer;
-use addresses::Addresses;
+use connection_quota::ConnectionQuota;
 use axum::{Extension, Router};
 use faceoff_service::{
-    ending::Ending,
-    pace::LeastRate,
+    shutdown::Shutdown,
+    transfer_rate::MinTransferRate,
     problem::{Problem, ProblemKind},
 };
 use hyper::server::conn::http1;
@@ -21,7 +21,7 @@ use hyper_util::{
     server::graceful::GracefulShutdown,
     service::TowerToHyperService,
 };
-use paced_stream::PacedStream;
+use min_rate_stream::MinRateStream;
 use socket2::SockRef;
 use std::{
     io::{self, Write},
@@ -37,30 +37,28 @@ use tokio::{
 };
 use tower::Layer as _;
 
-/// After an error of the listener itself, most often for want of a descriptor. Connections wait meanwhile.
+/// After an error of the listener itself, usually because no descriptor is left. Connections wait meanwhile.
 const ACCEPT_PAUSE: Duration = Duration::from_millis(500);
-/// How much of an answer may lie unsent in the system's buffer. Without a bound it grows to megabytes, and
-/// is refilled only when a third of it is gone: who reads steadily but slowly would look like one who reads
-/// nothing.
+/// How much of a response may wait unsent in the system's buffer. Without a bound the buffer grows to megabytes, and
+/// is refilled only when a third of it is free: a slow but steady reader would look like one that reads nothing.
 const UNSENT_BYTES: u32 = 128 << 10;
-/// How often the log says what lasts: that all connections are taken, or that none can be accepted.
-const TOLD_EVERY: Duration = Duration::from_secs(60);
+/// How often the log repeats that all connections are in use, or that none can be accepted.
+const LOG_INTERVAL: Duration = Duration::from_secs(60);
 
-/// How much of the server strangers may hold, and for how long.
+/// Limits of client connections.
 #[derive(Debug, Clone)]
 pub struct ConnectionLimits {
-    /// Connections at the same time. More wait to be accepted.
+    /// Open connections in total. Further ones wait to be accepted.
     pub open: usize,
-    /// Connections of one address (IPv6: of one /64) at the same time. More are told so and closed.
+    /// Open connections of one address (IPv6: of one /64). Further ones get an error response and are closed.
     pub per_address: usize,
-    /// Addresses without a bound of their own: a proxy's, behind which everybody is. What it says of whom it asks for is
-    /// believed (`X-Forwarded-For`).
+    /// Addresses without a limit: those of proxies, which all clients share. Their `X-Forwarded-For` is believed.
     pub exempt: Vec<IpAddr>,
-    /// To send the head of a request, counted from the opening or from the end of the last answer: so also
-    /// how long a connection may be idle.
-    pub head: Duration,
-    /// What a reader must take of an answer.
-    pub reading: LeastRate,
+    /// Time to send the head of a request, counted from the opening or from the end of the last response. So it also
+    /// limits how long a connection may be idle.
+    pub head_timeout: Duration,
+    /// How fast a client must read a response.
+    pub min_read_rate: MinTransferRate,
 }
 
 impl Default for ConnectionLimits {
@@ -72,8 +70,8 @@ impl Default for ConnectionLimits {
                 IpAddr::from([127, 0, 0, 1]),
                 IpAddr::from([0, 0, 0, 0, 0, 0, 0, 1_u16]),
             ],
-            head: Duration::from_secs(30),
-            reading: LeastRate {
+            head_timeout: Duration::from_secs(30),
+            min_read_rate: MinTransferRate {
                 bytes_per_s: 1024,
                 grace: Duration::from_secs(60),
             },
@@ -81,95 +79,95 @@ impl Default for ConnectionLimits {
     }
 }
 
-/// Answers requests until `until` ends, and after that the ones that are under way. What fails of a
-/// connection ends that connection; what fails of the listener is tried again.
+/// Answers requests until `until` completes, and then finishes those in flight. An error of a connection ends that
+/// connection; after an error of the listener it tries again.
 pub async fn serve(
     listener: TcpListener,
     router: Router,
     limits: ConnectionLimits,
     until: impl Future<Output = ()> + Send + 'static,
 ) {
-    let mut door = Door {
+    let mut acceptor = Acceptor {
         listener,
-        places: Arc::new(Semaphore::new(limits.open)),
-        told: None,
-        told_of_failure: None,
+        permits: Arc::new(Semaphore::new(limits.open)),
+        full_logged_at: None,
+        failure_logged_at: None,
     };
     let proxies: Arc<[IpAddr]> = limits.exempt.clone().into();
-    let addresses = Arc::new(Addresses::new(limits.per_address, limits.exempt));
-    let refusal: Arc<[u8]> = refusal(limits.per_address).into();
+    let quota = Arc::new(ConnectionQuota::new(limits.per_address, limits.exempt));
+    let limit_response: Arc<[u8]> = limit_response(limits.per_address).into();
     let mut http = http1::Builder::new();
     http.timer(TokioTimer::new())
-        .header_read_timeout(limits.head);
-    let ending = GracefulShutdown::new();
-    // Who follows a game would be waited for until that is over.
-    let (ends, told) = Ending::new();
-    let router = router.layer(Extension(told));
+        .header_read_timeout(limits.head_timeout);
+    let graceful = GracefulShutdown::new();
+    // Event streams have no end of their own: without this signal, shutdown would wait for the end of each game.
+    let (shutdown_sender, shutdown) = Shutdown::new();
+    let router = router.layer(Extension(shutdown));
     let mut until = pin!(until);
     loop {
-        let (stream, from, place) = tokio::select! {
+        let (stream, from, permit) = tokio::select! {
             () = &mut until => break,
-            accepted = door.accept() => accepted,
+            accepted = acceptor.accept() => accepted,
         };
-        let Some(seat) = addresses.enter(from.ip()) else {
-            refuse(stream, &refusal);
+        let Some(address_permit) = quota.acquire(from.ip()) else {
+            refuse(stream, &limit_response);
             continue;
         };
         if let Err(error) = SockRef::from(&stream).set_tcp_notsent_lowat(UNSENT_BYTES) {
-            tracing::debug!(%from, %error, "a slow reader will look slower than it is");
+            tracing::debug!(%from, %error, "cannot bound the send buffer; a slow client may be dropped too early");
         }
-        let stream = PacedStream::new(stream, limits.reading, reset);
+        let stream = MinRateStream::new(stream, limits.min_read_rate, reset);
         let peer = Peer {
             address: from.ip(),
-            proxies: Arc::clone(&proxies),
+            trusted_proxies: Arc::clone(&proxies),
         };
         let service = TowerToHyperService::new(Extension(peer).layer(router.clone()));
-        let answering = ending.watch(http.serve_connection(TokioIo::new(stream), service));
+        let connection = graceful.watch(http.serve_connection(TokioIo::new(stream), service));
         tokio::spawn(async move {
-            if let Err(error) = answering.await {
-                tracing::debug!(%from, %error, "a connection ended");
+            if let Err(error) = connection.await {
+                tracing::debug!(%from, %error, "a connection failed");
             }
-            drop((seat, place));
+            drop((address_permit, permit));
         });
     }
-    drop(door);
-    ends.send_replace(true);
-    ending.shutdown().await;
+    drop(acceptor);
+    shutdown_sender.send_replace(true);
+    graceful.shutdown().await;
 }
 
-/// Where connections come in.
-struct Door {
+/// Accepts connections, up to the total limit.
+struct Acceptor {
     listener: TcpListener,
-    places: Arc<Semaphore>,
-    /// When the log last said that all places are taken.
-    told: Option<Instant>,
-    /// When it last said that none can be accepted, since one was.
-    told_of_failure: Option<Instant>,
+    permits: Arc<Semaphore>,
+    /// When the log last said that all connections are in use.
+    full_logged_at: Option<Instant>,
+    /// When the log last said that none can be accepted. `None` once one is accepted again.
+    failure_logged_at: Option<Instant>,
 }
 
-impl Door {
-    /// The next connection, once there is a place for it: what waits outside costs the system's memory
-    /// and none of our descriptors.
+impl Acceptor {
+    /// The next connection, once a permit is free. Connections that wait to be accepted cost memory of the system, but no
+    /// descriptor of this process.
     async fn accept(&mut self) -> (TcpStream, SocketAddr, OwnedSemaphorePermit) {
         loop {
-            if self.places.available_permits() == 0 && is_due(self.told) {
-                tracing::warn!("all connections are taken; more wait until one ends");
-                self.told = Some(Instant::now());
+            if self.permits.available_permits() == 0 && is_log_due(self.full_logged_at) {
+                tracing::warn!("all connections are in use; new ones wait until one is closed");
+                self.full_logged_at = Some(Instant::now());
             }
-            let Ok(place) = Arc::clone(&self.places).acquire_owned().await else {
-                // Nobody closes it.
+            let Ok(permit) = Arc::clone(&self.permits).acquire_owned().await else {
+                // The semaphore is never closed.
                 return std::future::pending().await;
             };
             match self.listener.accept().await {
                 Ok((stream, from)) => {
-                    self.told_of_failure = None;
-                    return (stream, from, place);
+                    self.failure_logged_at = None;
+                    return (stream, from, permit);
                 }
-                Err(error) if gone(&error) => {}
+                Err(error) if is_peer_gone(&error) => {}
                 Err(error) => {
-                    if is_due(self.told_of_failure) {
+                    if is_log_due(self.failure_logged_at) {
                         tracing::error!(%error, "no connection can be accepted; trying again");
-                        self.told_of_failure = Some(Instant::now());
+                        self.failure_logged_at = Some(Instant::now());
                     }
                     tokio::time::sleep(ACCEPT_PAUSE).await;
                 }
@@ -178,13 +176,13 @@ impl Door {
     }
 }
 
-/// Is the log to say again what it said then?
-fn is_due(told: Option<Instant>) -> bool {
-    told.is_none_or(|told| told.elapsed() > TOLD_EVERY)
+/// May a message of that time be logged again?
+fn is_log_due(logged_at: Option<Instant>) -> bool {
+    logged_at.is_none_or(|logged_at| logged_at.elapsed() > LOG_INTERVAL)
 }
 
-/// Did the peer go before it was let in?
-fn gone(error: &io::Error) -> bool {
+/// Did the client go away before it was accepted?
+fn is_peer_gone(error: &io::Error) -> bool {
     matches!(
         error.kind(),
         io::ErrorKind::ConnectionRefused
@@ -194,14 +192,14 @@ fn gone(error: &io::Error) -> bool {
     )
 }
 
-/// Closes with a reset: what the peer does not take must not lie in the system's buffers for minutes.
+/// Closes with a reset: unread data must not stay in the system's buffers for minutes.
 fn reset(stream: &TcpStream) {
-    // Without it, it lies there, and that is all.
+    // If that fails, the data stays there for a while, which does no harm.
     let _ = stream.set_zero_linger();
 }
 
-/// What an address gets that has too many connections, as a whole answer.
-fn refusal(per_address: usize) -> Vec<u8> {
+/// The complete HTTP response to an address that has too many connections.
+fn limit_response(per_address: usize) -> Vec<u8> {
     let problem = Problem::new(
         ProblemKind::TooManyConnections,
         format!("an address has at most {per_address} connections; close some, or use one for many requests"),
@@ -210,9 +208,9 @@ fn refusal(per_address: usize) -> Vec<u8> {
     problem.as_http1()
 }
 
-/// Says why, if that goes without waiting, and closes.
-fn refuse(stream: TcpStream, refusal: &[u8]) {
+/// Sends the response if that needs no waiting, and closes the connection.
+fn refuse(stream: TcpStream, response: &[u8]) {
     if let Ok(mut stream) = stream.into_std() {
-        let _ = stream.write_all(refusal);
+        let _ = stream.write_all(response);
     }
 }

@@ -1,17 +1,17 @@
-//! What a server counts of itself, as Prometheus reads it (OpenMetrics text).
+//! Metrics of a server for Prometheus (OpenMetrics text).
 //!
-//! Everything that works hands its numbers here: requests ([`Web`]), slots ([`Slots`]), what is told of changes
-//! ([`Metrics::happened`]). What is a state and not a happening (the queue, disks) comes as a [`Standing`] when somebody
-//! reads. Nothing here names a team, a person or a score: who may read the numbers learns how the server does, and of
-//! nobody how they do. No clock is read and nothing is stored; counters begin at 0 with the process, as Prometheus expects.
+//! Requests ([`Web`]), jobs of slots ([`Slots`]) and events ([`Metrics::record_event`]) are counted as they happen. The
+//! state of the queue, disks and the process is passed as [`GaugeValues`] when the metrics are read. No metric names a
+//! team, a user or a score, so that operators learn nothing about teams from them. No clock is read and nothing is stored;
+//! counters start at 0 with the process, as Prometheus expects.
 
-mod latest;
+mod float_gauge;
 mod slots;
-mod standing;
+mod gauges;
 mod web;
 
-pub use slots::{Busy, Slots, UnitEnd};
-pub use standing::{Disk, Process, Queue, Standing};
+pub use slots::{BusySlot, Slots, JobEnd};
+pub use gauges::{Disk, Process, Queue, GaugeValues};
 pub use web::Web;
 
 use prometheus_client::{
@@ -19,29 +19,29 @@ use prometheus_client::{
     metrics::{counter::Counter, family::Family, info::Info},
     registry::Registry,
 };
-use standing::Gauges;
+use gauges::Gauges;
 use std::{fmt, sync::Arc};
 
 /// The media type of [`Metrics::text`].
 pub const MEDIA_TYPE: &str = "application/openmetrics-text; version=1.0.0; charset=utf-8";
 
-/// All numbers of a server; clones are the same ones.
+/// All metrics of a server; clones share them.
 #[derive(Clone)]
 pub struct Metrics {
     registry: Arc<Registry>,
     web: Web,
     slots: Slots,
-    events: Family<OfKind, Counter>,
+    events: Family<EventLabels, Counter>,
     gauges: Gauges,
 }
 
 #[derive(Debug, Clone, PartialEq, Eq, Hash, EncodeLabelSet)]
-struct OfKind {
+struct EventLabels {
     kind: String,
 }
 
 impl Metrics {
-    /// Of a server of this version, from 0.
+    /// Metrics of a server of this version; counters start at 0.
     #[must_use]
     pub fn new(version: &str) -> Self {
         let mut all = Registry::with_prefix("faceoff");
@@ -73,29 +73,29 @@ impl Metrics {
         &self.web
     }
 
-    /// Of slots, and of what they play.
+    /// Metrics of slots and their jobs.
     #[must_use]
     pub const fn slots(&self) -> &Slots {
         &self.slots
     }
 
-    /// A change was stored; `kind` is what happened, as the log has it.
-    pub fn happened(&self, kind: &str) {
+    /// Counts a stored event; `kind` is its kind in the log.
+    pub fn record_event(&self, kind: &str) {
         let kind = kind.to_owned();
-        self.events.get_or_create(&OfKind { kind }).inc();
+        self.events.get_or_create(&EventLabels { kind }).inc();
     }
 
-    /// So many changes came faster than they could be told one by one.
-    pub fn happened_untold(&self, count: u64) {
+    /// Counts events that were missed because they came faster than they could be processed.
+    pub fn record_missed_events(&self, count: u64) {
         let kind = "untold".to_owned();
-        self.events.get_or_create(&OfKind { kind }).inc_by(count);
+        self.events.get_or_create(&EventLabels { kind }).inc_by(count);
     }
 
-    /// All numbers as text ([`MEDIA_TYPE`]), with how things stand now.
+    /// All metrics as text ([`MEDIA_TYPE`]), with the current gauge values.
     ///
     /// # Errors
-    /// If the library cannot write one of them down.
-    pub fn text(&self, now: &Standing) -> Result<String, fmt::Error> {
+    /// If the library cannot format one of them.
+    pub fn text(&self, now: &GaugeValues) -> Result<String, fmt::Error> {
         self.gauges.set(now);
         let mut text = String::new();
         text::encode(&mut text, &self.registry)?;
@@ -115,14 +115,14 @@ mod tests {
     use std::time::Duration;
 
     #[test]
-    fn what_happened_is_in_the_text() {
+    fn metrics_text_has_events_and_requests() {
         let metrics = Metrics::new("1.2.3");
-        metrics.happened("evaluation_finished");
-        metrics.happened("evaluation_finished");
+        metrics.record_event("evaluation_finished");
+        metrics.record_event("evaluation_finished");
         let took = Duration::from_millis(3);
-        metrics.web().answered("GET", Some("/board"), 200, took);
-        metrics.web().answered("PUT", None, 404, took);
-        let text = metrics.text(&Standing::default()).unwrap();
+        metrics.web().record_response("GET", Some("/board"), 200, took);
+        metrics.web().record_response("PUT", None, 404, took);
+        let text = metrics.text(&GaugeValues::default()).unwrap();
         for line in [
             "faceoff_build_info{version=\"1.2.3\"} 1",
             "faceoff_events_total{kind=\"evaluation_finished\"} 2",

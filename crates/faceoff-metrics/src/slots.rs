@@ -1,4 +1,4 @@
-use crate::latest::Latest;
+use crate::float_gauge::FloatGauge;
 use faceoff_types::{EpisodeOutcome, RoundTrips, SlotTiming};
 use prometheus_client::{
     encoding::EncodeLabelSet,
@@ -11,49 +11,49 @@ use std::{
     time::Duration,
 };
 
-/// Upper bounds, seconds: a smoke run takes seconds, a shard up to minutes, a game many.
-const UNITS_S: [f64; 10] = [0.5, 1.0, 2.0, 5.0, 10.0, 30.0, 60.0, 180.0, 600.0, 1800.0];
-/// Upper bounds, seconds, around the control period of 20 ms that an answer has.
-const ANSWERS_S: [f64; 11] = [
+/// Bucket bounds, seconds: a validation run takes seconds, a shard up to minutes, a game many minutes.
+const JOB_DURATIONS_S: [f64; 10] = [0.5, 1.0, 2.0, 5.0, 10.0, 30.0, 60.0, 180.0, 600.0, 1800.0];
+/// Bucket bounds, seconds, around the control period of 20 ms.
+const ANSWER_TIMES_S: [f64; 11] = [
     0.0001, 0.0002, 0.0005, 0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.2, 1.0,
 ];
 
-/// Slots: what they do, how long it takes, and how evenly they keep time.
+/// Metrics of slots: jobs, durations, episodes and timing.
 #[derive(Clone)]
 pub struct Slots {
     busy: Gauge,
-    units: Family<Ended, Counter>,
-    durations: Family<OfWork, Histogram, fn() -> Histogram>,
-    episodes: Family<OfTask, Counter>,
-    faults: Family<OfTask, Counter>,
-    answers: Family<OfTask, Histogram, fn() -> Histogram>,
-    round_trips: Family<RoundTrip, Latest>,
-    stall: Family<OfSlot, Latest>,
+    jobs: Family<JobEndLabels, Counter>,
+    durations: Family<JobLabels, Histogram, fn() -> Histogram>,
+    episodes: Family<TaskLabels, Counter>,
+    faults: Family<TaskLabels, Counter>,
+    answers: Family<TaskLabels, Histogram, fn() -> Histogram>,
+    round_trips: Family<RoundTripLabels, FloatGauge>,
+    stall: Family<SlotLabels, FloatGauge>,
     reruns: Counter,
-    still: Gauge,
-    standing_still: Arc<Mutex<Vec<String>>>,
+    stuck_count: Gauge,
+    stuck_names: Arc<Mutex<Vec<String>>>,
 }
 
 #[derive(Debug, Clone, PartialEq, Eq, Hash, EncodeLabelSet)]
-struct Ended {
+struct JobEndLabels {
     work: &'static str,
     end: &'static str,
 }
 
-/// How a slot was done with a unit of work.
+/// How a slot's job ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum UnitEnd {
-    /// What came of it is stored.
+pub enum JobEnd {
+    /// The result is stored.
     Committed,
-    /// It is no longer the slot's: given back at the end of the server, cancelled, or its lease ran out.
+    /// The slot has lost the job: released at shutdown, cancelled, or the lease expired.
     Lost,
-    /// Given back for a fault of ours.
+    /// Released after a platform fault.
     PlatformFault,
-    /// Given back for want of room on a disk.
+    /// Released because a disk was full.
     FullDisk,
 }
 
-impl UnitEnd {
+impl JobEnd {
     const fn as_str(self) -> &'static str {
         match self {
             Self::Committed => "committed",
@@ -65,22 +65,22 @@ impl UnitEnd {
 }
 
 #[derive(Debug, Clone, PartialEq, Eq, Hash, EncodeLabelSet)]
-struct OfWork {
+struct JobLabels {
     work: &'static str,
 }
 
 #[derive(Debug, Clone, PartialEq, Eq, Hash, EncodeLabelSet)]
-struct OfTask {
+struct TaskLabels {
     task: &'static str,
 }
 
 #[derive(Debug, Clone, PartialEq, Eq, Hash, EncodeLabelSet)]
-struct OfSlot {
+struct SlotLabels {
     slot: String,
 }
 
 #[derive(Debug, Clone, PartialEq, Eq, Hash, EncodeLabelSet)]
-struct RoundTrip {
+struct RoundTripLabels {
     slot: String,
     /// `p50`, `p99` or `max`.
     of: &'static str,
@@ -90,41 +90,41 @@ impl Slots {
     pub(crate) fn new(all: &mut Registry) -> Self {
         let slots = Self {
             busy: Gauge::default(),
-            units: Family::default(),
-            durations: Family::new_with_constructor(|| Histogram::new(UNITS_S)),
+            jobs: Family::default(),
+            durations: Family::new_with_constructor(|| Histogram::new(JOB_DURATIONS_S)),
             episodes: Family::default(),
             faults: Family::default(),
-            answers: Family::new_with_constructor(|| Histogram::new(ANSWERS_S)),
+            answers: Family::new_with_constructor(|| Histogram::new(ANSWER_TIMES_S)),
             round_trips: Family::default(),
             stall: Family::default(),
             reruns: Counter::default(),
-            still: Gauge::default(),
-            standing_still: Arc::default(),
+            stuck_count: Gauge::default(),
+            stuck_names: Arc::default(),
         };
         all.register(
             "slots_busy",
-            "Slots that work on a unit",
+            "Slots that run a job",
             slots.busy.clone(),
         );
         all.register(
             "slots_standing_still",
-            "Slots that something holds although their agent was ended",
-            slots.still.clone(),
+            "Slots that are stuck although their agent was ended",
+            slots.stuck_count.clone(),
         );
         all.register(
             "units",
-            "Units of work that slots were done with, by kind and by how they ended",
-            slots.units.clone(),
+            "Jobs that slots have ended, by kind and outcome",
+            slots.jobs.clone(),
         );
         all.register_with_unit(
             "unit_duration",
-            "From the beginning of a unit of work to its end",
+            "Duration of jobs",
             Unit::Seconds,
             slots.durations.clone(),
         );
         all.register(
             "episodes",
-            "Episodes that were played and committed",
+            "Episodes that were run and committed",
             slots.episodes.clone(),
         );
         all.register(
@@ -140,61 +140,61 @@ impl Slots {
         );
         all.register_with_unit(
             "round_trip",
-            "Round trips to an agent that answers at once, of the slot's last shard: what the host adds to every answer",
+            "Round trips to an agent that answers at once, of the slot's last shard: the time that the host adds to every answer",
             Unit::Seconds,
             slots.round_trips.clone(),
         );
         all.register_with_unit(
             "host_stall",
-            "The most that the host took of one answer, of the slot's last shard",
+            "Longest delay of one answer by the host, of the slot's last shard",
             Unit::Seconds,
             slots.stall.clone(),
         );
         all.register(
             "host_noise_reruns",
-            "Tries of episodes that were dropped and played again because the host kept an agent from answering",
+            "Episodes that were repeated because the host kept an agent from answering",
             slots.reruns.clone(),
         );
         slots
     }
 
-    /// A slot begins a unit; `work` is its kind. Until the guard is gone the slot is busy.
+    /// Records that a slot starts a job of the kind `work`. The slot is busy until the guard is dropped.
     #[must_use]
-    pub fn begin(&self, work: &'static str) -> Busy {
+    pub fn start_job(&self, work: &'static str) -> BusySlot {
         self.busy.inc();
-        Busy {
+        BusySlot {
             slots: self.clone(),
             work,
         }
     }
 
-    /// The slots that something holds although their agent was ended, by the names of their threads.
-    pub fn set_standing_still(&self, names: Vec<String>) {
-        self.still
+    /// Sets the slots that are stuck although their agent was ended, by the names of their threads.
+    pub fn set_stuck(&self, names: Vec<String>) {
+        self.stuck_count
             .set(i64::try_from(names.len()).unwrap_or(i64::MAX));
         *self
-            .standing_still
+            .stuck_names
             .lock()
             .unwrap_or_else(PoisonError::into_inner) = names;
     }
 
-    /// Those of [`Self::set_standing_still`].
+    /// The slots of [`Self::set_stuck`].
     #[must_use]
-    pub fn standing_still(&self) -> Vec<String> {
-        let names = self.standing_still.lock();
+    pub fn stuck(&self) -> Vec<String> {
+        let names = self.stuck_names.lock();
         names.unwrap_or_else(PoisonError::into_inner).clone()
     }
 
-    /// A slot has played episodes, and they are committed.
-    pub fn played(&self, slot: &str, outcomes: &[EpisodeOutcome], timing: &SlotTiming) {
+    /// Records the committed episodes of a slot.
+    pub fn record_episodes(&self, slot: &str, outcomes: &[EpisodeOutcome], timing: &SlotTiming) {
         for outcome in outcomes {
-            let of_task = OfTask {
+            let labels = TaskLabels {
                 task: outcome.task.as_str(),
             };
-            self.episodes.get_or_create(&of_task).inc();
-            let faults = self.faults.get_or_create_owned(&of_task);
+            self.episodes.get_or_create(&labels).inc();
+            let faults = self.faults.get_or_create_owned(&labels);
             faults.inc_by(outcome.fault.is_some().into());
-            let answers = self.answers.get_or_create_owned(&of_task);
+            let answers = self.answers.get_or_create_owned(&labels);
             answers.observe(outcome.computation_time.mean_s);
         }
         self.reruns.inc_by(timing.host_noise_reruns.into());
@@ -202,12 +202,12 @@ impl Slots {
         for (of, seconds) in [("p50", p50), ("p99", p99), ("max", max)] {
             let slot = slot.to_owned();
             self.round_trips
-                .get_or_create(&RoundTrip { slot, of })
+                .get_or_create(&RoundTripLabels { slot, of })
                 .set(seconds);
         }
         let slot = slot.to_owned();
         self.stall
-            .get_or_create(&OfSlot { slot })
+            .get_or_create(&SlotLabels { slot })
             .set(timing.longest_stall_s);
     }
 }
@@ -218,27 +218,27 @@ impl fmt::Debug for Slots {
     }
 }
 
-/// A slot that works on a unit.
+/// Guard of a slot that runs a job.
 #[derive(Debug)]
-pub struct Busy {
+pub struct BusySlot {
     slots: Slots,
     work: &'static str,
 }
 
-impl Busy {
-    /// The unit is done with.
-    pub fn end(self, end: UnitEnd, took: Duration) {
+impl BusySlot {
+    /// Records the end of the job.
+    pub fn end(self, end: JobEnd, took: Duration) {
         let work = self.work;
         let end = end.as_str();
-        self.slots.units.get_or_create(&Ended { work, end }).inc();
+        self.slots.jobs.get_or_create(&JobEndLabels { work, end }).inc();
         self.slots
             .durations
-            .get_or_create(&OfWork { work })
+            .get_or_create(&JobLabels { work })
             .observe(took.as_secs_f64());
     }
 }
 
-impl Drop for Busy {
+impl Drop for BusySlot {
     fn drop(&mut self) {
         self.slots.busy.dec();
     }

@@ -5,33 +5,33 @@ use prometheus_client::{
 };
 use std::{fmt, time::Duration};
 
-/// Upper bounds, seconds: a board from the cache takes less than the first, a request that is given up 30.
+/// Bucket bounds, seconds: a cached board takes less than the first, a request that times out 30.
 const DURATIONS_S: [f64; 12] = [
     0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 5.0, 30.0,
 ];
 
-/// Requests, by route: the pattern of the path, so that there are as many as the server has routes.
+/// Metrics of requests by route. A route is the pattern of the path, so that the number of series is bounded.
 #[derive(Clone)]
 pub struct Web {
-    requests: Family<Answered, Counter>,
-    durations: Family<OfRoute, Histogram, fn() -> Histogram>,
-    refused: Family<Refused, Counter>,
+    requests: Family<ResponseLabels, Counter>,
+    durations: Family<RouteLabels, Histogram, fn() -> Histogram>,
+    refused: Family<RefusalLabels, Counter>,
 }
 
 #[derive(Debug, Clone, PartialEq, Eq, Hash, EncodeLabelSet)]
-struct Answered {
+struct ResponseLabels {
     method: &'static str,
     route: String,
     status: u16,
 }
 
 #[derive(Debug, Clone, PartialEq, Eq, Hash, EncodeLabelSet)]
-struct OfRoute {
+struct RouteLabels {
     route: String,
 }
 
 #[derive(Debug, Clone, PartialEq, Eq, Hash, EncodeLabelSet)]
-struct Refused {
+struct RefusalLabels {
     because: &'static str,
 }
 
@@ -45,42 +45,42 @@ impl Web {
         all.register("requests", "Requests answered", web.requests.clone());
         all.register_with_unit(
             "request_duration",
-            "From a request's head to the head of its answer",
+            "From the head of a request to the head of its response",
             Unit::Seconds,
             web.durations.clone(),
         );
         all.register(
             "refused",
-            "Requests that were refused before their handlers: rate, or too many at once",
+            "Requests that were refused before their handlers: by the rate limit, or too many at once",
             web.refused.clone(),
         );
         web
     }
 
-    /// A request was answered. `route` is the pattern of its path; none: there is no such path. Methods that the server
-    /// does not know count as one.
-    pub fn answered(&self, method: &str, route: Option<&str>, status: u16, took: Duration) {
+    /// Records a response. `route` is the pattern of the request's path; `None` if there is no such path. All methods
+    /// that the server does not know are counted together.
+    pub fn record_response(&self, method: &str, route: Option<&str>, status: u16, took: Duration) {
         let method = ["GET", "HEAD", "POST", "PUT", "PATCH", "DELETE", "OPTIONS"]
             .into_iter()
             .find(|known| *known == method)
             .unwrap_or("other");
         let route = route.unwrap_or("none").to_owned();
-        let of_route = OfRoute {
+        let route_labels = RouteLabels {
             route: route.clone(),
         };
-        let answered = Answered {
+        let response_labels = ResponseLabels {
             method,
             route,
             status,
         };
-        self.requests.get_or_create(&answered).inc();
+        self.requests.get_or_create(&response_labels).inc();
         let took_s = took.as_secs_f64();
-        self.durations.get_or_create(&of_route).observe(took_s);
+        self.durations.get_or_create(&route_labels).observe(took_s);
     }
 
-    /// A request was refused before its handler saw it: `because` is a word or two for it.
-    pub fn refused(&self, because: &'static str) {
-        self.refused.get_or_create(&Refused { because }).inc();
+    /// Records a request that was refused before its handler was called; `because` is the value of the label.
+    pub fn record_refusal(&self, because: &'static str) {
+        self.refused.get_or_create(&RefusalLabels { because }).inc();
     }
 }
 

@@ -1,4 +1,4 @@
-//! Which addresses may be connected to for a stranger: public ones on the Internet, and what the operator allows.
+//! Addresses that webhooks may have: public ones on the Internet, and those that the operator allows.
 
 use ipnet::{IpNet, Ipv4Net, Ipv6Net};
 use reqwest::Url;
@@ -7,17 +7,17 @@ use std::net::{IpAddr, Ipv4Addr, Ipv6Addr};
 
 const MAX_URL: usize = 1000;
 
-/// Where webhooks may be.
+/// Permitted addresses of webhooks.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct WebhookRules {
-    /// Are they told at all?
+    /// Whether webhooks are sent at all.
     pub enabled: bool,
-    /// May they be told without TLS?
+    /// Whether plain HTTP is allowed.
     pub allow_http: bool,
-    /// Ports that they may have; empty: any.
+    /// Allowed ports; empty: any.
     pub ports: Vec<u16>,
-    /// Networks that are not public, where they may be all the same.
+    /// Private networks that are allowed nevertheless.
     pub allow_private: Vec<IpNet>,
 }
 
@@ -32,21 +32,21 @@ impl Default for WebhookRules {
     }
 }
 
-/// Why nothing is sent to an address.
+/// Why an address is rejected.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum NotPublic {
     #[error("a loopback address")]
     Loopback,
-    /// The operator's or a neighbour's network.
+    /// In the operator's or a neighbouring network.
     #[error("an address of a private network")]
     Private,
-    /// What a network has for itself: routers, cloud metadata.
+    /// Local to a network segment: routers, cloud metadata.
     #[error("a link-local address")]
     LinkLocal,
     #[error("a multicast or broadcast address")]
     Multicast,
-    /// Nobody's, or for documents, measurements and translation.
-    #[error("an address that is nobody's on the Internet")]
+    /// Unassigned, or for documentation, benchmarks and translation.
+    #[error("an address that is not assigned to any host on the Internet")]
     Reserved,
 }
 
@@ -58,38 +58,38 @@ const fn v6(a: u16, b: u16, length: u8) -> Ipv6Net {
     Ipv6Net::new_assert(Ipv6Addr::new(a, b, 0, 0, 0, 0, 0, 0), length)
 }
 
-/// Of the registry of IPv4 addresses for special purposes (RFC 6890 and later) what is not reachable everywhere.
+/// Entries of the registry of special-purpose IPv4 addresses (RFC 6890 and later) that are not globally reachable.
 const V4: [(Ipv4Net, NotPublic); 16] = [
     (v4(0, 0, 0, 8), NotPublic::Reserved),
     (v4(10, 0, 0, 8), NotPublic::Private),
-    (v4(100, 64, 0, 10), NotPublic::Private), // a provider's own
+    (v4(100, 64, 0, 10), NotPublic::Private), // carrier-grade NAT
     (v4(127, 0, 0, 8), NotPublic::Loopback),
     (v4(169, 254, 0, 16), NotPublic::LinkLocal),
     (v4(172, 16, 0, 12), NotPublic::Private),
     (v4(192, 0, 0, 24), NotPublic::Reserved),
-    (v4(192, 0, 2, 24), NotPublic::Reserved), // documents
+    (v4(192, 0, 2, 24), NotPublic::Reserved), // documentation
     (v4(192, 88, 99, 24), NotPublic::Reserved),
     (v4(192, 168, 0, 16), NotPublic::Private),
-    (v4(198, 18, 0, 15), NotPublic::Private), // measurements
-    (v4(198, 51, 100, 24), NotPublic::Reserved), // documents
-    (v4(203, 0, 113, 24), NotPublic::Reserved), // documents
+    (v4(198, 18, 0, 15), NotPublic::Private), // benchmarks
+    (v4(198, 51, 100, 24), NotPublic::Reserved), // documentation
+    (v4(203, 0, 113, 24), NotPublic::Reserved), // documentation
     (v4(224, 0, 0, 4), NotPublic::Multicast),
     (v4(255, 255, 255, 24), NotPublic::Multicast),
     (v4(240, 0, 0, 4), NotPublic::Reserved),
 ];
 
-/// Of IPv6: only 2000::/3 is anybody's, but for some of it.
+/// Special-purpose IPv6 networks. Outside of 2000::/3 nothing is public.
 const V6: [(Ipv6Net, NotPublic); 7] = [
     (v6(0xfc00, 0, 7), NotPublic::Private),
     (v6(0xfe80, 0, 10), NotPublic::LinkLocal),
     (v6(0xff00, 0, 8), NotPublic::Multicast),
     (v6(0x2001, 0, 23), NotPublic::Reserved), // Teredo and other protocols
-    (v6(0x2001, 0xdb8, 32), NotPublic::Reserved), // documents
-    (v6(0x2002, 0, 16), NotPublic::Reserved), // an IPv4 address inside of an IPv6 one
-    (v6(0x3fff, 0, 20), NotPublic::Reserved), // documents
+    (v6(0x2001, 0xdb8, 32), NotPublic::Reserved), // documentation
+    (v6(0x2002, 0, 16), NotPublic::Reserved), // 6to4: contains an IPv4 address
+    (v6(0x3fff, 0, 20), NotPublic::Reserved), // documentation
 ];
 
-/// Where addresses of IPv6 on the Internet are.
+/// Global unicast addresses of IPv6.
 const GLOBAL: Ipv6Net = v6(0x2000, 0, 3);
 
 fn check_public(address: IpAddr) -> Result<(), NotPublic> {
@@ -111,12 +111,12 @@ fn check_public(address: IpAddr) -> Result<(), NotPublic> {
 }
 
 impl WebhookRules {
-    /// May anything be sent there?
+    /// Checks that messages may be sent to an address.
     ///
     /// # Errors
-    /// If the address is not public and the operator has not allowed it.
+    /// If the address is not public and not allowed by the operator.
     pub fn check_address(&self, address: IpAddr) -> Result<(), NotPublic> {
-        // An IPv4 address that is written as one of IPv6 leads to the same host.
+        // An IPv4-mapped IPv6 address leads to the same host.
         let address = address.to_canonical();
         if self.allow_private.iter().any(|net| net.contains(&address)) {
             return Ok(());
@@ -124,10 +124,10 @@ impl WebhookRules {
         check_public(address)
     }
 
-    /// Takes a webhook's URL apart. A name is not looked up: whatever it means when something is sent counts.
+    /// Parses and checks a webhook's URL. Host names are resolved only when a message is sent.
     ///
     /// # Errors
-    /// What was expected and what came.
+    /// A text with what was expected and what came.
     pub fn check_url(&self, text: &str) -> Result<Url, String> {
         if text.len() > MAX_URL {
             return Err(format!(
@@ -149,7 +149,7 @@ impl WebhookRules {
         }
         if !url.username().is_empty() || url.password().is_some() {
             return Err(
-                "expected no name and password in the URL: the signature says who sends".into(),
+                "expected no name and password in the URL: the signature identifies the sender".into(),
             );
         }
         if url.fragment().is_some() {
@@ -172,7 +172,7 @@ impl WebhookRules {
     }
 }
 
-/// The address that a URL's host is, if it is no name.
+/// The IP address in a URL, unless its host is a name.
 pub(crate) fn literal(url: &Url) -> Option<IpAddr> {
     let host = url.host_str()?;
     let host = host.strip_prefix('[').unwrap_or(host);
@@ -184,7 +184,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn only_addresses_of_the_internet_are_public() {
+    fn special_purpose_addresses_are_not_public() {
         for public in [
             "1.1.1.1",
             "8.8.8.8",
@@ -272,7 +272,7 @@ mod tests {
             "https://example.org/faceoff?a=b",
             "https://example.org:8443/",
             "https://1.1.1.1/",
-            "https://localhost/", // looked up when something is sent
+            "https://localhost/", // resolved when a message is sent
         ] {
             rules.check_url(good).unwrap();
         }
@@ -293,7 +293,7 @@ mod tests {
             ("https://[::ffff:127.0.0.1]/", "loopback"),
             ("https://[fe80::1]/", "link-local"),
             ("https://169.254.169.254/latest/meta-data", "link-local"),
-            ("https://0.0.0.0/", "nobody's"),
+            ("https://0.0.0.0/", "not assigned"),
         ] {
             let error = rules.check_url(bad).unwrap_err();
             assert!(error.contains(word), "{bad}: {error}");

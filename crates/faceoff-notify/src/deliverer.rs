@@ -1,11 +1,11 @@
-//! Tells webhooks what happens: makes deliveries of the log and sends what is due.
+//! Delivery to webhooks: turns events of the log into deliveries and sends those that are due.
 
 use crate::{
-    about::About,
+    notice_filter::NoticeFilter,
     address::WebhookRules,
     boxed,
     feed::Feed,
-    notice::{Notice, Reader},
+    notice::{Notice, Audience},
     sender::Sender,
 };
 use faceoff_store::{Change, Delivery, PlannedDeliveries, Store, StoreError, Subject, Webhook};
@@ -23,25 +23,25 @@ use tokio::{
 };
 use tokio_util::sync::CancellationToken;
 
-/// Messages under way at a time, one of each webhook …
-const AT_ONCE: usize = 32;
-/// … and so many of an owner: receivers that never answer hold up nobody else's.
-const OF_AN_OWNER: usize = 3;
-/// Between two looks at the log: what happens in between is planned together.
-const PACE: Duration = Duration::from_secs(1);
-/// The longest that nothing is looked at: another process may write, and a machine may sleep.
-const LOOK: Duration = Duration::from_secs(5);
+/// Maximum number of concurrent messages; each webhook has at most one.
+const MAX_CONCURRENT: usize = 32;
+/// Maximum number of concurrent messages of one owner, so that slow receivers do not delay other owners' messages.
+const MAX_CONCURRENT_PER_OWNER: usize = 3;
+/// Minimum time between two reads of the log: events in between are planned together.
+const MIN_INTERVAL: Duration = Duration::from_secs(1);
+/// Maximum time between two reads of the log: another process may write to it, and a machine may sleep.
+const MAX_INTERVAL: Duration = Duration::from_secs(5);
 
-/// What could not be noted is sent again, but not at once: a disk that is full must not make us send without a pause.
-const UNNOTED: Duration = Duration::from_secs(60);
+/// Pause after an attempt that could not be recorded. It is sent again, but a full disk must not cause a tight loop.
+const UNRECORDED_PAUSE: Duration = Duration::from_secs(60);
 
-/// What a webhook is sent, by the conventions: what happened, when, and what it is about.
+/// Body of a message, by the Standard Webhooks conventions: event kind, time and data.
 #[must_use]
 pub fn message(kind: &str, at: jiff::Timestamp, data: &Value) -> String {
     json!({ "type": kind, "timestamp": at, "data": data }).to_string()
 }
 
-/// Whoever tells webhooks. All that it knows is in the store: one that is killed sends what it had not noted again, by the
+/// Sends messages to webhooks. Its state is in the store: after a crash it sends unrecorded attempts again, with the
 /// same id.
 #[derive(Debug, Clone)]
 pub struct Deliverer {
@@ -51,43 +51,43 @@ pub struct Deliverer {
     feed: Arc<Feed>,
 }
 
-/// What is being sent.
+/// Deliveries that are being sent.
 #[derive(Debug, Default)]
-struct UnderWay {
-    sending: JoinSet<()>,
-    of: HashMap<task::Id, (WebhookId, Option<TeamId>)>,
+struct ActiveDeliveries {
+    tasks: JoinSet<()>,
+    webhooks: HashMap<task::Id, (WebhookId, Option<TeamId>)>,
 }
 
-impl UnderWay {
-    fn has_room_for(&self, webhook: &Webhook) -> bool {
-        let of_owner = self.of.values().filter(|(_, team)| *team == webhook.team);
-        self.of.len() < AT_ONCE
-            && of_owner.count() < OF_AN_OWNER
-            && self.of.values().all(|(id, _)| *id != webhook.id)
+impl ActiveDeliveries {
+    fn can_start(&self, webhook: &Webhook) -> bool {
+        let same_owner = self.webhooks.values().filter(|(_, team)| *team == webhook.team);
+        self.webhooks.len() < MAX_CONCURRENT
+            && same_owner.count() < MAX_CONCURRENT_PER_OWNER
+            && self.webhooks.values().all(|(id, _)| *id != webhook.id)
     }
 
-    /// Waits for the end of one; false: none is under way.
-    async fn one_ended(&mut self) -> bool {
-        let Some(ended) = self.sending.join_next_with_id().await else {
+    /// Waits for the end of one delivery; false if there is none.
+    async fn join_next(&mut self) -> bool {
+        let Some(ended) = self.tasks.join_next_with_id().await else {
             return false;
         };
         let id = match ended {
             Ok((id, ())) => id,
             Err(error) => {
-                tracing::error!(%error, "a message to a webhook was not sent; it is sent again");
+                tracing::error!(%error, "sending a message to a webhook failed; it is sent again");
                 error.id()
             }
         };
-        self.of.remove(&id);
+        self.webhooks.remove(&id);
         true
     }
 }
 
 impl Deliverer {
-    /// One that sends by these rules, and by `tls` to https.
+    /// A deliverer with these rules, and with `tls` for https.
     ///
     /// # Errors
-    /// If no client can be made of that.
+    /// If the HTTP client cannot be built.
     pub fn new(
         store: Store,
         clock: Clock,
@@ -102,38 +102,38 @@ impl Deliverer {
         })
     }
 
-    /// Tells until `shutdown`. What fails of the database is tried again.
+    /// Delivers until `shutdown`. Database errors are retried.
     #[boxed]
     pub async fn run(self, shutdown: CancellationToken) {
-        let mut under_way = UnderWay::default();
+        let mut active = ActiveDeliveries::default();
         let mut changes = self.store.events();
         let mut has_failed = false;
         loop {
             let planned_at = Instant::now();
-            let next = match self.step(&mut under_way).await {
+            let next = match self.step(&mut active).await {
                 Ok(next) => {
                     has_failed = false;
                     next
                 }
                 Err(error) => {
-                    // Once: it comes again every few seconds.
+                    // Logged once: the error repeats every few seconds.
                     if !has_failed {
-                        tracing::error!(%error, "webhooks could not be told; trying again");
+                        tracing::error!(%error, "webhooks could not be processed; trying again");
                     }
                     has_failed = true;
-                    LOOK
+                    MAX_INTERVAL
                 }
             };
-            let wake = planned_at + next.min(LOOK);
+            let wake = planned_at + next.min(MAX_INTERVAL);
             tokio::select! {
-                // What is under way is sent again after the next start.
+                // Active deliveries are sent again after the next start.
                 () = shutdown.cancelled() => return,
                 () = sleep_until(wake) => {}
-                true = under_way.one_ended() => {}
-                () = changed(&mut changes) => {
+                true = active.join_next() => {}
+                () = wait_for_change(&mut changes) => {
                     tokio::select! {
                         () = shutdown.cancelled() => return,
-                        () = sleep_until(planned_at + PACE) => {}
+                        () = sleep_until(planned_at + MIN_INTERVAL) => {}
                     }
                 }
             }
@@ -141,24 +141,24 @@ impl Deliverer {
         }
     }
 
-    /// Plans and sends what is due, and again until nothing is; [`run`](Self::run) does so at the right times.
+    /// Plans and sends due deliveries until there are none; [`run`](Self::run) does this continuously.
     ///
     /// # Errors
     /// If the database fails.
     #[boxed]
     pub async fn deliver_due(&self) -> Result<(), StoreError> {
-        let mut under_way = UnderWay::default();
+        let mut active = ActiveDeliveries::default();
         loop {
-            self.step(&mut under_way).await?;
-            let more = under_way.one_ended().await;
-            if !more && self.store.webhooks_behind().await?.is_empty() {
+            self.step(&mut active).await?;
+            let more = active.join_next().await;
+            if !more && self.store.webhooks_with_new_events().await?.is_empty() {
                 return Ok(());
             }
         }
     }
 
-    /// Plans a page of the log, and begins to send what is due and has room. How long until there is something to do.
-    async fn step(&self, under_way: &mut UnderWay) -> Result<Duration, StoreError> {
+    /// Plans a page of the log, and starts due deliveries within the limits. Returns the time until the next step.
+    async fn step(&self, active: &mut ActiveDeliveries) -> Result<Duration, StoreError> {
         let has_more = self.plan().await?;
         let now = self.clock.now();
         for delivery in self.store.due_deliveries(now).await? {
@@ -166,49 +166,49 @@ impl Deliverer {
                 Err(StoreError::NotFound(_)) => continue,
                 webhook => webhook?,
             };
-            if !under_way.has_room_for(&webhook) {
+            if !active.can_start(&webhook) {
                 continue;
             }
-            let of = (webhook.id, webhook.team);
+            let owner = (webhook.id, webhook.team);
             let (deliverer, url) = (self.clone(), webhook.url);
-            let started = under_way.sending.spawn(async move {
+            let started = active.tasks.spawn(async move {
                 deliverer.send(&url, delivery).await;
             });
-            under_way.of.insert(started.id(), of);
+            active.webhooks.insert(started.id(), owner);
         }
         if has_more {
             return Ok(Duration::ZERO);
         }
-        let next = self.store.next_delivery().await?;
-        // What is due and not under way waits for the end of something that is.
-        let wait = next.filter(|at| *at > now).map_or(LOOK, |at| {
-            Duration::try_from(at.duration_since(now)).unwrap_or(LOOK)
+        let next = self.store.next_delivery_at().await?;
+        // Due deliveries beyond the limits start when an active one ends.
+        let wait = next.filter(|at| *at > now).map_or(MAX_INTERVAL, |at| {
+            Duration::try_from(at.duration_since(now)).unwrap_or(MAX_INTERVAL)
         });
         Ok(wait)
     }
 
-    /// Makes deliveries of the next page of the log, for all webhooks that have not seen it. Is there more?
+    /// Plans deliveries of the next page of the log, for all webhooks that have not seen it. True if there may be more.
     async fn plan(&self) -> Result<bool, StoreError> {
-        let mut at_the_same_place: BTreeMap<i64, Vec<Webhook>> = BTreeMap::new();
-        for webhook in self.store.webhooks_behind().await? {
-            at_the_same_place
+        let mut by_position: BTreeMap<i64, Vec<Webhook>> = BTreeMap::new();
+        for webhook in self.store.webhooks_with_new_events().await? {
+            by_position
                 .entry(webhook.seen)
                 .or_default()
                 .push(webhook);
         }
         let mut planned = Vec::new();
-        for (after, webhooks) in at_the_same_place {
+        for (after, webhooks) in by_position {
             let Some(page) = self.feed.after(after).await? else {
                 continue;
             };
             for webhook in webhooks {
-                let about = About::of(&webhook.about);
-                let reader = webhook.team.map_or(Reader::Organiser, Reader::Team);
-                let is_told = |notice: &&Notice| {
-                    about.as_ref().is_ok_and(|about| about.takes(notice))
-                        && notice.is_told_to(reader, &page.stages)
+                let filter = NoticeFilter::parse(&webhook.topics);
+                let audience = webhook.team.map_or(Audience::Organiser, Audience::Team);
+                let is_sent = |notice: &&Notice| {
+                    filter.as_ref().is_ok_and(|filter| filter.matches(notice))
+                        && notice.is_visible_to(audience, &page.stages)
                 };
-                let told = page.notices.iter().filter(is_told).map(|notice| {
+                let bodies = page.notices.iter().filter(is_sent).map(|notice| {
                     let body = message(&notice.kind, notice.at, &notice.json());
                     (notice.id, notice.kind.clone(), body)
                 });
@@ -216,7 +216,7 @@ impl Deliverer {
                     webhook: webhook.id,
                     after,
                     until: page.until,
-                    bodies: told.collect(),
+                    bodies: bodies.collect(),
                 });
             }
         }
@@ -229,29 +229,29 @@ impl Deliverer {
         Ok(has_more)
     }
 
-    /// Sends something and notes what came of it.
+    /// Sends a message and records the attempt.
     async fn send(&self, url: &str, delivery: Delivery) {
         let now = self.clock.now();
-        let noted = async {
+        let recorded = async {
             let keys = self.store.webhook_keys(delivery.webhook, now).await?;
             let (attempt, means) = self.sender.send(url, &keys, &delivery, now).await;
-            self.store.note_attempt(delivery.id, attempt, means).await
+            self.store.record_attempt(delivery.id, attempt, means).await
         };
-        match noted.await {
+        match recorded.await {
             Ok(()) | Err(StoreError::NotFound(_)) => {}
             Err(error) => {
-                tracing::error!(delivery = %delivery.id, %error, "what came of a message to a webhook is not noted; it is sent again");
-                sleep(UNNOTED).await;
+                tracing::error!(delivery = %delivery.id, %error, "an attempt to send to a webhook was not recorded; it is sent again");
+                sleep(UNRECORDED_PAUSE).await;
             }
         }
     }
 }
 
-/// Until something is in the log that was not.
-async fn changed(changes: &mut broadcast::Receiver<Change>) {
+/// Waits for a new event in the log.
+async fn wait_for_change(changes: &mut broadcast::Receiver<Change>) {
     loop {
         match changes.recv().await {
-            // A test is to be sent.
+            // A test message was queued.
             Ok(Change::Progress(Subject::Season)) => return,
             Ok(Change::Progress(_)) => {}
             Ok(Change::Recorded(_)) | Err(RecvError::Lagged(_)) => return,

@@ -1,36 +1,36 @@
-//! The log, read once for all who follow it.
+//! The feed of the log: each page is read once for all followers.
 
-use crate::{boxed, notice::Notice, stages_told::StagesTold};
-use faceoff_store::{Concern, Store, StoreError, Subject};
+use crate::{boxed, notice::Notice, stage_visibility::StageVisibility};
+use faceoff_store::{SubjectContext, Store, StoreError, Subject};
 use std::{
     collections::{HashMap, VecDeque},
     sync::Arc,
 };
 use tokio::sync::Mutex;
 
-/// Events of a page at most.
-const PAGE: u32 = 200;
-/// Pages that are kept: those who follow are at the same place, or nearly.
-const KEPT: usize = 8;
+/// Maximum number of events in a page.
+const PAGE_SIZE: u32 = 200;
+/// Number of cached pages: most followers are at the same position, or nearly.
+const CACHED_PAGES: usize = 8;
 
-/// What happened after an event, from the oldest on.
+/// Notices after an event, the oldest first.
 #[derive(Debug)]
 pub struct Page {
-    /// After the event with this id.
+    /// Id of the event before the page.
     after: i64,
     pub notices: Vec<Notice>,
-    /// What is kept from others, as of the end of the page or later.
-    pub stages: StagesTold,
-    /// The id of the last one; what comes next comes after it.
+    /// Visibility of results, as of the end of the page or later.
+    pub stages: StageVisibility,
+    /// Id of the last event of the page.
     pub until: i64,
 }
 
-/// Reads the log. Everybody who waits reads the same page once something happens: it is read once, and a reader is no
-/// more than the id that it has come to.
+/// Reads the log. All waiting followers get the same cached page. A follower's only state is the id of the last event
+/// that it has seen.
 #[derive(Debug)]
 pub struct Feed {
     store: Store,
-    kept: Mutex<VecDeque<Arc<Page>>>,
+    cache: Mutex<VecDeque<Arc<Page>>>,
 }
 
 impl Feed {
@@ -38,45 +38,45 @@ impl Feed {
     pub fn new(store: Store) -> Self {
         Self {
             store,
-            kept: Mutex::default(),
+            cache: Mutex::default(),
         }
     }
 
-    /// What happened after the event with this id, as far as a page goes; `None`: nothing yet.
+    /// The page after the event with this id; `None` if there are no later events yet.
     ///
     /// # Errors
     /// If the log cannot be read.
     #[boxed]
     pub async fn after(&self, id: i64) -> Result<Option<Arc<Page>>, StoreError> {
-        let mut kept = self.kept.lock().await;
-        // Nothing of it changes any more: what is newer comes after it.
-        if let Some(page) = kept.iter().find(|page| page.after == id) {
+        let mut cache = self.cache.lock().await;
+        // Pages never change: newer events are on later pages.
+        if let Some(page) = cache.iter().find(|page| page.after == id) {
             return Ok(Some(Arc::clone(page)));
         }
-        let records = self.store.events_after(id, PAGE).await?;
+        let records = self.store.events_after(id, PAGE_SIZE).await?;
         let Some(until) = records.last().map(|record| record.id) else {
             return Ok(None);
         };
         let mut notices = Vec::with_capacity(records.len());
-        // Most of what happens comes in rows, of one evaluation.
-        let mut concerns: HashMap<Subject, Concern> = HashMap::new();
+        // Consecutive events often belong to the same evaluation.
+        let mut contexts: HashMap<Subject, SubjectContext> = HashMap::new();
         for record in records {
             let subject = record.subject;
-            let concern = match concerns.get(&subject) {
-                Some(concern) => *concern,
-                None => self.store.concern(subject).await?,
+            let context = match contexts.get(&subject) {
+                Some(context) => *context,
+                None => self.store.subject_context(subject).await?,
             };
-            concerns.insert(subject, concern);
-            notices.push(Notice::new(record, concern));
+            contexts.insert(subject, context);
+            notices.push(Notice::new(record, context));
         }
         let page = Arc::new(Page {
             after: id,
             notices,
-            stages: StagesTold::read(&self.store).await?,
+            stages: StageVisibility::read(&self.store).await?,
             until,
         });
-        kept.truncate(KEPT - 1);
-        kept.push_front(Arc::clone(&page));
+        cache.truncate(CACHED_PAGES - 1);
+        cache.push_front(Arc::clone(&page));
         Ok(Some(page))
     }
 }

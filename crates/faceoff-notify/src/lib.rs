@@ -1,14 +1,13 @@
-//! What is told to those who do not ask: which change of the season is told to whom, in which words, and the webhooks
-//! that carry it.
+//! Notifications: notices of changes, their visibility, and their delivery to webhooks.
 //!
-//! A notice says what happened to what, so that a page or a program knows what to ask for again; it holds no score and
-//! nobody's words. Who is told of what is decided in one file (`notice.rs`), for the stream of events of the API, for
-//! webhooks and for the feed.
+//! A notice names an event and its subject, so that a page or an API client knows what to reload. It contains no scores
+//! and no free texts. Visibility is decided in one file (`notice.rs`), for the API's event stream, webhooks and the
+//! feed.
 //!
-//! This crate answers no request, decides nothing about a season, and trusts no address that a webhook names: names are
-//! resolved here, and what is not public on the Internet is not connected to.
+//! This crate handles no requests and changes nothing in a season. It does not trust the addresses of webhooks: names
+//! are resolved here, and only public addresses on the Internet are connected to.
 
-mod about;
+mod notice_filter;
 mod address;
 mod deliverer;
 mod feed;
@@ -16,17 +15,17 @@ mod notice;
 mod resolver;
 mod secret;
 mod sender;
-mod stages_told;
+mod stage_visibility;
 mod topic;
 
-/// What others await is boxed, so that it is compiled here, once, and not by each crate that awaits it.
+/// Boxes public async functions, so that they are compiled once here and not by each crate that awaits them.
 pub(crate) use async_recursion::async_recursion as boxed;
 
-pub use about::{About, MAX_ITEMS, ParseAboutError};
+pub use notice_filter::{NoticeFilter, MAX_FILTER_ITEMS, ParseNoticeFilterError};
 pub use address::{NotPublic, WebhookRules};
 pub use deliverer::{Deliverer, message};
 pub use feed::{Feed, Page};
-pub use notice::{Notice, Reader};
+pub use notice::{Notice, Audience};
 pub use secret::WebhookSecret;
-pub use stages_told::StagesTold;
+pub use stage_visibility::StageVisibility;
 pub use topic::Topic;

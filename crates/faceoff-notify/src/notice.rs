@@ -1,35 +1,34 @@
-//! A change, as it is told, and who is told of it.
+//! Notices of events, and their visibility.
 
-use crate::stages_told::StagesTold;
-use faceoff_store::{Concern, Event, EventRecord, Subject};
+use crate::stage_visibility::StageVisibility;
+use faceoff_store::{SubjectContext, Event, EventRecord, Subject};
 use faceoff_types::TeamId;
 use jiff::Timestamp;
 use serde_json::{Map, Value, json};
 
+/// Recipients that a notice is checked for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Reader {
-    Anybody,
+pub enum Audience {
+    Public,
     Team(TeamId),
     Organiser,
 }
 
 #[derive(Debug, Clone, PartialEq)]
 pub struct Notice {
-    /// Of the event: they rise.
+    /// Id of the event; ids are ascending.
     pub id: i64,
     pub at: Timestamp,
-    /// What happened, by name.
+    /// Kind of the event, as `day_released`.
     pub kind: String,
     pub event: Event,
     pub subject: Subject,
-    /// With what belongs to it.
-    pub concern: Concern,
+    pub context: SubjectContext,
 }
 
 impl Notice {
-    /// Of an event and whom it concerns.
     #[must_use]
-    pub fn new(record: EventRecord, concern: Concern) -> Self {
+    pub fn new(record: EventRecord, context: SubjectContext) -> Self {
         let fields = serde_json::to_value(&record.event).unwrap_or_default();
         Self {
             id: record.id,
@@ -37,51 +36,51 @@ impl Notice {
             kind: fields["kind"].as_str().unwrap_or_default().to_owned(),
             event: record.event,
             subject: record.subject,
-            concern,
+            context,
         }
     }
 
-    /// Is it told to somebody?
+    /// Whether an audience may see the notice.
     #[must_use]
-    pub fn is_told_to(&self, reader: Reader, stages: &StagesTold) -> bool {
-        match reader {
-            Reader::Organiser => true,
-            Reader::Team(team) => self.is_own(team) || self.is_public(stages),
-            Reader::Anybody => self.is_public(stages),
+    pub fn is_visible_to(&self, audience: Audience, stages: &StageVisibility) -> bool {
+        match audience {
+            Audience::Organiser => true,
+            Audience::Team(team) => self.is_own(team) || self.is_public(stages),
+            Audience::Public => self.is_public(stages),
         }
     }
 
-    /// Is it a team's own business?
-    fn is_own(&self, reader: TeamId) -> bool {
-        match self.concern {
-            // That we broke something, and play it again, is ours.
+    /// Whether the notice concerns a team privately.
+    fn is_own(&self, own: TeamId) -> bool {
+        match self.context {
+            // Platform faults are visible to organisers only.
             _ if matches!(self.event, Event::UnitGivenBack { .. }) => false,
-            Concern::Team(team)
-            | Concern::Submission { team, .. }
-            | Concern::Ablation { team, .. }
-            | Concern::Evaluation { team, .. } => team == reader,
-            Concern::Game { teams, .. } => teams.contains(&reader),
-            Concern::Question { team } => team == Some(reader),
-            // When they sign in, and with which keys, is their own.
-            Concern::Person { team } => {
-                let is_told = matches!(
+            SubjectContext::Team(team)
+            | SubjectContext::Submission { team, .. }
+            | SubjectContext::Ablation { team, .. }
+            | SubjectContext::Evaluation { team, .. } => team == own,
+            SubjectContext::Game { teams, .. } => teams.contains(&own),
+            SubjectContext::Question { team } => team == Some(own),
+            // Sign-ins and tokens of a user are private.
+            SubjectContext::User { team } => {
+                let is_membership = matches!(
                     self.event,
                     Event::PersonJoined { .. } | Event::PersonLeft { .. }
                 );
-                is_told && team == Some(reader)
+                is_membership && team == Some(own)
             }
-            Concern::Season
-            | Concern::Stage { .. }
-            | Concern::Tournament(_)
-            | Concern::Organisers => false,
+            SubjectContext::Season
+            | SubjectContext::Stage { .. }
+            | SubjectContext::Tournament(_)
+            | SubjectContext::Organisers => false,
         }
     }
 
-    /// May everybody know? Of a stage that is blind, or whose boards stand still, nothing that tells of a result; of a
-    /// day that is not out only what boards show at once.
-    fn is_public(&self, stages: &StagesTold) -> bool {
-        match self.concern {
-            Concern::Evaluation {
+    /// Whether the notice is public. Results of blind stages and after a board freeze are hidden; before a day's release
+    /// only the events that boards show at once are public.
+    fn is_public(&self, stages: &StageVisibility) -> bool {
+        match self.context {
+            SubjectContext::Evaluation {
                 stage,
                 finished_at,
                 is_released,
@@ -93,61 +92,61 @@ impl Notice {
                 );
                 self.event.is_public()
                     && (is_released || is_shown_at_once)
-                    && stages.shows(stage, finished_at)
+                    && stages.is_result_visible(stage, finished_at)
             }
-            // All that is told of such a game is on its page.
-            Concern::Game { is_public, .. } => {
+            // Everything else about a public game is shown on its page.
+            SubjectContext::Game { is_public, .. } => {
                 is_public && !matches!(self.event, Event::UnitGivenBack { .. })
             }
-            Concern::Question { .. } => matches!(self.event, Event::Answered { public: true }),
-            Concern::Season | Concern::Stage { .. } | Concern::Tournament(_) | Concern::Team(_) => {
+            SubjectContext::Question { .. } => matches!(self.event, Event::Answered { public: true }),
+            SubjectContext::Season | SubjectContext::Stage { .. } | SubjectContext::Tournament(_) | SubjectContext::Team(_) => {
                 self.event.is_public()
             }
-            Concern::Submission { .. }
-            | Concern::Ablation { .. }
-            | Concern::Person { .. }
-            | Concern::Organisers => false,
+            SubjectContext::Submission { .. }
+            | SubjectContext::Ablation { .. }
+            | SubjectContext::User { .. }
+            | SubjectContext::Organisers => false,
         }
     }
 
-    /// Is it about this, or about something of it?
+    /// Whether the notice is about a subject or a part of it.
     pub(crate) fn is_about(&self, subject: Subject) -> bool {
-        let is_of_concern = match (subject, self.concern) {
+        let is_part = match (subject, self.context) {
             (Subject::Team(team), _) => self.teams().contains(&team),
-            (Subject::Stage(of), Concern::Stage { stage, .. })
-            | (Subject::Stage(of), Concern::Evaluation { stage, .. }) => of == stage,
-            (Subject::Day(of), Concern::Evaluation { stage, day, .. }) => {
-                (of.stage, of.date) == (stage, day)
+            (Subject::Stage(id), SubjectContext::Stage { stage, .. })
+            | (Subject::Stage(id), SubjectContext::Evaluation { stage, .. }) => id == stage,
+            (Subject::Day(other), SubjectContext::Evaluation { stage, day, .. }) => {
+                (other.stage, other.date) == (stage, day)
             }
-            (Subject::Submission(of), Concern::Evaluation { submission, .. })
-            | (Subject::Submission(of), Concern::Ablation { submission, .. }) => of == submission,
-            (Subject::Tournament(of), Concern::Game { tournament, .. }) => of == tournament,
+            (Subject::Submission(id), SubjectContext::Evaluation { submission, .. })
+            | (Subject::Submission(id), SubjectContext::Ablation { submission, .. }) => id == submission,
+            (Subject::Tournament(id), SubjectContext::Game { tournament, .. }) => id == tournament,
             _ => false,
         };
-        is_of_concern || subject == self.subject
+        is_part || subject == self.subject
     }
 
-    /// The teams that it is about.
+    /// Teams that the notice is about.
     fn teams(&self) -> Vec<TeamId> {
-        match (&self.event, &self.concern) {
+        match (&self.event, &self.context) {
             (Event::TeamsEntered { teams } | Event::TournamentOpened { teams, .. }, _) => {
                 teams.clone()
             }
             (Event::TeamOut { team, .. } | Event::TeamLeftTournament { team, .. }, _)
             | (Event::RegistrationApproved { team }, _)
-            | (_, Concern::Team(team))
-            | (_, Concern::Submission { team, .. })
-            | (_, Concern::Ablation { team, .. })
-            | (_, Concern::Evaluation { team, .. }) => vec![*team],
-            (_, Concern::Game { teams, .. }) if teams[0] == teams[1] => vec![teams[0]],
-            (_, Concern::Game { teams, .. }) => teams.to_vec(),
-            (_, Concern::Person { team }) => team.iter().copied().collect(),
-            // Who asks is told to nobody.
+            | (_, SubjectContext::Team(team))
+            | (_, SubjectContext::Submission { team, .. })
+            | (_, SubjectContext::Ablation { team, .. })
+            | (_, SubjectContext::Evaluation { team, .. }) => vec![*team],
+            (_, SubjectContext::Game { teams, .. }) if teams[0] == teams[1] => vec![teams[0]],
+            (_, SubjectContext::Game { teams, .. }) => teams.to_vec(),
+            (_, SubjectContext::User { team }) => team.iter().copied().collect(),
+            // The author of a question is private.
             _ => Vec::new(),
         }
     }
 
-    /// As everybody who is told reads it: what to ask for again, and nothing of what it says.
+    /// The notice as recipients get it: ids to reload, without the event's content.
     #[must_use]
     pub fn json(&self) -> Value {
         let mut fields = Map::new();
@@ -162,14 +161,14 @@ impl Notice {
         if !teams.is_empty() {
             put("teams", json!(teams));
         }
-        match self.concern {
-            Concern::Stage { stage, day } => {
+        match self.context {
+            SubjectContext::Stage { stage, day } => {
                 put("stage", json!(stage));
                 if let Some(day) = day {
                     put("day", json!(day));
                 }
             }
-            Concern::Evaluation {
+            SubjectContext::Evaluation {
                 stage,
                 day,
                 submission,
@@ -179,17 +178,17 @@ impl Notice {
                 put("day", json!(day));
                 put("submission", json!(submission));
             }
-            Concern::Submission { submission, .. } | Concern::Ablation { submission, .. } => {
+            SubjectContext::Submission { submission, .. } | SubjectContext::Ablation { submission, .. } => {
                 put("submission", json!(submission));
             }
-            Concern::Tournament(tournament) | Concern::Game { tournament, .. } => {
+            SubjectContext::Tournament(tournament) | SubjectContext::Game { tournament, .. } => {
                 put("tournament", json!(tournament));
             }
-            Concern::Season
-            | Concern::Team(_)
-            | Concern::Person { .. }
-            | Concern::Question { .. }
-            | Concern::Organisers => {}
+            SubjectContext::Season
+            | SubjectContext::Team(_)
+            | SubjectContext::User { .. }
+            | SubjectContext::Question { .. }
+            | SubjectContext::Organisers => {}
         }
         Value::Object(fields)
     }

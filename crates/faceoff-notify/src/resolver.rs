@@ -1,19 +1,20 @@
-//! Names of webhooks, looked up by us: what is connected to is what was checked, whatever the name means a moment later.
+//! Resolution of webhooks' host names. The client connects to the addresses that were checked, even if the name resolves
+//! otherwise a moment later.
 
 use crate::address::{NotPublic, WebhookRules};
 use reqwest::dns::{Addrs, Name, Resolve, Resolving};
 use std::{net::SocketAddr, sync::Arc};
 
-/// Why a name leads nowhere.
+/// Why a host name is rejected.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum ResolveError {
-    #[error("the name is not known")]
+    #[error("the host name cannot be resolved")]
     Unknown(#[source] std::io::Error),
-    #[error("the name leads to {0}, and must lead to the Internet")]
+    #[error("the host name resolves to {0}, expected an address on the Internet")]
     NotPublic(NotPublic),
 }
 
-/// Looks names up and checks every address of each.
+/// Resolves host names and checks all their addresses.
 #[derive(Debug, Clone)]
 pub(crate) struct CheckedResolver(pub(crate) Arc<WebhookRules>);
 
@@ -23,7 +24,7 @@ impl Resolve for CheckedResolver {
         Box::pin(async move {
             let found = tokio::net::lookup_host((name.as_str(), 0)).await;
             let found: Vec<SocketAddr> = found.map_err(ResolveError::Unknown)?.collect();
-            // One that is not public is enough: whoever names it wants us to reach it.
+            // One private address is enough to refuse: the owner may want the server to reach it.
             for address in &found {
                 rules
                     .check_address(address.ip())

@@ -1,32 +1,32 @@
-//! The keys by which a receiver knows that a message is the server's.
+//! Secrets of webhooks: with them, receivers verify that a message comes from the server.
 
 use base64::{Engine as _, engine::general_purpose::STANDARD};
-use faceoff_store::WebhookKeys;
+use faceoff_store::WebhookSecrets;
 use hmac::{Hmac, KeyInit as _, Mac as _};
 use sha2::Sha256;
 use std::fmt;
 
-/// A new key, to be handed out once.
+/// A new secret. Its text is shown to the owner once.
 pub struct WebhookSecret([u8; 32]);
 
 impl WebhookSecret {
-    /// Draws one from the operating system's generator.
+    /// Generates a secret with the operating system's random generator.
     ///
     /// # Errors
-    /// The operating system has no randomness to give.
+    /// If the operating system provides no randomness.
     pub fn generate() -> Result<Self, getrandom::Error> {
         let mut bytes = [0; 32];
         getrandom::fill(&mut bytes)?;
         Ok(Self(bytes))
     }
 
-    /// As the receiver keeps it.
+    /// Text form for the receiver, with the prefix `whsec_`.
     #[must_use]
-    pub fn shown(&self) -> String {
+    pub fn encoded(&self) -> String {
         format!("whsec_{}", STANDARD.encode(self.0))
     }
 
-    /// What is stored, and signs.
+    /// Key that is stored and signs messages.
     #[must_use]
     pub const fn bytes(&self) -> [u8; 32] {
         self.0
@@ -45,8 +45,8 @@ fn signature(key: &[u8; 32], signed: &str) -> String {
     format!("v1,{}", STANDARD.encode(mac.finalize().into_bytes()))
 }
 
-/// The header `webhook-signature`: by each key that signs one signature.
-pub(crate) fn signatures(keys: &WebhookKeys, id: &str, timestamp: i64, body: &str) -> String {
+/// Value of the header `webhook-signature`: one signature of each active secret.
+pub(crate) fn signatures(keys: &WebhookSecrets, id: &str, timestamp: i64, body: &str) -> String {
     let signed = format!("{id}.{timestamp}.{body}");
     let all = [Some(&keys.secret), keys.old_secret.as_ref()];
     let all: Vec<String> = all
@@ -63,7 +63,7 @@ mod tests {
 
     /// The example of the Standard Webhooks' own libraries.
     #[test]
-    fn a_signature_is_that_of_the_conventions() {
+    fn signature_matches_the_reference_example() {
         let key = STANDARD.decode("MfKQ9r8GKYqrTwjUPD8ILPZIo2LaLaSw").unwrap();
         let body = r#"{"test": 2432232314}"#;
         let signed = format!("msg_p5jXN8AQM9LWM0D4loKWxJek.1614265330.{body}");
@@ -74,8 +74,8 @@ mod tests {
     }
 
     #[test]
-    fn while_a_secret_is_replaced_both_sign() {
-        let keys = |old_secret| WebhookKeys {
+    fn replaced_secret_also_signs() {
+        let keys = |old_secret| WebhookSecrets {
             secret: [1; 32],
             old_secret,
         };
@@ -89,11 +89,11 @@ mod tests {
     }
 
     #[test]
-    fn a_secret_is_shown_as_receivers_take_it_and_hides_in_debug_output() {
+    fn secret_has_standard_encoding_and_no_debug_output() {
         let secret = WebhookSecret::generate().unwrap();
-        let shown = secret.shown();
-        let bytes = STANDARD.decode(shown.strip_prefix("whsec_").unwrap());
+        let encoded = secret.encoded();
+        let bytes = STANDARD.decode(encoded.strip_prefix("whsec_").unwrap());
         assert_eq!(bytes.unwrap(), secret.bytes());
-        assert!(!format!("{secret:?}").contains(&shown[6..]));
+        assert!(!format!("{secret:?}").contains(&encoded[6..]));
     }
 }

@@ -1,24 +1,24 @@
-//! One message to one address.
+//! Sending of one message to one webhook.
 
 use crate::{
     address::WebhookRules,
     resolver::{CheckedResolver, ResolveError},
     secret::signatures,
 };
-use faceoff_store::{AttemptMeans, Delivery, DeliveryAttempt, WebhookKeys};
+use faceoff_store::{DeliveryOutcome, Delivery, DeliveryAttempt, WebhookSecrets};
 use faceoff_types::DeliveryId;
 use jiff::{SignedDuration, Timestamp};
 use reqwest::{StatusCode, header, redirect};
 use std::{error::Error, sync::Arc, time::Duration};
 
-/// A receiver has so long to answer.
-const PATIENCE: Duration = Duration::from_secs(15);
-/// After an attempt that failed, the next one: the first after the first pause.
-const PAUSES_S: [i64; 6] = [5, 5 * 60, 30 * 60, 2 * 3600, 5 * 3600, 10 * 3600];
-/// Up to so much of a pause comes on top, so that not everything that failed at once comes again at once.
+/// Time that a receiver has to respond.
+const RESPONSE_TIMEOUT: Duration = Duration::from_secs(15);
+/// Pauses after failed attempts, seconds.
+const RETRY_PAUSES_S: [i64; 6] = [5, 5 * 60, 30 * 60, 2 * 3600, 5 * 3600, 10 * 3600];
+/// Maximum random extension, as a fraction of the pause: simultaneous failures must not be retried simultaneously.
 const JITTER: f64 = 0.2;
 
-/// Sends, and follows nothing.
+/// Sends messages; redirects are not followed.
 #[derive(Debug, Clone)]
 pub(crate) struct Sender {
     rules: Arc<WebhookRules>,
@@ -36,32 +36,32 @@ impl Sender {
             .tls_backend_preconfigured(tls)
             .redirect(redirect::Policy::none())
             .no_proxy()
-            .timeout(PATIENCE)
-            // Nothing of a stranger's is held open.
+            .timeout(RESPONSE_TIMEOUT)
+            // No connections to untrusted receivers are kept open.
             .pool_max_idle_per_host(0)
             .dns_resolver(CheckedResolver(Arc::clone(&rules)))
             .build()?;
         Ok(Self { rules, client })
     }
 
-    /// Sends something, and says what came of it.
+    /// Sends a delivery. Returns the attempt and its outcome.
     pub(crate) async fn send(
         &self,
         url: &str,
-        keys: &WebhookKeys,
+        keys: &WebhookSecrets,
         delivery: &Delivery,
         now: Timestamp,
-    ) -> (DeliveryAttempt, AttemptMeans) {
-        let answered = self.post(url, keys, delivery, now).await;
-        let (status, error) = match answered {
-            Ok(status) => (Some(status), refused(status)),
+    ) -> (DeliveryAttempt, DeliveryOutcome) {
+        let response = self.post(url, keys, delivery, now).await;
+        let (status, error) = match response {
+            Ok(status) => (Some(status), status_error(status)),
             Err(error) => (None, Some(error)),
         };
-        let means = match (&error, status) {
-            (None, _) => AttemptMeans::Taken,
-            (Some(_), Some(StatusCode::GONE)) => AttemptMeans::Gone,
-            (Some(_), _) => AttemptMeans::Failed {
-                again_at: again_at(delivery.id, delivery.attempts, now),
+        let outcome = match (&error, status) {
+            (None, _) => DeliveryOutcome::Accepted,
+            (Some(_), Some(StatusCode::GONE)) => DeliveryOutcome::Gone,
+            (Some(_), _) => DeliveryOutcome::Failed {
+                retry_at: retry_at(delivery.id, delivery.attempts, now),
             },
         };
         let attempt = DeliveryAttempt {
@@ -69,18 +69,18 @@ impl Sender {
             status: status.map(|status| status.as_u16()),
             error,
         };
-        (attempt, means)
+        (attempt, outcome)
     }
 
-    /// What was answered. Of the body nothing is read: nobody is shown what an address says to us.
+    /// Posts a delivery. Returns the status of the response; its body is never read or shown.
     async fn post(
         &self,
         url: &str,
-        keys: &WebhookKeys,
+        keys: &WebhookSecrets,
         delivery: &Delivery,
         now: Timestamp,
     ) -> Result<StatusCode, String> {
-        // Again: the rules may be others, and a literal address is looked up by nobody.
+        // Checked again: the rules may have changed, and literal addresses bypass the resolver.
         let url = self.rules.check_url(url)?;
         let (id, timestamp) = (delivery.id.to_string(), now.as_second());
         let signature = signatures(keys, &id, timestamp, &delivery.body);
@@ -92,28 +92,28 @@ impl Sender {
             .header("webhook-timestamp", timestamp)
             .header("webhook-signature", signature)
             .body(delivery.body.clone());
-        let answer = request.send().await;
-        answer
-            .map(|answer| answer.status())
-            .map_err(|error| words(&error))
+        let response = request.send().await;
+        response
+            .map(|response| response.status())
+            .map_err(|error| describe_error(&error))
     }
 }
 
-/// What is wrong with a status, if anything is.
-fn refused(status: StatusCode) -> Option<String> {
+/// Error text for a status other than 2xx.
+fn status_error(status: StatusCode) -> Option<String> {
     if status.is_success() {
         return None;
     }
     let code = status.as_u16();
     Some(if status.is_redirection() {
-        format!("it answered {code}: redirects are not followed, name the address that it leads to")
+        format!("it answered {code}: redirects are not followed, use the address that it redirects to")
     } else {
         format!("it answered {code}, expected 200 to 299")
     })
 }
 
-/// Why there was no answer, without what our network says of itself.
-fn words(error: &reqwest::Error) -> String {
+/// Why there was no response, without details of the server's network.
+fn describe_error(error: &reqwest::Error) -> String {
     let mut cause: Option<&(dyn Error + 'static)> = Some(error);
     while let Some(found) = cause {
         if let Some(resolving) = found.downcast_ref::<ResolveError>() {
@@ -122,24 +122,24 @@ fn words(error: &reqwest::Error) -> String {
         cause = found.source();
     }
     if error.is_timeout() {
-        format!("it did not answer within {} s", PATIENCE.as_secs())
+        format!("it did not answer within {} s", RESPONSE_TIMEOUT.as_secs())
     } else if error.is_connect() {
-        "no connection, or none with a certificate that is good".into()
+        "no connection, or the certificate is not valid".into()
     } else {
-        "the connection broke off before there was an answer".into()
+        "the connection was closed before there was a response".into()
     }
 }
 
-/// When something is sent again that was sent so often before this time; `None`: never.
-fn again_at(id: DeliveryId, attempts: u32, now: Timestamp) -> Option<Timestamp> {
-    let pause = *PAUSES_S.get(usize::try_from(attempts).ok()?)?;
-    // Derived, so that the same log is the same plan.
-    let mut drawn = blake3::Hasher::new_derive_key("Faceoff: pauses between attempts of a webhook");
-    drawn.update(id.as_uuid().as_bytes());
-    drawn.update(&attempts.to_le_bytes());
-    let [first, second, ..] = *drawn.finalize().as_bytes();
-    let drawn = f64::from(u16::from_le_bytes([first, second])) / f64::from(u16::MAX);
-    let pause = SignedDuration::from_secs(pause).mul_f64(1.0 + JITTER * drawn);
+/// Time of the next attempt after `attempts` earlier ones and this one; `None` after the last.
+fn retry_at(id: DeliveryId, attempts: u32, now: Timestamp) -> Option<Timestamp> {
+    let pause = *RETRY_PAUSES_S.get(usize::try_from(attempts).ok()?)?;
+    // Derived from the id, so that the same log gives the same times.
+    let mut hasher = blake3::Hasher::new_derive_key("Faceoff: pauses between attempts of a webhook");
+    hasher.update(id.as_uuid().as_bytes());
+    hasher.update(&attempts.to_le_bytes());
+    let [first, second, ..] = *hasher.finalize().as_bytes();
+    let fraction = f64::from(u16::from_le_bytes([first, second])) / f64::from(u16::MAX);
+    let pause = SignedDuration::from_secs(pause).mul_f64(1.0 + JITTER * fraction);
     now.checked_add(pause).ok()
 }
 
@@ -148,22 +148,22 @@ mod tests {
     use super::*;
 
     #[test]
-    fn pauses_grow_are_no_two_alike_and_end() {
+    fn retry_pauses_grow_vary_and_end() {
         let now: Timestamp = "2026-03-01T10:00:00Z".parse().unwrap();
         let ids = [DeliveryId::new(), DeliveryId::new()];
-        for (attempts, pause) in (0..).zip(PAUSES_S) {
+        for (attempts, pause) in (0..).zip(RETRY_PAUSES_S) {
             for id in ids {
-                let at = again_at(id, attempts, now).unwrap();
+                let at = retry_at(id, attempts, now).unwrap();
                 let waits = at.duration_since(now).as_secs_f64();
                 let pause = pause as f64;
                 assert!((pause..=pause * (1.0 + JITTER)).contains(&waits));
-                assert_eq!(Some(at), again_at(id, attempts, now), "derived");
+                assert_eq!(Some(at), retry_at(id, attempts, now), "the time is deterministic");
             }
             assert_ne!(
-                again_at(ids[0], attempts, now),
-                again_at(ids[1], attempts, now)
+                retry_at(ids[0], attempts, now),
+                retry_at(ids[1], attempts, now)
             );
         }
-        assert_eq!(again_at(ids[0], 6, now), None);
+        assert_eq!(retry_at(ids[0], 6, now), None);
     }
 }

@@ -1,16 +1,16 @@
-//! What changes are about, in the words of those who follow them.
+//! Topics: groups of events that clients follow.
 
 use faceoff_store::{Event, Subject};
 use std::{fmt, str::FromStr};
 
-/// A part of the season that pages and programs show.
+/// A part of the season that pages and API clients show.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Topic {
-    /// The season itself, its terms and its queue's pauses.
+    /// The season itself, its terms and pauses of its queue.
     Season,
-    /// Whatever may change a board.
+    /// All events that can change a board.
     Board,
-    /// Whatever may change who waits for what.
+    /// All events that can change the queue.
     Queue,
     /// Stages and their days.
     Stages,
@@ -21,7 +21,7 @@ pub enum Topic {
     Ablations,
     Announcements,
     People,
-    /// Teams that want to take part.
+    /// Registrations of new teams.
     Registrations,
     Proposals,
     /// Tournaments and their rounds.
@@ -47,7 +47,7 @@ impl Topic {
         Self::Games,
     ];
 
-    /// As it is written.
+    /// The topic's word in filters.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -68,16 +68,16 @@ impl Topic {
         }
     }
 
-    /// Is it about this?
+    /// Whether an event of this subject belongs to the topic.
     #[must_use]
-    pub const fn has(self, subject: Subject, event: &Event) -> bool {
+    pub const fn includes(self, subject: Subject, event: &Event) -> bool {
         match self {
             Self::Board => changes_boards(event),
             Self::Queue => changes_queue(event),
             Self::Season => matches!(subject, Subject::Season),
             Self::Stages => matches!(
                 subject,
-                Subject::Stage(_) | Subject::Day(_) | Subject::DayOfNone(_)
+                Subject::Stage(_) | Subject::Day(_) | Subject::DayWithoutStage(_)
             ),
             Self::Teams => matches!(subject, Subject::Team(_)),
             Self::Submissions => matches!(subject, Subject::Submission(_)),
@@ -86,7 +86,7 @@ impl Topic {
             Self::Announcements => {
                 matches!(subject, Subject::Announcement(_) | Subject::Question(_))
             }
-            Self::People => matches!(subject, Subject::Person(_)),
+            Self::People => matches!(subject, Subject::User(_)),
             Self::Registrations => matches!(subject, Subject::Registration(_)),
             Self::Proposals => matches!(subject, Subject::Proposal(_)),
             Self::Tournaments => matches!(subject, Subject::Tournament(_)),

@@ -1,11 +1,11 @@
-//! `/submissions/{id}/ablation`: what each perturbation costs an agent, as a chart and as a table, and the episodes that it
-//! changes.
+//! `/submissions/{id}/ablation`: the effect of each perturbation on an agent, as a chart and as a table, and the episodes with
+//! another outcome.
 
 pub(super) mod pair;
 
 use super::{
     assets,
-    chart::{Bars, Rated},
+    chart::{Bars, LabelledRate},
     figures,
     frame::{Frame, PageProblem, render},
 };
@@ -20,7 +20,7 @@ use faceoff_service::{
     viewer::Viewer,
     views::{
         ablation,
-        ablation_clips::{AblationClips, Differing},
+        ablation_clips::{AblationClips, DifferingEpisode},
         season::SeasonHead,
         submission, team,
     },
@@ -30,7 +30,7 @@ use faceoff_types::{Profile, SubmissionId, Task};
 /// One row of the table.
 struct Row {
     profile: Profile,
-    /// One letter, written under its bar in the chart.
+    /// Label below the bar of the profile.
     letter: char,
     percent: String,
     low: String,
@@ -38,7 +38,7 @@ struct Row {
     successes: u32,
     episodes: u32,
     penalty_points: String,
-    /// Against `ideal`; none of `ideal` itself.
+    /// Difference to the profile `ideal`; `None` for `ideal`.
     difference: Option<Difference>,
 }
 
@@ -47,8 +47,7 @@ struct Difference {
     lost: u32,
     gained: u32,
     p: String,
-    /// Can it be told from chance?
-    clear: bool,
+    is_significant: bool,
 }
 
 struct Group {
@@ -68,13 +67,13 @@ struct Page {
     groups: Vec<Group>,
     style: &'static str,
     id: SubmissionId,
-    changed: Vec<Changed>,
+    outcome_changes: Vec<OutcomeChanges>,
 }
 
-/// The episodes of a profile that do not end as in the ideal simulator.
-struct Changed {
+/// Episodes that end differently with a profile than in the ideal simulator.
+struct OutcomeChanges {
     profile: Profile,
-    pairs: Vec<Differing>,
+    pairs: Vec<DifferingEpisode>,
 }
 
 /// The newest ablation of a submission.
@@ -90,24 +89,24 @@ pub(super) async fn page(
         return Err(Problem::new(ProblemKind::NotFound, detail).into());
     };
     let team = team::find(&app, submission.team).await?;
-    let season = SeasonHead::now(&app).await?;
+    let season = SeasonHead::load(&app).await?;
     let groups = match &view.status {
         AblationStatus::Finished { tasks, .. } => {
             let groups = tasks.iter();
             groups
-                .map(|(task, effects)| Group::of(*task, effects))
+                .map(|(task, effects)| Group::new(*task, effects))
                 .collect()
         }
         AblationStatus::Open { .. } | AblationStatus::Failed { .. } => Vec::new(),
     };
-    let clips = AblationClips::of(&app, viewer?, id).await?;
-    let changed = clips.differing(&app).await?.into_iter();
+    let clips = AblationClips::load(&app, viewer?, id).await?;
+    let outcome_changes = clips.differing_episodes(&app).await?.into_iter();
     render(&Page {
-        frame: Frame::of(&app, season.name, ""),
+        frame: Frame::for_app(&app, season.name, ""),
         style: assets::EPISODES_STYLE.url(),
         id,
-        changed: changed
-            .map(|(profile, pairs)| Changed { profile, pairs })
+        outcome_changes: outcome_changes
+            .map(|(profile, pairs)| OutcomeChanges { profile, pairs })
             .collect(),
         team: team.name.to_string(),
         agent: submission.agent_name,
@@ -118,10 +117,10 @@ pub(super) async fn page(
 }
 
 impl Group {
-    fn of(task: Task, effects: &[ProfileEffect]) -> Self {
-        let rates: Vec<Rated> = effects
+    fn new(task: Task, effects: &[ProfileEffect]) -> Self {
+        let rates: Vec<LabelledRate> = effects
             .iter()
-            .map(|effect| Rated {
+            .map(|effect| LabelledRate {
                 name: effect.profile.as_str(),
                 letter: letter(effect.profile),
                 percent: 100.0 * effect.success_rate,
@@ -130,36 +129,36 @@ impl Group {
             .collect();
         Self {
             task,
-            chart: Bars::of(task.as_str(), &rates),
-            rows: effects.iter().map(Row::of).collect(),
+            chart: Bars::new(task.as_str(), &rates),
+            rows: effects.iter().map(Row::new).collect(),
         }
     }
 }
 
 impl Row {
-    fn of(effect: &ProfileEffect) -> Self {
+    fn new(effect: &ProfileEffect) -> Self {
         let [low, high] = effect.success_ci95;
         Self {
             profile: effect.profile,
             letter: letter(effect.profile),
-            percent: figures::one(100.0 * effect.success_rate),
-            low: figures::one(100.0 * low),
-            high: figures::one(100.0 * high),
+            percent: figures::one_decimal(100.0 * effect.success_rate),
+            low: figures::one_decimal(100.0 * low),
+            high: figures::one_decimal(100.0 * high),
             successes: effect.successes,
             episodes: effect.episodes,
-            penalty_points: figures::one(effect.penalty_points),
+            penalty_points: figures::one_decimal(effect.penalty_points),
             difference: (effect.profile != Profile::Ideal).then(|| Difference {
                 points: figures::signed(100.0 * effect.difference),
                 lost: effect.lost,
                 gained: effect.gained,
                 p: figures::p_value(effect.p_value),
-                clear: effect.p_value <= SIGNIFICANCE,
+                is_significant: effect.p_value <= SIGNIFICANCE,
             }),
         }
     }
 }
 
-/// A letter for each profile, since colour alone must not carry it.
+/// Letter of a profile in the chart: colour alone must not carry the meaning.
 const fn letter(profile: Profile) -> char {
     match profile {
         Profile::Ideal => 'I',
@@ -178,7 +177,7 @@ mod tests {
     use std::collections::BTreeSet;
 
     #[test]
-    fn every_profile_has_a_letter_of_its_own_and_is_told_apart_by_its_p_value() {
+    fn profile_letters_are_unique_and_p_decides_significance() {
         let letters: BTreeSet<char> = Profile::ABLATION.into_iter().map(letter).collect();
         assert_eq!(letters.len(), Profile::ABLATION.len());
         let effect = ProfileEffect {
@@ -193,9 +192,9 @@ mod tests {
             gained: 0,
             p_value: 0.5,
         };
-        let difference = Row::of(&effect).difference.unwrap();
+        let difference = Row::new(&effect).difference.unwrap();
         assert_eq!(
-            (difference.points.as_str(), difference.clear),
+            (difference.points.as_str(), difference.is_significant),
             ("−50.0", false)
         );
     }

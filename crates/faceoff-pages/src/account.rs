@@ -1,7 +1,7 @@
-//! `/account`: who has signed in, and the tokens and sessions that are theirs.
+//! `/account`: the signed-in user with their tokens and sessions.
 
 use super::{
-    figures::minute,
+    figures::utc_minute,
     frame::{Frame, PageProblem, render},
 };
 use askama::Template;
@@ -10,14 +10,14 @@ use axum::{
     response::{IntoResponse, Redirect, Response},
 };
 use faceoff_api::views::{
-    person::{PersonView, WhoView},
+    user::{UserView, CallerView},
     token::TokenView,
 };
 use faceoff_service::{
     app::App,
-    auth::Anybody,
+    auth::OptionalCaller,
     problem::Problem,
-    views::{person, season::SeasonHead, token},
+    views::{user, season::SeasonHead, token},
 };
 use faceoff_store::TokenOwner;
 use jiff::Timestamp;
@@ -26,34 +26,34 @@ use jiff::Timestamp;
 #[template(path = "account.html")]
 struct Page {
     frame: Frame,
-    who: WhoView,
-    person: PersonView,
+    account: CallerView,
+    person: UserView,
     tokens: Vec<TokenView>,
     now: Timestamp,
 }
 
 impl Page {
-    fn shown(&self, at: &Timestamp) -> String {
-        minute(*at)
+    fn timestamp(&self, at: &Timestamp) -> String {
+        utc_minute(*at)
     }
 
     fn state(&self, token: &TokenView) -> String {
         match (token.revoked_at, token.expires_at) {
-            (Some(at), _) => format!("revoked {}", self.shown(&at)),
-            (None, Some(at)) if at <= self.now => format!("expired {}", self.shown(&at)),
-            (None, Some(at)) => format!("good until {}", self.shown(&at)),
-            (None, None) => "good".into(),
+            (Some(at), _) => format!("revoked {}", self.timestamp(&at)),
+            (None, Some(at)) if at <= self.now => format!("expired {}", self.timestamp(&at)),
+            (None, Some(at)) => format!("valid until {}", self.timestamp(&at)),
+            (None, None) => "valid".into(),
         }
     }
 }
 
-/// The account, or where one signs in.
+/// The account; redirects to the sign-in page without a session.
 pub(super) async fn page(
-    Anybody(caller): Anybody,
+    OptionalCaller(caller): OptionalCaller,
     State(app): State<App>,
 ) -> Result<Response, PageProblem> {
     let Some((caller, person)) = caller.and_then(|caller| {
-        let person = caller.person()?.clone();
+        let person = caller.user()?.clone();
         Some((caller, person))
     }) else {
         return Ok(Redirect::to("/sign-in").into_response());
@@ -61,13 +61,13 @@ pub(super) async fn page(
     let tokens = app.store.tokens().await.map_err(Problem::from)?;
     let own = tokens
         .into_iter()
-        .filter(|token| token.owner == TokenOwner::Person(person.id));
-    let season = SeasonHead::now(&app).await?.name;
+        .filter(|token| token.owner == TokenOwner::User(person.id));
+    let season = SeasonHead::load(&app).await?.name;
     render(&Page {
-        frame: Frame::of(&app, season, "/account"),
-        tokens: own.map(token::of).collect(),
-        who: person::who(caller.who, token::of(caller.token)),
-        person: person::of(person),
+        frame: Frame::for_app(&app, season, "/account"),
+        tokens: own.map(token::view).collect(),
+        account: user::caller(caller.principal, token::view(caller.token)),
+        person: user::view(person),
         now: app.config.clock.now(),
     })
 }

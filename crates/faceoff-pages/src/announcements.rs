@@ -1,7 +1,7 @@
-//! `/announcements`: what the organisers have told everybody, and what they have answered for everybody to read.
+//! `/announcements`: announcements of the organisers, published answers and the terms.
 
 use super::{
-    figures::minute,
+    figures::utc_minute,
     frame::{Frame, PageProblem, render},
 };
 use askama::Template;
@@ -14,8 +14,8 @@ use faceoff_service::{
 };
 use jiff::Timestamp;
 
-/// Announcements that the page shows.
-const SHOWN: u32 = 200;
+/// Largest number of announcements on the page.
+const MAX_ANNOUNCEMENTS: u32 = 200;
 
 #[derive(Template)]
 #[template(path = "announcements.html")]
@@ -27,26 +27,26 @@ struct Page {
 }
 
 impl Page {
-    fn shown(&self, at: &Timestamp) -> String {
-        minute(*at)
+    fn timestamp(&self, at: &Timestamp) -> String {
+        utc_minute(*at)
     }
 }
 
 pub(super) async fn page(State(app): State<App>) -> Result<Response, PageProblem> {
-    let announcements = app.store.announcements(SHOWN).await;
+    let announcements = app.store.announcements(MAX_ANNOUNCEMENTS).await;
     let questions = app.store.questions().await.map_err(Problem::from)?;
     let public = questions.into_iter().filter(|question| {
         let answer = question.answer.as_ref();
         answer.is_some_and(|answer| answer.is_public)
     });
     let terms = app.store.terms().await.map_err(Problem::from)?;
-    let season = SeasonHead::now(&app).await?.name;
+    let season = SeasonHead::load(&app).await?.name;
     render(&Page {
-        frame: Frame::of(&app, season, "/announcements"),
+        frame: Frame::for_app(&app, season, "/announcements"),
         announcements: announcements
             .map_err(Problem::from)?
             .into_iter()
-            .map(announcement::of)
+            .map(announcement::view)
             .collect(),
         answered: public
             .map(|question| announcement::question(question, false))

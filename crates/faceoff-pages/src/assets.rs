@@ -1,6 +1,6 @@
 //! Styles, scripts and icon, compiled in.
 
-use crate::packed::{Packed, packed};
+use crate::compressed_text::{CompressedText, compressed_text};
 use axum::{
     Router,
     http::{HeaderValue, header},
@@ -15,7 +15,7 @@ use std::sync::OnceLock;
 pub(super) struct Asset {
     path: &'static str,
     media_type: &'static str,
-    content: Packed,
+    content: CompressedText,
     url: OnceLock<String>,
 }
 
@@ -25,50 +25,50 @@ const JAVASCRIPT: &str = "text/javascript; charset=utf-8";
 pub(super) static STYLE: Asset = Asset::new(
     "/static/faceoff.css",
     CSS,
-    packed!("web/static/faceoff.css"),
+    compressed_text!("web/static/faceoff.css"),
 );
-/// Of all pages: what follows a day under way, and tells times by the reader's clock.
+/// Loaded by all pages: live updates, and times in the visitor's time zone.
 pub(super) static SCRIPT: Asset =
-    Asset::new("/static/live.js", JAVASCRIPT, packed!("web/static/live.js"));
+    Asset::new("/static/live.js", JAVASCRIPT, compressed_text!("web/static/live.js"));
 pub(super) static ICON: Asset = Asset::new(
     "/static/faceoff.svg",
     "image/svg+xml",
-    packed!("web/static/faceoff.svg"),
+    compressed_text!("web/static/faceoff.svg"),
 );
-pub(super) static DESK_STYLE: Asset =
-    Asset::new("/static/desk.css", CSS, packed!("web/static/desk.css"));
-pub(super) static DESK_SCRIPT: Asset =
-    Asset::new("/static/desk.js", JAVASCRIPT, packed!("web/static/desk.js"));
+pub(super) static DASHBOARD_STYLE: Asset =
+    Asset::new("/static/dashboard.css", CSS, compressed_text!("web/static/dashboard.css"));
+pub(super) static DASHBOARD_SCRIPT: Asset =
+    Asset::new("/static/dashboard.js", JAVASCRIPT, compressed_text!("web/static/dashboard.js"));
 pub(super) static EPISODES_STYLE: Asset = Asset::new(
     "/static/episodes.css",
     CSS,
-    packed!("web/static/episodes.css"),
+    compressed_text!("web/static/episodes.css"),
 );
 pub(super) static REPLAY_STYLE: Asset =
-    Asset::new("/static/replay.css", CSS, packed!("web/static/replay.css"));
-/// Made of `web/client` by `make web`.
+    Asset::new("/static/replay.css", CSS, compressed_text!("web/static/replay.css"));
+/// Built from `web/client` by `make web`.
 pub(super) static REPLAY_SCRIPT: Asset = Asset::new(
     "/static/replay.js",
     JAVASCRIPT,
-    packed!("web/client/dist/replay.js"),
+    compressed_text!("web/client/dist/replay.js"),
 );
 
 static ALL: [&Asset; 8] = [
     &STYLE,
     &SCRIPT,
     &ICON,
-    &DESK_STYLE,
-    &DESK_SCRIPT,
+    &DASHBOARD_STYLE,
+    &DASHBOARD_SCRIPT,
     &EPISODES_STYLE,
     &REPLAY_STYLE,
     &REPLAY_SCRIPT,
 ];
 
-/// The board, as previews of links show it: one of the documentation's pictures.
+/// Picture of the board for link previews; it belongs to the documentation.
 pub(super) const PREVIEW_PATH: &str = "/docs/images/board.png";
 
 impl Asset {
-    const fn new(path: &'static str, media_type: &'static str, content: Packed) -> Self {
+    const fn new(path: &'static str, media_type: &'static str, content: CompressedText) -> Self {
         Self {
             path,
             media_type,
@@ -77,8 +77,8 @@ impl Asset {
         }
     }
 
-    /// Where pages load it from. The hash changes with the content, so that a browser may keep it for good and still never
-    /// shows a new page with old styles.
+    /// Address for pages. The hash changes with the content: browsers cache it without limit and still never show a new page
+    /// with old styles.
     pub(super) fn url(&self) -> &str {
         self.url.get_or_init(|| {
             let hash = blake3::hash(self.content.text().as_bytes()).to_hex();
@@ -86,7 +86,7 @@ impl Asset {
         })
     }
 
-    fn answer(&'static self) -> Response {
+    fn response(&'static self) -> Response {
         let headers = [
             (
                 header::CONTENT_TYPE,
@@ -103,6 +103,6 @@ impl Asset {
 
 pub(super) fn router() -> Router<App> {
     ALL.into_iter().fold(Router::new(), |router, asset| {
-        router.route(asset.path, get(move || async { asset.answer() }))
+        router.route(asset.path, get(move || async { asset.response() }))
     })
 }

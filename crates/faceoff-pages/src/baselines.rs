@@ -1,11 +1,10 @@
-//! The organisers' reference agents, in a section of their own on the boards' pages.
+//! The section of the organisers' reference agents on the pages of the boards.
 
 use super::figures::{self, Rate};
 use faceoff_api::views::{baseline::BaselineRow, board::BoardView};
 use faceoff_types::{EvaluationId, Task, Tier};
 use jiff::civil::Date;
 
-/// A row of the section.
 pub(super) struct Baseline {
     pub(super) would_rank: u32,
     pub(super) team: String,
@@ -13,17 +12,17 @@ pub(super) struct Baseline {
     pub(super) evaluation: EvaluationId,
     pub(super) day: Date,
     pub(super) tier: Tier,
-    pub(super) sign: &'static str,
-    /// Of the tasks that the board is about and that it played.
+    pub(super) symbol: &'static str,
+    /// Success rates of the tasks that the board covers and the agent played.
     pub(super) rates: Vec<(Task, Rate)>,
     pub(super) penalty_points: String,
     pub(super) score: String,
 }
 
-/// Of a board, in its order.
-pub(super) fn of(board: &BoardView) -> Vec<Baseline> {
+/// The reference agents of a board, in its order.
+pub(super) fn rows(board: &BoardView) -> Vec<Baseline> {
     let row = |row: &BaselineRow| {
-        let of_board = row
+        let tasks = row
             .tasks
             .iter()
             .filter(|(task, _)| board.task.is_none_or(|only| only == **task));
@@ -38,12 +37,12 @@ pub(super) fn of(board: &BoardView) -> Vec<Baseline> {
             evaluation: row.evaluation,
             day: row.day,
             tier: row.tier,
-            sign: figures::tier_sign(row.tier),
-            rates: of_board
-                .map(|(task, result)| (*task, Rate::of(result)))
+            symbol: figures::tier_symbol(row.tier),
+            rates: tasks
+                .map(|(task, result)| (*task, Rate::new(result)))
                 .collect(),
-            penalty_points: figures::one(points),
-            score: figures::one(row.score),
+            penalty_points: figures::one_decimal(points),
+            score: figures::one_decimal(row.score),
         }
     };
     board.baselines.iter().map(row).collect()

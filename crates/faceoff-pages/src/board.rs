@@ -3,13 +3,13 @@
 mod address;
 mod days;
 mod heading;
-mod order;
+mod sort;
 mod rows;
-mod under_way;
+mod day_progress;
 
 use super::{
     baselines::{self, Baseline},
-    frame::{Frame, PageProblem, render_tagged},
+    frame::{Frame, PageProblem, render_with_etag},
 };
 use address::Address;
 use askama::Template;
@@ -21,16 +21,16 @@ use faceoff_service::{
     extract::{PathParam, QueryParams},
     problem::Problem,
     viewer::Viewer,
-    views::{board, season::SeasonHead, sight::Sight, trail::Trail},
+    views::{board, season::SeasonHead, visibility::Visibility, board_timeline::BoardTimeline},
 };
 use faceoff_types::Task;
 use heading::Heading;
-use order::Order;
+use sort::Sort;
 use rows::{Context, Group, OverallRow, TaskRow, common_setting};
-use under_way::UnderWay;
+use day_progress::DayProgress;
 
-/// Seconds between two looks at what is being played, of a page that is kept as it is on the server.
-const LOOK_SECONDS: u32 = 10;
+/// Interval at which `live.js` reloads the progress of running evaluations.
+const POLL_SECONDS: u32 = 10;
 
 #[derive(Template)]
 #[template(path = "board.html")]
@@ -38,28 +38,28 @@ struct OverallPage {
     frame: Frame,
     heading: Heading,
     days: Days,
-    order: Order,
+    sort: Sort,
     commitment: String,
     setting: Option<String>,
-    /// The day that changes are told since.
+    /// The earlier day to which changes are relative.
     since: Option<jiff::civil::Date>,
-    has_groups: bool,
+    has_ties: bool,
     groups: Vec<Group<OverallRow>>,
     baselines: Vec<Baseline>,
-    under_way: UnderWay,
+    progress: DayProgress,
     disqualified: Vec<TeamView>,
 }
 
 impl OverallPage {
-    /// What has changed when the board has, in a sentence.
-    fn told(&self) -> String {
+    /// Text for screen readers after a live update.
+    fn live_text(&self) -> String {
         let rows = self.groups.iter().flat_map(|group| &group.rows);
-        told(rows.map(|row| (row.who.team.as_str(), row.score.percent.as_str())))
+        live_text(rows.map(|row| (row.team.team.as_str(), row.score.percent.as_str())))
     }
 }
 
-/// Of teams and their scores, as they stand in the list.
-fn told<'a>(mut rows: impl Iterator<Item = (&'a str, &'a str)>) -> String {
+/// `rows`: teams with their scores, in the order of the board.
+fn live_text<'a>(mut rows: impl Iterator<Item = (&'a str, &'a str)>) -> String {
     let Some((first, percent)) = rows.next() else {
         return String::new();
     };
@@ -73,31 +73,31 @@ pub(super) async fn overall(
     query: Result<QueryParams<BoardPageQuery>, Problem>,
 ) -> Result<Response, PageProblem> {
     let QueryParams(query) = query?;
-    let address = Address::of("/", &query);
-    let order = Order::of(&query, None, &address)?;
-    let sight = Sight::of(&app, viewer?).await?;
-    let season = SeasonHead::now(&app).await?;
-    let mut board = board::asked(&app, &sight, query.board(), None).await?;
-    order.apply(&mut board.rows, None);
+    let address = Address::new("/", &query);
+    let sort = Sort::new(&query, None, &address)?;
+    let visibility = Visibility::load(&app, viewer?).await?;
+    let season = SeasonHead::load(&app).await?;
+    let mut board = board::query(&app, &visibility, query.board(), None).await?;
+    sort.apply(&mut board.rows, None);
     let today = app.store.stage(board.stage).await.map_err(Problem::from)?;
     let today = today.day(app.config.clock.now());
-    let trail = Trail::of(&app, &sight, &board, query.live).await?;
-    let context = Context::of(&board, trail.before.as_ref(), order.is_usual());
+    let timeline = BoardTimeline::load(&app, &visibility, &board, query.live).await?;
+    let context = Context::new(&board, timeline.before.as_ref(), sort.is_by_rank());
     let page = OverallPage {
-        frame: Frame::of(&app, season.name, "/"),
-        heading: Heading::of(&app, &board, &sight, &address, season.paused).await?,
-        days: Days::of(&board, &trail, &address),
+        frame: Frame::for_app(&app, season.name, "/"),
+        heading: Heading::load(&app, &board, &visibility, &address, season.paused).await?,
+        days: Days::new(&board, &timeline, &address),
         commitment: season.commitment,
         setting: common_setting(&board.rows),
-        since: trail.before.as_ref().map(|before| before.day),
-        has_groups: context.has_groups(),
-        groups: context.groups(|row| OverallRow::of(row, &context, &board.weights)),
-        baselines: baselines::of(&board),
-        under_way: UnderWay::of(&app, &sight, today, board.division.as_ref()).await?,
+        since: timeline.before.as_ref().map(|before| before.day),
+        has_ties: context.has_ties(),
+        groups: context.groups(|row| OverallRow::new(row, &context, &board.weights)),
+        baselines: baselines::rows(&board),
+        progress: DayProgress::load(&app, &visibility, today, board.division.as_ref()).await?,
         disqualified: board.disqualified.clone(),
-        order,
+        sort,
     };
-    render_tagged(&page)
+    render_with_etag(&page)
 }
 
 #[derive(Template)]
@@ -106,21 +106,21 @@ struct TaskPage {
     frame: Frame,
     heading: Heading,
     days: Days,
-    order: Order,
+    sort: Sort,
     title: &'static str,
     aim: &'static str,
     setting: Option<String>,
     since: Option<jiff::civil::Date>,
-    has_groups: bool,
+    has_ties: bool,
     groups: Vec<Group<TaskRow>>,
     baselines: Vec<Baseline>,
 }
 
 impl TaskPage {
-    /// What has changed when the board has, in a sentence.
-    fn told(&self) -> String {
+    /// Text for screen readers after a live update.
+    fn live_text(&self) -> String {
         let rows = self.groups.iter().flat_map(|group| &group.rows);
-        told(rows.map(|row| (row.who.team.as_str(), row.rate.percent.as_str())))
+        live_text(rows.map(|row| (row.team.team.as_str(), row.rate.percent.as_str())))
     }
 }
 
@@ -133,10 +133,10 @@ pub(super) async fn by_task(
 ) -> Result<Response, PageProblem> {
     let (PathParam(task), QueryParams(query)) = (task?, query?);
     let path = format!("/tasks/{task}");
-    let address = Address::of(&path, &query);
-    let order = Order::of(&query, Some(task), &address)?;
-    let sight = Sight::of(&app, viewer?).await?;
-    let season = SeasonHead::now(&app).await?;
+    let address = Address::new(&path, &query);
+    let sort = Sort::new(&query, Some(task), &address)?;
+    let visibility = Visibility::load(&app, viewer?).await?;
+    let season = SeasonHead::load(&app).await?;
     let (title, aim) = match task {
         Task::Hit => (
             "Hit",
@@ -144,30 +144,30 @@ pub(super) async fn by_task(
         ),
         Task::Defend => (
             "Defend",
-            "Stop an incoming puck on the own side of the table.",
+            "Stop an incoming puck on the agent’s side of the table.",
         ),
         Task::Prepare => (
             "Prepare",
-            "Bring a puck from the border to a good hitting position.",
+            "Move a puck from the rim to a good hitting position.",
         ),
     };
-    let mut board = board::asked(&app, &sight, query.board(), Some(task)).await?;
-    // The board leaves out teams without the task; a row without one could show nothing.
+    let mut board = board::query(&app, &visibility, query.board(), Some(task)).await?;
+    // The board excludes teams without a result in this task.
     board.rows.retain(|row| row.tasks.contains_key(&task));
-    order.apply(&mut board.rows, Some(task));
-    let trail = Trail::of(&app, &sight, &board, query.live).await?;
-    let context = Context::of(&board, trail.before.as_ref(), order.is_usual());
-    render_tagged(&TaskPage {
-        frame: Frame::of(&app, season.name, path.clone()),
-        heading: Heading::of(&app, &board, &sight, &address, season.paused).await?,
-        days: Days::of(&board, &trail, &address),
+    sort.apply(&mut board.rows, Some(task));
+    let timeline = BoardTimeline::load(&app, &visibility, &board, query.live).await?;
+    let context = Context::new(&board, timeline.before.as_ref(), sort.is_by_rank());
+    render_with_etag(&TaskPage {
+        frame: Frame::for_app(&app, season.name, path.clone()),
+        heading: Heading::load(&app, &board, &visibility, &address, season.paused).await?,
+        days: Days::new(&board, &timeline, &address),
         title,
         aim,
         setting: common_setting(&board.rows),
-        since: trail.before.as_ref().map(|before| before.day),
-        has_groups: context.has_groups(),
-        groups: context.groups(|row| TaskRow::of(row, &row.tasks[&task], &context)),
-        baselines: baselines::of(&board),
-        order,
+        since: timeline.before.as_ref().map(|before| before.day),
+        has_ties: context.has_ties(),
+        groups: context.groups(|row| TaskRow::new(row, &row.tasks[&task], &context)),
+        baselines: baselines::rows(&board),
+        sort,
     })
 }

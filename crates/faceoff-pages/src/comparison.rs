@@ -9,36 +9,36 @@ use super::{
 use askama::Template;
 use axum::{extract::State, response::Response};
 use faceoff_api::{requests::ComparisonQuery, views::comparison::ComparisonView};
-use faceoff_scoring::WhoSolved;
+use faceoff_scoring::SolvedEpisodes;
 use faceoff_service::{
     app::App,
     extract::PathParams,
     problem::Problem,
     viewer::Viewer,
-    views::{clips::Clips, comparison, season::SeasonHead, sight::Sight},
+    views::{clips::Clips, comparison, season::SeasonHead, visibility::Visibility},
 };
 use faceoff_types::{EvaluationId, Task};
 
-/// A difference with its interval and its test.
+/// A difference with its interval and significance test.
 struct Difference {
     value: String,
     low: String,
     high: String,
     p_value: String,
-    /// In words: who is ahead, if anyone can be told to be.
+    /// Which team is ahead, if the difference is significant.
     verdict: String,
 }
 
 impl Difference {
-    /// In percentage points; `names` are the two teams'.
-    fn of(value: f64, ci95: [f64; 2], p: f64, told_apart: bool, names: [&str; 2]) -> Self {
+    /// Values in percentage points.
+    fn new(value: f64, ci95: [f64; 2], p: f64, is_significant: bool, names: [&str; 2]) -> Self {
         Self {
             value: figures::signed(value),
             low: figures::signed(ci95[0]),
             high: figures::signed(ci95[1]),
             p_value: figures::p_value(p),
-            verdict: match (told_apart, value > 0.0) {
-                (false, _) => "not told apart".to_owned(),
+            verdict: match (is_significant, value > 0.0) {
+                (false, _) => "statistically tied".to_owned(),
                 (true, true) => format!("{} is ahead", names[0]),
                 (true, false) => format!("{} is ahead", names[1]),
             },
@@ -57,24 +57,24 @@ struct Row {
     difference: Difference,
 }
 
-/// The episodes of a task that one of the two alone solved.
-struct Differing {
+/// Episodes of a task that only one of the two teams solved.
+struct DifferingEpisodes {
     task: Task,
     sides: [(String, Vec<u32>); 2],
 }
 
-impl Differing {
-    /// Tasks without any are left out.
-    fn of(view: &ComparisonView) -> Vec<Self> {
-        let of_task = |(task, who): (&Task, &WhoSolved)| Self {
+impl DifferingEpisodes {
+    /// Tasks without such episodes are omitted.
+    fn by_task(view: &ComparisonView) -> Vec<Self> {
+        let task_episodes = |(task, solved): (&Task, &SolvedEpisodes)| Self {
             task: *task,
             sides: [
-                (view.a.team.to_string(), who.only_a.clone()),
-                (view.b.team.to_string(), who.only_b.clone()),
+                (view.a.team.to_string(), solved.only_a.clone()),
+                (view.b.team.to_string(), solved.only_b.clone()),
             ],
         };
-        let all = view.episodes.iter().flatten().map(of_task);
-        all.filter(|of| of.sides.iter().any(|(_, episodes)| !episodes.is_empty()))
+        let all = view.episodes.iter().flatten().map(task_episodes);
+        all.filter(|task| task.sides.iter().any(|(_, episodes)| !episodes.is_empty()))
             .collect()
     }
 }
@@ -88,60 +88,59 @@ struct Page {
     score_a: String,
     score_b: String,
     overall: Difference,
-    differing: Vec<Differing>,
-    /// Can episodes be looked at side by side?
+    differing: Vec<DifferingEpisodes>,
+    /// Are replays available for both?
     has_replays: bool,
 }
 
-/// The comparison of two evaluations.
 pub(super) async fn page(
     viewer: Result<Viewer, Problem>,
     State(app): State<App>,
     ids: Result<PathParams<EvaluationId, 2>, Problem>,
 ) -> Result<Response, PageProblem> {
     let PathParams(ids) = ids?;
-    let sight = Sight::of(&app, viewer?).await?;
-    let view = comparison::of(&app, &sight, ids, ComparisonQuery { episodes: true }).await?;
+    let visibility = Visibility::load(&app, viewer?).await?;
+    let view = comparison::compare(&app, &visibility, ids, ComparisonQuery { episodes: true }).await?;
     let mut has_replays = true;
     for id in ids {
-        has_replays &= Clips::of(&app, &sight, id).await.is_ok();
+        has_replays &= Clips::find(&app, &visibility, id).await.is_ok();
     }
-    let season = SeasonHead::now(&app).await?;
+    let season = SeasonHead::load(&app).await?;
     let names = [view.a.team.as_str(), view.b.team.as_str()];
     let rows = view
         .tasks
         .iter()
-        .map(|(task, of)| Row {
+        .map(|(task, comparison)| Row {
             task: task.to_string(),
-            both: of.both,
-            only_a: of.only_a,
-            only_b: of.only_b,
-            neither: of.neither,
-            rate_a: figures::one(100.0 * of.success_rate_a),
-            rate_b: figures::one(100.0 * of.success_rate_b),
-            difference: Difference::of(
-                100.0 * of.difference,
-                of.difference_ci95.map(|bound| 100.0 * bound),
-                of.p_value,
-                of.told_apart,
+            both: comparison.both,
+            only_a: comparison.only_a,
+            only_b: comparison.only_b,
+            neither: comparison.neither,
+            rate_a: figures::one_decimal(100.0 * comparison.success_rate_a),
+            rate_b: figures::one_decimal(100.0 * comparison.success_rate_b),
+            difference: Difference::new(
+                100.0 * comparison.difference,
+                comparison.difference_ci95.map(|bound| 100.0 * bound),
+                comparison.p_value,
+                comparison.significant,
                 names,
             ),
         })
         .collect();
-    let of = &view.overall;
+    let overall = &view.overall;
     render(&Page {
-        frame: Frame::of(&app, season.name, ""),
+        frame: Frame::for_app(&app, season.name, ""),
         rows,
-        score_a: figures::one(of.score_a),
-        score_b: figures::one(of.score_b),
-        overall: Difference::of(
-            of.difference,
-            of.difference_ci95,
-            of.p_value,
-            of.told_apart,
+        score_a: figures::one_decimal(overall.score_a),
+        score_b: figures::one_decimal(overall.score_b),
+        overall: Difference::new(
+            overall.difference,
+            overall.difference_ci95,
+            overall.p_value,
+            overall.significant,
             names,
         ),
-        differing: Differing::of(&view),
+        differing: DifferingEpisodes::by_task(&view),
         has_replays,
         view,
     })

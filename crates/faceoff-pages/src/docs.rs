@@ -1,4 +1,4 @@
-//! `/docs`: the project's documentation, the API's reference and a search in both. Nothing of it changes while the server
+//! `/docs`: the documentation of the project, the API reference and a search in both. The content is fixed while the server
 //! runs.
 
 mod images;
@@ -25,36 +25,36 @@ use faceoff_service::{
 };
 use library::{Group, LIBRARY, Page};
 use reference::{Part, Reference, Schema, Tokens};
-use search::{Found, Index, SHOWN};
+use search::{Index, MAX_RESULTS, SearchResult};
 use serde::Deserialize;
 use serde_json::Value;
 use std::sync::{Arc, OnceLock};
 
-/// A browser asks again each time, by tag: the frame around a page tells of what is amiss.
-const KEPT: &str = "public, no-cache";
-const LONGEST_QUESTION: usize = 200;
-/// What somebody new reads, in this order.
+/// Browsers revalidate each page by its ETag, since the frame of a page shows problems of the server.
+const CACHE_CONTROL: &str = "public, no-cache";
+const MAX_QUERY_CHARS: usize = 200;
+/// Pages for newcomers with a description, in reading order.
 const NEWCOMERS: [(&str, &str); 4] = [
     ("start", "An agent on the board within an hour"),
-    ("rules", "What counts, and what costs points"),
-    ("robot", "What you control and what you see"),
+    ("rules", "What counts and what costs points"),
+    ("robot", "What the agent controls and observes"),
     (
         "protocol",
-        "What your program and the evaluator say to each other",
+        "Messages between agent and evaluator",
     ),
 ];
 
-/// All that can be read.
+/// Content of the documentation, built on first use.
 #[derive(Debug)]
-struct Shelf {
+struct Documentation {
     api: Arc<Value>,
     reference: OnceLock<Reference>,
     index: OnceLock<Index>,
 }
 
-impl Shelf {
+impl Documentation {
     fn reference(&self) -> &Reference {
-        self.reference.get_or_init(|| Reference::of(&self.api))
+        self.reference.get_or_init(|| Reference::new(&self.api))
     }
 
     fn index(&self) -> &Index {
@@ -66,9 +66,9 @@ impl Shelf {
     }
 }
 
-/// The documentation's pages. `api` is the API's OpenAPI document.
+/// The pages of the documentation. `api` is the OpenAPI document of the API.
 pub(super) fn router(api: Arc<Value>) -> Router<App> {
-    let shelf = Arc::new(Shelf {
+    let documentation = Arc::new(Documentation {
         api,
         reference: OnceLock::new(),
         index: OnceLock::new(),
@@ -82,7 +82,7 @@ pub(super) fn router(api: Arc<Value>) -> Router<App> {
         .route("/docs/api-reference/schemas/{name}", get(schema))
         .route("/docs/api-reference/{group}", get(operations))
         .route("/docs/{page}", get(document))
-        .layer(Extension(shelf))
+        .layer(Extension(documentation))
 }
 
 #[derive(Template)]
@@ -96,7 +96,7 @@ struct ContentsPage {
 
 async fn contents(State(app): State<App>, conditions: Conditions) -> Result<Response, PageProblem> {
     let newcomers = NEWCOMERS.iter();
-    answer(
+    respond(
         &conditions,
         &ContentsPage {
             frame: frame(&app),
@@ -123,11 +123,11 @@ async fn document(
     conditions: Conditions,
 ) -> Result<Response, PageProblem> {
     let Some(page) = library::page(&name) else {
-        return Err(nothing(format!(
+        return Err(not_found(format!(
             "the documentation has no page {name}; all of them are listed at /docs"
         )));
     };
-    answer(
+    respond(
         &conditions,
         &DocumentPage {
             frame: frame(&app),
@@ -147,15 +147,15 @@ struct ReferencePage<'a> {
 
 async fn api_reference(
     State(app): State<App>,
-    Extension(shelf): Extension<Arc<Shelf>>,
+    Extension(documentation): Extension<Arc<Documentation>>,
     conditions: Conditions,
 ) -> Result<Response, PageProblem> {
-    answer(
+    respond(
         &conditions,
         &ReferencePage {
             frame: frame(&app),
             question: String::new(),
-            reference: shelf.reference(),
+            reference: documentation.reference(),
         },
     )
 }
@@ -170,18 +170,18 @@ struct OperationsPage<'a> {
 
 async fn operations(
     State(app): State<App>,
-    Extension(shelf): Extension<Arc<Shelf>>,
+    Extension(documentation): Extension<Arc<Documentation>>,
     PathParam(name): PathParam<String>,
     conditions: Conditions,
 ) -> Result<Response, PageProblem> {
-    let mut groups = shelf.reference().groups.iter();
+    let mut groups = documentation.reference().groups.iter();
     let Some(group) = groups.find(|group| group.name == name) else {
-        return Err(nothing(format!(
+        return Err(not_found(format!(
             "the API has no operations named {name}; all of them are listed at {}",
             reference::PATH
         )));
     };
-    answer(
+    respond(
         &conditions,
         &OperationsPage {
             frame: frame(&app),
@@ -201,15 +201,15 @@ struct SchemasPage<'a> {
 
 async fn schemas(
     State(app): State<App>,
-    Extension(shelf): Extension<Arc<Shelf>>,
+    Extension(documentation): Extension<Arc<Documentation>>,
     conditions: Conditions,
 ) -> Result<Response, PageProblem> {
-    answer(
+    respond(
         &conditions,
         &SchemasPage {
             frame: frame(&app),
             question: String::new(),
-            schemas: &shelf.reference().schemas,
+            schemas: &documentation.reference().schemas,
         },
     )
 }
@@ -224,18 +224,18 @@ struct SchemaPage<'a> {
 
 async fn schema(
     State(app): State<App>,
-    Extension(shelf): Extension<Arc<Shelf>>,
+    Extension(documentation): Extension<Arc<Documentation>>,
     PathParam(name): PathParam<String>,
     conditions: Conditions,
 ) -> Result<Response, PageProblem> {
-    let mut schemas = shelf.reference().schemas.iter();
+    let mut schemas = documentation.reference().schemas.iter();
     let Some(schema) = schemas.find(|schema| schema.name == name) else {
-        return Err(nothing(format!(
+        return Err(not_found(format!(
             "the API has no schema {name}; all of them are listed at {}/schemas",
             reference::PATH
         )));
     };
-    answer(
+    respond(
         &conditions,
         &SchemaPage {
             frame: frame(&app),
@@ -245,9 +245,8 @@ async fn schema(
     )
 }
 
-/// What is looked for.
 #[derive(Debug, Deserialize)]
-struct Question {
+struct SearchQuery {
     #[serde(default)]
     q: String,
 }
@@ -257,54 +256,54 @@ struct Question {
 struct SearchPage {
     frame: Frame,
     question: String,
-    found: Vec<Found>,
+    results: Vec<SearchResult>,
     count: usize,
 }
 
 async fn find(
     State(app): State<App>,
-    Extension(shelf): Extension<Arc<Shelf>>,
-    query: Result<QueryParams<Question>, Problem>,
+    Extension(documentation): Extension<Arc<Documentation>>,
+    query: Result<QueryParams<SearchQuery>, Problem>,
     conditions: Conditions,
 ) -> Result<Response, PageProblem> {
-    let QueryParams(Question { q: question }) = query?;
+    let QueryParams(SearchQuery { q: question }) = query?;
     let chars = question.chars().count();
-    if chars > LONGEST_QUESTION {
+    if chars > MAX_QUERY_CHARS {
         let detail =
-            format!("q: expected at most {LONGEST_QUESTION} characters to look for, got {chars}");
+            format!("q: expected at most {MAX_QUERY_CHARS} characters, got {chars}");
         return Err(Problem::new(ProblemKind::InvalidRequest, detail).into());
     }
     let question = question.trim().to_owned();
-    let (found, count) = shelf.index().search(&question);
-    answer(
+    let (results, count) = documentation.index().search(&question);
+    respond(
         &conditions,
         &SearchPage {
             frame: frame(&app),
             question,
-            found,
+            results,
             count,
         },
     )
 }
 
 fn frame(app: &App) -> Frame {
-    Frame::of(app, String::new(), "/docs")
+    Frame::for_app(app, String::new(), "/docs")
 }
 
-fn nothing(detail: String) -> PageProblem {
+fn not_found(detail: String) -> PageProblem {
     Problem::new(ProblemKind::NotFound, detail).into()
 }
 
-/// A page with its tag, or that its reader has it.
-fn answer(conditions: &Conditions, page: &impl Template) -> Result<Response, PageProblem> {
+/// The page with an ETag, or 304 if the client has this version.
+fn respond(conditions: &Conditions, page: &impl Template) -> Result<Response, PageProblem> {
     let html = page.render().map_err(Problem::internal)?;
-    let tag = ETag::of("docs", &[&html]);
-    let kept = [
+    let tag = ETag::new("docs", &[&html]);
+    let headers = [
         (header::ETAG, tag.header()),
-        (header::CACHE_CONTROL, HeaderValue::from_static(KEPT)),
+        (header::CACHE_CONTROL, HeaderValue::from_static(CACHE_CONTROL)),
     ];
     Ok(match conditions.not_modified(&tag) {
-        Some(known) => (kept, known).into_response(),
-        None => (kept, Html(html)).into_response(),
+        Some(not_modified) => (headers, not_modified).into_response(),
+        None => (headers, Html(html)).into_response(),
     })
 }

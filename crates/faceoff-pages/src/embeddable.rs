@@ -1,3 +1,3 @@
-/// Marks an answer that pages of other sites may hold.
+/// Response extension: other sites may embed this page in a frame.
 #[derive(Debug, Clone, Copy)]
 pub struct Embeddable;

@@ -1,15 +1,15 @@
-//! `/evaluations/{id}/episodes`: how each episode went and why, where they began, and where limits were broken.
+//! `/evaluations/{id}/episodes`: outcomes of all episodes, their start positions and violations.
 
 mod maps;
 mod rows;
 
 use super::{
     assets,
-    episode_words::end_word,
+    episode_text::end_label,
     frame::{Frame, PageProblem, render},
-    table_drawing::Ground,
+    table_drawing::TableOutline,
 };
-use crate::query::asking;
+use crate::query::with_query;
 use askama::Template;
 use axum::{extract::State, response::Response};
 use faceoff_api::requests::EpisodesQuery;
@@ -18,21 +18,20 @@ use faceoff_service::{
     extract::{PathParam, QueryParams},
     problem::{Problem, ProblemKind},
     viewer::Viewer,
-    views::{clips::Clips, season::SeasonHead, sight::Sight},
+    views::{clips::Clips, season::SeasonHead, visibility::Visibility},
 };
 use faceoff_types::{EpisodeEnd, EvaluationId, Task};
 use jiff::civil::Date;
-use maps::{OutcomeMap, SafetyMap};
+use maps::{StartMap, ViolationMap};
 use rows::Row;
 
-/// Episodes on a page.
 const PER_PAGE: usize = 100;
 
-/// A choice of a form's list.
-struct Choice {
+/// An option of a select box.
+struct SelectOption {
     value: &'static str,
-    word: &'static str,
-    chosen: bool,
+    label: &'static str,
+    is_selected: bool,
 }
 
 #[derive(Template)]
@@ -43,29 +42,28 @@ struct Page {
     id: EvaluationId,
     team: String,
     day: Date,
-    /// Of all episodes of the evaluation.
+    /// Number of episodes of the evaluation.
     total: usize,
-    /// Of those that were asked for.
+    /// Number of episodes that match the filter.
     found: usize,
     failed: usize,
     sees_observed: bool,
-    is_chosen: bool,
-    tasks: Vec<Choice>,
-    went: Vec<Choice>,
-    broke: Vec<Choice>,
-    ends: Vec<Choice>,
-    ground: Ground,
-    outcomes: Vec<OutcomeMap>,
-    safety: SafetyMap,
+    has_filter: bool,
+    tasks: Vec<SelectOption>,
+    went: Vec<SelectOption>,
+    broke: Vec<SelectOption>,
+    ends: Vec<SelectOption>,
+    table: TableOutline,
+    start_maps: Vec<StartMap>,
+    violations: ViolationMap,
     rows: Vec<Row>,
-    /// The first and the last of `rows` among those found, from 1.
+    /// Numbers of the first and last row among the matching episodes, from 1.
     from: usize,
     to: usize,
-    newer: Option<String>,
-    older: Option<String>,
+    previous_page: Option<String>,
+    next_page: Option<String>,
 }
 
-/// The episodes of an evaluation.
 pub(super) async fn page(
     viewer: Result<Viewer, Problem>,
     State(app): State<App>,
@@ -74,30 +72,30 @@ pub(super) async fn page(
 ) -> Result<Response, PageProblem> {
     let PathParam(id) = id?;
     let QueryParams(query) = query?;
-    let chosen = query.chosen().map_err(|field| {
+    let chosen = query.filter().map_err(|field| {
         let detail =
-            format!("there is no such choice of {field:?}; choose on the page of the episodes");
+            format!("unknown value of {field:?}; use the filter on the page of the episodes");
         Problem::new(ProblemKind::InvalidRequest, detail)
     })?;
-    let sight = Sight::of(&app, viewer?).await?;
-    let clips = Clips::of(&app, &sight, id).await?;
+    let visibility = Visibility::load(&app, viewer?).await?;
+    let clips = Clips::find(&app, &visibility, id).await?;
     let view = clips.episodes().await?;
     let team = app
         .store
         .team(clips.evaluation.team)
         .await
         .map_err(Problem::from)?;
-    let season = SeasonHead::now(&app).await?;
+    let season = SeasonHead::load(&app).await?;
 
-    let of_task: Vec<_> = view
+    let task_episodes: Vec<_> = view
         .episodes
         .iter()
         .filter(|line| chosen.task.is_none_or(|task| task == line.task))
         .collect();
-    let found: Vec<_> = of_task
+    let found: Vec<_> = task_episodes
         .iter()
         .copied()
-        .filter(|line| chosen.takes(line))
+        .filter(|line| chosen.matches(line))
         .collect();
     let pages = found.len().div_ceil(PER_PAGE).max(1);
     let number = usize::try_from(query.page.unwrap_or(1)).unwrap_or(usize::MAX);
@@ -107,20 +105,20 @@ pub(super) async fn page(
         .iter()
         .skip(first)
         .take(PER_PAGE)
-        .map(|line| Row::of(id, line))
+        .map(|line| Row::new(id, line))
         .collect();
     let other_page = |number: usize| {
         let query = EpisodesQuery {
             page: u32::try_from(number).ok(),
             ..query.clone()
         };
-        let address = asking(&format!("/evaluations/{id}/episodes"), &query);
+        let address = with_query(&format!("/evaluations/{id}/episodes"), &query);
         format!("{address}#table")
     };
-    let choice = |given: &str, value: &'static str, word: &'static str| Choice {
+    let option = |selected: &str, value: &'static str, label: &'static str| SelectOption {
         value,
-        word,
-        chosen: given == value,
+        label,
+        is_selected: selected == value,
     };
     let is_played = |task: &Task| view.episodes.iter().any(|line| line.task == *task);
     let tasks = Task::ALL.into_iter().filter(is_played);
@@ -131,7 +129,7 @@ pub(super) async fn page(
         ("joint_pos", "joint position"),
         ("joint_vel", "joint velocity"),
     ];
-    let late = clips.sees_observed.then_some(("late", "a late answer"));
+    let late = clips.can_see_observations.then_some(("late", "a late answer"));
     let ends = [
         EpisodeEnd::Horizon,
         EpisodeEnd::LeftTable,
@@ -141,44 +139,44 @@ pub(super) async fn page(
         EpisodeEnd::AgentFault,
     ];
     render(&Page {
-        frame: Frame::of(&app, season.name, ""),
+        frame: Frame::for_app(&app, season.name, ""),
         style: assets::EPISODES_STYLE.url(),
         id,
         team: team.name.to_string(),
-        day: clips.evaluation.of.date,
+        day: clips.evaluation.stage_day.date,
         total: view.episodes.len(),
         found: found.len(),
         failed: found.iter().filter(|line| !line.success).count(),
-        sees_observed: clips.sees_observed,
-        is_chosen: query
+        sees_observed: clips.can_see_observations,
+        has_filter: query
             != EpisodesQuery {
                 page: query.page,
                 ..EpisodesQuery::default()
             },
         tasks: tasks
             .clone()
-            .map(|task| choice(&query.task, task.as_str(), task.as_str()))
+            .map(|task| option(&query.task, task.as_str(), task.as_str()))
             .collect(),
         went: [("success", "success"), ("failure", "no success")]
-            .map(|(value, word)| choice(&query.went, value, word))
+            .map(|(value, label)| option(&query.went, value, label))
             .into(),
         broke: groups
             .into_iter()
             .chain(late)
-            .map(|(value, word)| choice(&query.broke, value, word))
+            .map(|(value, label)| option(&query.broke, value, label))
             .collect(),
         ends: ends
-            .map(|end| choice(&query.end, end.as_str(), end_word(end)))
+            .map(|end| option(&query.end, end.as_str(), end_label(end)))
             .into(),
-        ground: Ground::new(),
-        outcomes: tasks
-            .filter_map(|task| OutcomeMap::of(task, &found))
+        table: TableOutline::new(),
+        start_maps: tasks
+            .filter_map(|task| StartMap::new(task, &found))
             .collect(),
-        safety: SafetyMap::of(&found),
+        violations: ViolationMap::new(&found),
         from: if rows.is_empty() { 0 } else { first + 1 },
         to: first + rows.len(),
         rows,
-        newer: (number > 1).then(|| other_page(number - 1)),
-        older: (number < pages).then(|| other_page(number + 1)),
+        previous_page: (number > 1).then(|| other_page(number - 1)),
+        next_page: (number < pages).then(|| other_page(number + 1)),
     })
 }

@@ -1,10 +1,10 @@
-//! `/evaluations/{id}`: what everybody may know of an evaluation. Log, faults and dataset are its
-//! team's and stay in the API.
+//! `/evaluations/{id}`: the public page of an evaluation. Log, faults and dataset are visible to the team only, through the API
+//! and the dashboard.
 
-mod slow;
+mod slow_answers;
 
 use super::{
-    chart::{Counted, Span, Strip},
+    chart::{TimeBin, TimeSummary, Strip},
     figures,
     frame::{Frame, PageProblem, render},
 };
@@ -26,17 +26,17 @@ use faceoff_service::{
     extract::PathParam,
     problem::Problem,
     viewer::Viewer,
-    views::{ablation, clips::Clips, evaluation, season::SeasonHead, sight::Sight, submission},
+    views::{ablation, clips::Clips, evaluation, season::SeasonHead, visibility::Visibility, submission},
 };
 use faceoff_types::{
     EvaluationId, Profile, RoundTrips, Seed, SlotTiming, StageDay, Task, ViolationCounts,
 };
-use figures::{Rate, minute};
+use figures::{Rate, utc_minute};
 use jiff::{Timestamp, civil};
-use slow::SlowAnswers;
+use slow_answers::SlowAnswers;
 use std::collections::BTreeMap;
 
-/// A task's results, in words.
+/// Formatted results of a task.
 struct TaskFigures {
     task: Task,
     rate: Rate,
@@ -46,79 +46,79 @@ struct TaskFigures {
     per_episode: String,
     tier_name: &'static str,
     tier_title: &'static str,
-    tier_sign: &'static str,
+    tier_symbol: &'static str,
     tier_change: String,
     details: Option<TaskDetails>,
 }
 
-/// What is told of a task once its day is released.
+/// Details of a task that are public once the day is released.
 struct TaskDetails {
     steps: u64,
     /// End effector, elbow and wrist, joint position, joint velocity, answer time.
-    broken: [Broken; 5],
+    violations: [ViolationFigures; 5],
     mean_ms: String,
     p99_ms: String,
     max_ms: String,
 }
 
 impl TaskFigures {
-    fn of(task: Task, result: &TaskView, summary: &EpisodeSummary) -> Self {
+    fn new(task: Task, result: &TaskView, summary: &EpisodeSummary) -> Self {
         Self {
             task,
-            rate: Rate::of(result),
+            rate: Rate::new(result),
             successes: result.successes,
             episodes: result.episodes,
-            penalty_points: figures::one(result.penalty_points),
+            penalty_points: figures::one_decimal(result.penalty_points),
             per_episode: figures::per_episode(result.penalty_points, result.episodes),
             tier_name: result.tier.as_str(),
             tier_title: result.tier.title(),
-            tier_sign: figures::tier_sign(result.tier),
-            tier_change: figures::chance(summary.tier_change_of(Some(task))),
-            details: TaskDetails::of(result),
+            tier_symbol: figures::tier_symbol(result.tier),
+            tier_change: figures::probability(summary.tier_change_of(Some(task))),
+            details: TaskDetails::new(result),
         }
     }
 }
 
-/// What one kind of violation came to.
-struct Broken {
+/// Episodes with a kind of violation.
+struct ViolationFigures {
     share: String,
-    /// What it cost; `None` of nothing.
+    /// Penalty points; `None` without violations.
     points: Option<String>,
 }
 
-impl Broken {
-    fn of(result: &TaskView, violations: ViolationCounts) -> [Self; 5] {
-        let of_motion = [
+impl ViolationFigures {
+    fn by_kind(result: &TaskView, violations: ViolationCounts) -> [Self; 5] {
+        let motion = [
             (violations.ee, EE_POINTS),
             (violations.link, LINK_POINTS),
             (violations.joint_pos, JOINT_POS_POINTS),
             (violations.joint_vel, JOINT_VEL_POINTS),
         ];
-        let of_motion = of_motion.map(|(count, each)| (count, f64::from(count) * each));
-        // How much a slow answer costs depends on how slow it was: it is what remains.
-        let rest: f64 = of_motion.iter().map(|(_, points)| points).sum();
-        let slow = (result.penalty_points - rest).max(0.0);
-        let [ee, link, joint_pos, joint_vel] = of_motion;
+        let motion = motion.map(|(count, each)| (count, f64::from(count) * each));
+        // The cost of a late answer depends on its time, so the points of late answers are the remainder.
+        let motion_points: f64 = motion.iter().map(|(_, points)| points).sum();
+        let late = (result.penalty_points - motion_points).max(0.0);
+        let [ee, link, joint_pos, joint_vel] = motion;
         [
             ee,
             link,
             joint_pos,
             joint_vel,
-            (violations.computation_time, slow),
+            (violations.computation_time, late),
         ]
         .map(|(count, points)| Self {
-            share: figures::share(count, result.episodes),
-            points: (count > 0).then(|| figures::one(points)),
+            share: figures::count_with_share(count, result.episodes),
+            points: (count > 0).then(|| figures::one_decimal(points)),
         })
     }
 }
 
 impl TaskDetails {
-    fn of(result: &TaskView) -> Option<Self> {
+    fn new(result: &TaskView) -> Option<Self> {
         let (violations, time) = (result.violations?, result.computation_time_s?);
         Some(Self {
             steps: result.steps?,
-            broken: Broken::of(result, violations),
+            violations: ViolationFigures::by_kind(result, violations),
             mean_ms: figures::milliseconds(time.mean),
             p99_ms: figures::milliseconds(time.p99),
             max_ms: figures::milliseconds(time.max),
@@ -126,41 +126,41 @@ impl TaskDetails {
     }
 }
 
-struct Finished {
+struct FinalResult {
     score: Rate,
     penalty_points: String,
     tier_name: &'static str,
     tier_title: &'static str,
-    tier_sign: &'static str,
+    tier_symbol: &'static str,
     tier_bounds: String,
     tier_change: String,
     resamples: u32,
     ruleset: String,
     seed: Option<String>,
-    /// Of the dataset's archive.
+    /// BLAKE3 of the dataset's archive.
     dataset_blake3: Option<String>,
     finished_at: Timestamp,
     tasks: Vec<TaskFigures>,
-    /// Evaluations that met the same episodes.
-    others: Vec<Other>,
+    /// Evaluations on the same episodes.
+    others: Vec<OtherEvaluation>,
     timing: Option<TimingFigures>,
-    /// How long answers took; once the day is released.
-    times: Option<Strip>,
+    /// Chart of answer times; once the day is released.
+    answer_times: Option<Strip>,
     slow: SlowAnswers,
 }
 
-/// Another team's evaluation of the same episodes.
-struct Other {
+/// Another team's evaluation on the same episodes.
+struct OtherEvaluation {
     team: String,
     evaluation: EvaluationId,
     score: String,
 }
 
-/// How evenly the slots kept time, in words.
+/// Noise floor and host interference, formatted.
 struct TimingFigures {
     before: RoundTripFigures,
     during: RoundTripFigures,
-    /// `None` when there was none.
+    /// `None` if no delay was measured.
     longest_stall_ms: Option<String>,
     host_noise_reruns: u32,
     platform_retries: u32,
@@ -175,12 +175,12 @@ struct RoundTripFigures {
 }
 
 impl TimingFigures {
-    fn of(timing: &SlotTiming) -> Self {
+    fn new(timing: &SlotTiming) -> Self {
         let figures = |trips: RoundTrips| RoundTripFigures {
             count: trips.count,
-            p50_ms: figures::fine_milliseconds(trips.p50),
-            p99_ms: figures::fine_milliseconds(trips.p99),
-            max_ms: figures::fine_milliseconds(trips.max),
+            p50_ms: figures::precise_milliseconds(trips.p50),
+            p99_ms: figures::precise_milliseconds(trips.p99),
+            max_ms: figures::precise_milliseconds(trips.max),
         };
         Self {
             before: figures(timing.before_s),
@@ -204,30 +204,27 @@ struct Page {
     extra_turn: Option<String>,
     day: civil::Date,
     profile: Profile,
-    /// Path of the page of its submission's ablation, if there is one.
+    /// Path of the ablation of the submission, if there is one.
     ablation: Option<String>,
-    /// Are its episodes shown, each with a replay?
+    /// Are episodes and replays visible?
     has_episodes: bool,
-    /// Said when there is no result.
+    /// Text in place of a result.
     state: String,
-    /// Is its dataset there for everybody?
-    public: bool,
-    /// When and why it was removed, if it was.
+    is_dataset_public: bool,
     dataset_removed: Option<RulingView>,
     progress: Option<Progress>,
-    /// Where it stands in the queue.
     queue: Option<QueueView>,
     next: String,
-    finished: Option<Finished>,
+    result: Option<FinalResult>,
 }
 
 impl Page {
-    /// What has changed when the page has, in a sentence.
-    fn told(&self) -> String {
-        match &self.finished {
-            Some(done) => format!(
+    /// Text for screen readers after a live update.
+    fn live_text(&self) -> String {
+        match &self.result {
+            Some(result) => format!(
                 "The evaluation of {} is finished: score {} percent, {} penalty points.",
-                self.team, done.score.percent, done.penalty_points
+                self.team, result.score.percent, result.penalty_points
             ),
             None => self.state.clone(),
         }
@@ -240,19 +237,19 @@ pub(super) async fn page(
     id: Result<PathParam<EvaluationId>, Problem>,
 ) -> Result<Response, PageProblem> {
     let PathParam(id) = id?;
-    let sight = Sight::of(&app, viewer?).await?;
-    let view = evaluation::find(&app, &sight, id).await?;
+    let visibility = Visibility::load(&app, viewer?).await?;
+    let view = evaluation::find(&app, &visibility, id).await?;
     let submission = submission::find(&app, view.submission).await?;
     let ablation = ablation::exists(&app, submission.id).await?;
-    let season = SeasonHead::now(&app).await?;
+    let season = SeasonHead::load(&app).await?;
     let scored_at = view.status.finished_at();
-    let frozen = scored_at.and_then(|at| sight.freeze_hiding(view.stage, at));
-    let clips = Clips::of(&app, &sight, id).await.ok();
+    let frozen = scored_at.and_then(|at| visibility.hiding_freeze(view.stage, at));
+    let clips = Clips::find(&app, &visibility, id).await.ok();
     let distributions = match &clips {
         Some(clips) => clips.computation_times().await?,
         None => BTreeMap::new(),
     };
-    let finished = match &view.status {
+    let final_result = match &view.status {
         _ if frozen.is_some() => None,
         EvaluationStatus::Finished {
             finished_at,
@@ -262,21 +259,21 @@ pub(super) async fn page(
         } => {
             let summary = evaluation::summary(&view, &app).await?;
             let others = match view.released_at {
-                Some(_) => others(&app, &sight, &view, result.seed).await?,
+                Some(_) => others(&app, &visibility, &view, result.seed).await?,
                 None => Vec::new(),
             };
-            Some(Finished {
+            Some(FinalResult {
                 dataset_blake3: dataset_blake3.clone(),
                 others,
-                slow: SlowAnswers::of(&app, &view, result).await?,
-                times: times(result, &distributions),
-                ..Finished::of(result, *finished_at, &summary)
+                slow: SlowAnswers::load(&app, &view, result).await?,
+                answer_times: answer_times(result, &distributions),
+                ..FinalResult::new(result, *finished_at, &summary)
             })
         }
         _ => None,
     };
     render(&Page {
-        frame: Frame::of(&app, season.name, ""),
+        frame: Frame::for_app(&app, season.name, ""),
         id,
         team: view.team_name.to_string(),
         agent: submission.agent_name,
@@ -288,77 +285,75 @@ pub(super) async fn page(
         ablation: ablation.then(|| format!("/submissions/{}/ablation", submission.id)),
         state: match frozen {
             Some(frozen) => format!(
-                "It is finished. The boards of its stage are frozen since {} ({}): its result is shown once they are \
-                 unfrozen.",
-                minute(frozen.at),
+                "Finished. The boards of this stage are frozen since {} ({}); the result is shown when they are unfrozen.",
+                utc_minute(frozen.at),
                 frozen.reason
             ),
-            None => in_words(&view).to_owned(),
+            None => state_text(&view).to_owned(),
         },
-        public: view.public,
+        is_dataset_public: view.public,
         dataset_removed: view.dataset_removed.clone(),
         progress: (!view.status.is_final()).then_some(view.progress),
         queue: view.queue,
         next: view.next.clone(),
-        finished,
+        result: final_result,
     })
 }
 
-/// What has become of an evaluation without a result.
-const fn in_words(view: &EvaluationView) -> &'static str {
-    const HIDDEN: &str = "It is over. Its stage is blind: how it went is hidden from everybody until the organiser opens \
-                          the stage, and nobody knows when that is.";
+/// State of an evaluation without a visible result.
+const fn state_text(view: &EvaluationView) -> &'static str {
+    const HIDDEN: &str = "Finished. The stage is blind: results are hidden from everyone, teams included, until the \
+                          organisers reveal them. No date is set.";
     match &view.status {
         EvaluationStatus::Finished { .. } | EvaluationStatus::AgentFailed { .. } if view.blind => {
             HIDDEN
         }
-        EvaluationStatus::Queued => "It waits for a worker.",
-        EvaluationStatus::Running => "Episodes are being played.",
-        EvaluationStatus::Finalising => "All episodes are played; the score is being computed.",
+        EvaluationStatus::Queued => "Waiting for a free slot.",
+        EvaluationStatus::Running => "Running.",
+        EvaluationStatus::Finalising => "All episodes have been played; the score is being computed.",
         EvaluationStatus::Finished { .. } => "",
         EvaluationStatus::AgentFailed { .. } => {
-            "The agent broke the protocol or a limit too often and was stopped; there is no score. \
-             Its team sees the faults and the log when the day is released."
+            "The agent was stopped because it violated the protocol or a limit too often. There is no score. The team sees \
+             faults and log when the day is released."
         }
         EvaluationStatus::PlatformFailed { .. } => {
-            "It was stopped by a fault of this server, not of the agent. The same agent plays the same episodes \
-             again, unless the fault stays."
+            "Stopped by a fault of this server, not of the agent. The evaluation is repeated with the same agent on the \
+             same episodes, unless the fault persists."
         }
         EvaluationStatus::NotPlayed { .. } => {
-            "Its day's deadline came before all of it was played, for want of this server's capacity: by no fault of \
-             the agent's."
+            "Not finished before the deadline of the day, because the server ran out of time, not because of the agent."
         }
-        EvaluationStatus::Cancelled { .. } => "The organiser cancelled it.",
+        EvaluationStatus::Cancelled { .. } => "Cancelled by the organisers.",
     }
 }
 
-/// The finished evaluations that can be compared with this one, in the order of their scores.
+/// Finished evaluations on the same episodes, best score first.
 async fn others(
     app: &App,
-    sight: &Sight,
-    of: &EvaluationView,
+    visibility: &Visibility,
+    evaluation: &EvaluationView,
     seed: Option<Seed>,
-) -> Result<Vec<Other>, PageProblem> {
+) -> Result<Vec<OtherEvaluation>, PageProblem> {
     let same_episodes = |other: &EvaluationView| {
-        other.id != of.id
+        other.id != evaluation.id
             && other.voided.is_none()
-            && other.profile == of.profile
-            && other.episodes_per_task == of.episodes_per_task
-            && other.tasks == of.tasks
+            && other.profile == evaluation.profile
+            && other.episodes_per_task == evaluation.episodes_per_task
+            && other.tasks == evaluation.tasks
     };
     let day = StageDay {
-        stage: of.stage,
-        date: of.day,
+        stage: evaluation.stage,
+        date: evaluation.day,
     };
-    let same_day = evaluation::of_day(app, sight, day).await?;
+    let same_day = evaluation::day_evaluations(app, visibility, day).await?;
     let mut others = Vec::new();
     let is_shown = |view: &EvaluationView| {
         let scored_at = view.status.finished_at();
-        scored_at.is_none_or(|at| sight.freeze_hiding(view.stage, at).is_none())
+        scored_at.is_none_or(|at| visibility.hiding_freeze(view.stage, at).is_none())
     };
     let shown = same_day.into_iter().filter(same_episodes).filter(is_shown);
     for view in shown {
-        // An extra turn may have had episodes of its own.
+        // An extra evaluation may have other episodes.
         if let EvaluationStatus::Finished {
             result: Some(result),
             ..
@@ -371,31 +366,31 @@ async fn others(
     others.sort_by(|a, b| b.0.total_cmp(&a.0).then_with(|| a.2.cmp(&b.2)));
     Ok(others
         .into_iter()
-        .map(|(score, team, evaluation)| Other {
+        .map(|(score, team, evaluation)| OtherEvaluation {
             team: team.to_string(),
             evaluation,
-            score: figures::one(score),
+            score: figures::one_decimal(score),
         })
         .collect())
 }
 
-/// How many control steps were answered in which time.
+/// Number of control steps by answer time.
 type Distributions = BTreeMap<Task, Vec<TimeBinView>>;
 
-/// Answer times of all tasks, if they are told.
-fn times(result: &ResultView, distributions: &Distributions) -> Option<Strip> {
+/// Answer times of all tasks, if they are public.
+fn answer_times(result: &ResultView, distributions: &Distributions) -> Option<Strip> {
     let tasks = result.tasks.iter();
-    let spans: Vec<Span> = tasks
-        .filter_map(|(task, of_task)| {
-            let time = of_task.computation_time_s?;
-            Some(Span {
+    let summaries: Vec<TimeSummary> = tasks
+        .filter_map(|(task, result)| {
+            let time = result.computation_time_s?;
+            Some(TimeSummary {
                 name: task.as_str(),
                 mean: 1e3 * time.mean,
                 p99: 1e3 * time.p99,
                 max: 1e3 * time.max,
-                counted: distributions
+                bins: distributions
                     .get(task)
-                    .map(|bins| counted(bins))
+                    .map(|bins| time_bins(bins))
                     .unwrap_or_default(),
             })
         })
@@ -404,11 +399,11 @@ fn times(result: &ResultView, distributions: &Distributions) -> Option<Strip> {
         let trips = timing.during_s;
         [1e3 * trips.p50, 1e3 * trips.p99]
     });
-    (!spans.is_empty()).then(|| Strip::of(&spans, floor))
+    (!summaries.is_empty()).then(|| Strip::new(&summaries, floor))
 }
 
-fn counted(bins: &[TimeBinView]) -> Vec<Counted> {
-    let bins = bins.iter().map(|bin| Counted {
+fn time_bins(bins: &[TimeBinView]) -> Vec<TimeBin> {
+    let bins = bins.iter().map(|bin| TimeBin {
         from: 1e3 * bin.from_s,
         to: 1e3 * bin.to_s,
         count: bin.steps,
@@ -416,23 +411,22 @@ fn counted(bins: &[TimeBinView]) -> Vec<Counted> {
     bins.collect()
 }
 
-impl Finished {
-    /// Had any episode a violation?
+impl FinalResult {
     fn has_violations(&self) -> bool {
         let details = self.tasks.iter().filter_map(|task| task.details.as_ref());
-        let mut kinds = details.flat_map(|details| &details.broken);
+        let mut kinds = details.flat_map(|details| &details.violations);
         kinds.any(|kind| kind.points.is_some())
     }
 
-    fn of(result: &ResultView, finished_at: Timestamp, summary: &EpisodeSummary) -> Self {
+    fn new(result: &ResultView, finished_at: Timestamp, summary: &EpisodeSummary) -> Self {
         Self {
             score: Rate::of_score(result.score, &result.tasks, &result.variation.weights),
-            penalty_points: figures::one(result.penalty_points),
+            penalty_points: figures::one_decimal(result.penalty_points),
             tier_name: result.tier.as_str(),
             tier_title: result.tier.title(),
-            tier_sign: figures::tier_sign(result.tier),
+            tier_symbol: figures::tier_symbol(result.tier),
             tier_bounds: figures::tier_bounds(result.tier, &result.variation.tier_bounds),
-            tier_change: figures::chance(summary.tier_change_of(None)),
+            tier_change: figures::probability(summary.tier_change_of(None)),
             resamples: TIER_CHANGE_RESAMPLES,
             ruleset: result.ruleset.clone(),
             seed: result.seed.map(|seed| seed.to_string()),
@@ -440,13 +434,13 @@ impl Finished {
             tasks: result
                 .tasks
                 .iter()
-                .map(|(task, result)| TaskFigures::of(*task, result, summary))
+                .map(|(task, result)| TaskFigures::new(*task, result, summary))
                 .collect(),
             dataset_blake3: None,
             others: Vec::new(),
             slow: SlowAnswers::default(),
-            timing: result.timing.as_ref().map(TimingFigures::of),
-            times: None,
+            timing: result.timing.as_ref().map(TimingFigures::new),
+            answer_times: None,
         }
     }
 }

@@ -1,4 +1,4 @@
-//! Numbers as the pages write them. The pages' units are stated in the tables' heads.
+//! Number formats of the pages. Units are stated in the heads of tables.
 
 use faceoff_api::views::task::TaskView;
 use faceoff_scoring::TIER_CHANGE_RESAMPLES;
@@ -13,21 +13,21 @@ pub(super) struct Rate {
     /// Lower and upper bound in percent, one decimal.
     pub(super) low: String,
     pub(super) high: String,
-    /// Where the interval begins, how wide it is and where the rate lies, in hundredths of the bar.
+    /// Start and width of the interval and position of the rate, in percent of the bar.
     pub(super) bar_from: String,
     pub(super) bar_width: String,
     pub(super) bar_at: String,
 }
 
 impl Rate {
-    pub(super) fn of(result: &TaskView) -> Self {
+    pub(super) fn new(result: &TaskView) -> Self {
         let [low, high] = result
             .success_ci95
             .map(|bound| 100.0 * bound.clamp(0.0, 1.0));
         Self::of_percent(100.0 * result.success_rate, [low, high])
     }
 
-    /// The overall score, as a rate.
+    /// The overall score with its interval.
     pub(super) fn of_score(
         score: f64,
         tasks: &BTreeMap<Task, TaskView>,
@@ -38,18 +38,18 @@ impl Rate {
 
     fn of_percent(percent: f64, [low, high]: [f64; 2]) -> Self {
         Self {
-            percent: one(percent),
-            low: one(low),
-            high: one(high),
-            bar_from: one(low),
-            bar_width: one(high - low),
-            bar_at: one(percent),
+            percent: one_decimal(percent),
+            low: one_decimal(low),
+            high: one_decimal(high),
+            bar_from: one_decimal(low),
+            bar_width: one_decimal(high - low),
+            bar_at: one_decimal(percent),
         }
     }
 }
 
-/// A 95 % interval of the score in percent. Tasks are independent of each other, so that the distances from the rates
-/// to the ends of their intervals add up as squares, each side by itself (Zou and Donner, Statistics in Medicine 2008).
+/// A 95 % interval of the score in percent. The tasks are independent, so the squared distances from the rates to the ends of
+/// their intervals add up on each side (Zou and Donner, Statistics in Medicine 2008).
 pub(super) fn score_interval(
     score: f64,
     tasks: &BTreeMap<Task, TaskView>,
@@ -70,13 +70,13 @@ pub(super) fn score_interval(
     ]
 }
 
-/// A moment to the minute.
-pub(super) fn minute(at: Timestamp) -> String {
+/// Time in UTC, to the minute.
+pub(super) fn utc_minute(at: Timestamp) -> String {
     at.strftime("%Y-%m-%d %H:%M UTC").to_string()
 }
 
-/// Two significant digits of what is not negative.
-pub(super) fn significant(value: f64) -> String {
+/// A non-negative value with two significant digits.
+pub(super) fn two_significant_digits(value: f64) -> String {
     let decimals = match value {
         _ if value >= 10.0 => 0,
         _ if value >= 1.0 => 1,
@@ -86,17 +86,17 @@ pub(super) fn significant(value: f64) -> String {
     format!("{value:.decimals$}")
 }
 
-/// One decimal; never “-0.0”.
-pub(super) fn one(value: f64) -> String {
+/// One decimal; zero has no sign.
+pub(super) fn one_decimal(value: f64) -> String {
     format!("{:.1}", value + 0.0)
 }
 
-/// A probability from a bootstrap, in percent. None of the resamples is not the same as never.
-pub(super) fn chance(probability: f64) -> String {
+/// A probability from a bootstrap, in percent. A count of zero is shown as an upper bound, since rare cases may be missed.
+pub(super) fn probability(probability: f64) -> String {
     if probability * f64::from(TIER_CHANGE_RESAMPLES) < 0.5 {
         format!("under {} %", 100.0 / f64::from(TIER_CHANGE_RESAMPLES))
     } else {
-        format!("{} %", one(100.0 * probability))
+        format!("{} %", one_decimal(100.0 * probability))
     }
 }
 
@@ -111,7 +111,7 @@ pub(super) fn p_value(p: f64) -> String {
 
 /// A difference with its sign, one decimal.
 pub(super) fn signed(value: f64) -> String {
-    let text = one(value.abs());
+    let text = one_decimal(value.abs());
     match value {
         _ if text == "0.0" => text,
         value if value > 0.0 => format!("+{text}"),
@@ -119,7 +119,7 @@ pub(super) fn signed(value: f64) -> String {
     }
 }
 
-/// Seconds as milliseconds, with three significant places where that matters.
+/// Seconds as milliseconds: two decimals below 10 ms, none above.
 pub(super) fn milliseconds(seconds: f64) -> String {
     let ms = seconds * 1e3;
     if ms < 10.0 {
@@ -129,18 +129,18 @@ pub(super) fn milliseconds(seconds: f64) -> String {
     }
 }
 
-/// Seconds as milliseconds to the microsecond, for times far below a control step.
-pub(super) fn fine_milliseconds(seconds: f64) -> String {
+/// Seconds as milliseconds with three decimals, for times far below a control step.
+pub(super) fn precise_milliseconds(seconds: f64) -> String {
     format!("{:.3}", seconds * 1e3)
 }
 
-/// Points per episode, by which the tiers are drawn.
+/// Penalty points per episode, which decide the tier.
 pub(super) fn per_episode(points: f64, episodes: u32) -> String {
     format!("{:.2}", points / f64::from(episodes.max(1)))
 }
 
 /// A count with its share of the episodes in percent.
-pub(super) fn share(count: u32, episodes: u32) -> String {
+pub(super) fn count_with_share(count: u32, episodes: u32) -> String {
     if count == 0 {
         return "0".to_owned();
     }
@@ -148,14 +148,14 @@ pub(super) fn share(count: u32, episodes: u32) -> String {
     format!("{count} ({percent:.0} %)")
 }
 
-/// Some of all, in percent without decimals.
+/// A share in percent, without decimals.
 pub(super) fn percent(some: usize, all: usize) -> String {
     let count = |count: usize| u32::try_from(count).map_or(f64::INFINITY, f64::from);
     format!("{:.0} %", 100.0 * count(some) / count(all.max(1)))
 }
 
-/// A sign beside the tier's name, since colour alone must not carry it.
-pub(super) const fn tier_sign(tier: Tier) -> &'static str {
+/// Symbol beside the name of a tier: colour alone must not carry the meaning.
+pub(super) const fn tier_symbol(tier: Tier) -> &'static str {
     match tier {
         Tier::Deployable => "✓",
         Tier::Improvable => "▲",
@@ -163,7 +163,7 @@ pub(super) const fn tier_sign(tier: Tier) -> &'static str {
     }
 }
 
-/// What a tier means, as the legend and the tables' group heads say it.
+/// Definition of a tier, for the legend and the group heads of tables.
 pub(super) fn tier_bounds(tier: Tier, bounds: &TierBounds) -> String {
     let (deployable, improvable) = (bounds.deployable(), bounds.improvable());
     match tier {
@@ -181,33 +181,33 @@ mod tests {
     use faceoff_scoring::{DEPLOYABLE_POINTS_PER_EPISODE, IMPROVABLE_POINTS_PER_EPISODE};
 
     #[test]
-    fn the_tiers_bounds_are_the_scorings() {
+    fn tier_bounds_match_the_scoring_constants() {
         let deployable = DEPLOYABLE_POINTS_PER_EPISODE.to_string();
         let improvable = IMPROVABLE_POINTS_PER_EPISODE.to_string();
-        let told = |tier| tier_bounds(tier, &TierBounds::default());
-        assert!(told(Tier::Deployable).contains(&deployable));
-        assert!(told(Tier::Improvable).contains(&deployable));
-        assert!(told(Tier::Improvable).contains(&improvable));
-        assert!(told(Tier::NonDeployable).contains(&improvable));
+        let text = |tier| tier_bounds(tier, &TierBounds::default());
+        assert!(text(Tier::Deployable).contains(&deployable));
+        assert!(text(Tier::Improvable).contains(&deployable));
+        assert!(text(Tier::Improvable).contains(&improvable));
+        assert!(text(Tier::NonDeployable).contains(&improvable));
     }
 
     #[test]
-    fn figures_read_as_in_the_paper() {
-        assert_eq!(one(54.94), "54.9");
-        assert_eq!(one(-0.0), "0.0");
+    fn numbers_are_formatted_as_in_the_paper() {
+        assert_eq!(one_decimal(54.94), "54.9");
+        assert_eq!(one_decimal(-0.0), "0.0");
         assert_eq!(milliseconds(0.000_212), "0.21");
         assert_eq!(milliseconds(0.0204), "20");
-        assert_eq!(fine_milliseconds(0.000_021_4), "0.021");
+        assert_eq!(precise_milliseconds(0.000_021_4), "0.021");
         assert_eq!(per_episode(327.5, 1000), "0.33");
-        assert_eq!(chance(0.0), "under 0.05 %");
-        assert_eq!(chance(0.0005), "0.1 %");
-        assert_eq!(chance(0.4025), "40.2 %");
+        assert_eq!(probability(0.0), "under 0.05 %");
+        assert_eq!(probability(0.0005), "0.1 %");
+        assert_eq!(probability(0.4025), "40.2 %");
         assert_eq!(p_value(0.0004), "under 0.001");
         assert_eq!(p_value(0.0494), "0.049");
         assert_eq!(signed(12.24), "+12.2");
         assert_eq!(signed(-0.3), "−0.3");
         assert_eq!(signed(-0.01), "0.0");
-        assert_eq!(share(0, 50), "0");
-        assert_eq!(share(5, 50), "5 (10 %)");
+        assert_eq!(count_with_share(0, 50), "0");
+        assert_eq!(count_with_share(5, 50), "5 (10 %)");
     }
 }

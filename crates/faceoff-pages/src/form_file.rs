@@ -1,101 +1,101 @@
-//! The file of a form as a browser sends it (`multipart/form-data`, RFC 7578): the form's only part, streamed. Nothing of
-//! the file is kept in memory, and what surrounds it is bounded. (The reader that comes with axum, `multer` 3, takes in all
-//! that the connection has ready before it hands on the first byte.)
+//! Streaming reader for a form with a single file (`multipart/form-data`, RFC 7578). The file is never kept in memory, and the
+//! size of everything around it is bounded. axum's own reader, `multer` 3, is not used. It buffers all data that the
+//! connection has ready before it returns the first byte.
 
 use axum::{
     body::{Body, BodyDataStream, Bytes},
     http::{HeaderMap, header},
 };
 use faceoff_service::{
-    pace::LeastRate,
+    transfer_rate::MinTransferRate,
     problem::{Problem, ProblemKind},
 };
 use futures::{StreamExt, stream};
 use std::io;
 use tokio::time::Instant;
 
-/// The part's own head, and what follows the file, are shorter than this; those of browsers have some 200 bytes.
-const AROUND_BYTES: usize = 8 * 1024;
-/// By RFC 2046.
-const LONGEST_BOUNDARY: usize = 70;
+/// Largest size of the head of the part, and of the data after the file. Browsers send about 200 bytes.
+const MAX_ENVELOPE_BYTES: usize = 8 * 1024;
+/// Limit of RFC 2046.
+const MAX_BOUNDARY_LENGTH: usize = 70;
 
-/// A file on its way.
+/// A file that is being received.
 pub(crate) struct FormFile {
-    /// As its sender calls it; empty if none was chosen.
+    /// File name of the sender; empty if no file was chosen.
     pub(crate) name: String,
-    /// How many bytes it has, where the form's were announced.
+    /// Size of the file, if the request has a content length.
     pub(crate) bytes: Option<u64>,
     pub(crate) body: Body,
 }
 
 impl FormFile {
-    /// Reads as far as the file begins, within the grace of `rate`.
+    /// Reads up to the start of the file, within the grace period of `rate`.
     ///
     /// # Errors
-    /// `UnsupportedMediaType` if it is no such form; `InvalidRequest` if it is a broken one; `RequestTimeout`.
-    pub(crate) async fn of(
+    /// `UnsupportedMediaType` for another content type; `InvalidRequest` for a malformed form; `RequestTimeout`.
+    pub(crate) async fn read(
         headers: &HeaderMap,
         body: Body,
-        rate: LeastRate,
+        rate: MinTransferRate,
     ) -> Result<Self, Problem> {
         let boundary = boundary(headers).ok_or_else(|| {
             Problem::new(
                 ProblemKind::UnsupportedMediaType,
-                "expected the form of the page, of the type multipart/form-data",
+                "expected the form of the page with content type multipart/form-data",
             )
         })?;
-        let until = Instant::now() + rate.grace;
+        let deadline = Instant::now() + rate.grace;
         let mut stream = body.into_data_stream();
         let mut head: Vec<u8> = Vec::new();
-        let begins = loop {
+        let file_start = loop {
             if let Some(at) = find(&head, b"\r\n\r\n") {
                 break at + 4;
             }
-            if head.len() > AROUND_BYTES {
-                return Err(broken("its file has no head"));
+            if head.len() > MAX_ENVELOPE_BYTES {
+                return Err(malformed_form("the head of the file is missing or too long"));
             }
-            match tokio::time::timeout_at(until, stream.next()).await {
+            match tokio::time::timeout_at(deadline, stream.next()).await {
                 Ok(Some(Ok(chunk))) => head.extend_from_slice(&chunk),
-                Ok(Some(Err(error))) => return Err(broken(&error.to_string())),
-                Ok(None) => return Err(broken("it ends before its file begins")),
+                Ok(Some(Err(error))) => return Err(malformed_form(&error.to_string())),
+                Ok(None) => return Err(malformed_form("it ends before the file starts")),
                 Err(_) => {
                     return Err(Problem::new(
                         ProblemKind::RequestTimeout,
-                        "the form did not come; nothing was stored, send it again over a faster connection",
+                        "the form was not received in time; nothing was stored, send it again over a faster connection",
                     ));
                 }
             }
         };
-        let held = head.split_off(begins);
+        let buffer = head.split_off(file_start);
         let lines = String::from_utf8_lossy(&head);
         let Some(lines) = lines.strip_prefix(&format!("--{boundary}\r\n")) else {
-            return Err(broken("it does not begin with its boundary"));
+            return Err(malformed_form("it does not start with its boundary"));
         };
-        let name = file_name(lines).ok_or_else(|| broken("its first field is no file"))?;
+        let name = file_name(lines).ok_or_else(|| malformed_form("its first field is not a file"))?;
         let delimiter = format!("\r\n--{boundary}");
-        let announced = headers
+        let content_length = headers
             .get(header::CONTENT_LENGTH)
             .and_then(|value| value.to_str().ok()?.parse::<u64>().ok());
-        // The delimiter, and “--” with the line's end behind it.
-        let around = (begins + delimiter.len() + 4) as u64;
-        let rest = Rest {
+        // The delimiter, then “--” and the line break.
+        let envelope = (file_start + delimiter.len() + 4) as u64;
+        let reader = FileReader {
             stream,
-            held,
+            buffer,
             delimiter: delimiter.into_bytes(),
-            at: At::File,
+            state: ReadState::File,
         };
         Ok(Self {
             name,
-            bytes: announced.map(|bytes| bytes.saturating_sub(around)),
-            body: Body::from_stream(stream::unfold(rest, Rest::next)),
+            bytes: content_length.map(|bytes| bytes.saturating_sub(envelope)),
+            body: Body::from_stream(stream::unfold(reader, FileReader::next)),
         })
     }
 }
 
-fn broken(why: &str) -> Problem {
+fn malformed_form(why: &str) -> Problem {
     Problem::new(
         ProblemKind::InvalidRequest,
-        format!("the form is not understood: {why}; load the page anew, and send it again"),
+        format!("malformed form: {why}; reload the page and send the form again"),
     )
 }
 
@@ -105,33 +105,33 @@ fn boundary(headers: &HeaderMap) -> Option<String> {
     if !essence.trim().eq_ignore_ascii_case("multipart/form-data") {
         return None;
     }
-    let boundary = parameters.split(';').find_map(|one| {
-        let (name, value) = one.trim().split_once('=')?;
+    let boundary = parameters.split(';').find_map(|parameter| {
+        let (name, value) = parameter.trim().split_once('=')?;
         name.eq_ignore_ascii_case("boundary")
             .then(|| value.trim_matches('"'))
     })?;
-    let is_fine = (1..=LONGEST_BOUNDARY).contains(&boundary.len())
+    let is_valid = (1..=MAX_BOUNDARY_LENGTH).contains(&boundary.len())
         && boundary.chars().all(|c| c.is_ascii_graphic() || c == ' ');
-    is_fine.then(|| boundary.to_owned())
+    is_valid.then(|| boundary.to_owned())
 }
 
-/// The name that the part's head gives its file.
+/// File name in the head of the part.
 fn file_name(head: &str) -> Option<String> {
     let line = head.lines().find(|line| {
         line.get(..20)
             .is_some_and(|name| name.eq_ignore_ascii_case("content-disposition:"))
     })?;
-    // Browsers write a quotation mark in it as %22.
+    // Browsers encode quotation marks in the name as %22.
     let (_, name) = line.split_once("; filename=\"")?;
     let (name, _) = name.split_once('"')?;
     Some(name.to_owned())
 }
 
-fn find(bytes: &[u8], sought: &[u8]) -> Option<usize> {
-    let first = *sought.first()?;
+fn find(bytes: &[u8], pattern: &[u8]) -> Option<usize> {
+    let first = *pattern.first()?;
     let mut from = 0;
     while let Some(at) = bytes[from..].iter().position(|byte| *byte == first) {
-        if bytes[from + at..].starts_with(sought) {
+        if bytes[from + at..].starts_with(pattern) {
             return Some(from + at);
         }
         from += at + 1;
@@ -139,72 +139,71 @@ fn find(bytes: &[u8], sought: &[u8]) -> Option<usize> {
     None
 }
 
-/// Where the reading of a form is.
 #[derive(Clone, Copy)]
-enum At {
+enum ReadState {
     File,
-    /// Behind the file, whose end was told.
-    Behind,
-    Over,
+    /// After the delimiter that ends the file.
+    Trailer,
+    Done,
 }
 
-struct Rest {
+struct FileReader {
     stream: BodyDataStream,
-    /// Read, and not handed on: the delimiter may begin in it.
-    held: Vec<u8>,
+    /// Received data that is not passed on yet: the delimiter may start in it.
+    buffer: Vec<u8>,
     delimiter: Vec<u8>,
-    at: At,
+    state: ReadState,
 }
 
-impl Rest {
+impl FileReader {
     async fn next(mut self) -> Option<(io::Result<Bytes>, Self)> {
         loop {
-            match self.at {
-                At::Over => return None,
-                At::Behind => {
-                    let read = self.behind().await;
-                    self.at = At::Over;
+            match self.state {
+                ReadState::Done => return None,
+                ReadState::Trailer => {
+                    let read = self.read_trailer().await;
+                    self.state = ReadState::Done;
                     return read.err().map(|error| (Err(error), self));
                 }
-                At::File => {}
+                ReadState::File => {}
             }
-            let ready = match find(&self.held, &self.delimiter) {
+            let ready = match find(&self.buffer, &self.delimiter) {
                 Some(at) => {
-                    self.at = At::Behind;
+                    self.state = ReadState::Trailer;
                     at
                 }
-                None => self.held.len().saturating_sub(self.delimiter.len() - 1),
+                None => self.buffer.len().saturating_sub(self.delimiter.len() - 1),
             };
             if ready > 0 {
-                let later = self.held.split_off(ready);
-                let now = std::mem::replace(&mut self.held, later);
+                let later = self.buffer.split_off(ready);
+                let now = std::mem::replace(&mut self.buffer, later);
                 return Some((Ok(now.into()), self));
             }
-            if let At::File = self.at {
-                let read = match self.stream.next().await {
+            if let ReadState::File = self.state {
+                let error = match self.stream.next().await {
                     Some(Ok(chunk)) => {
-                        self.held.extend_from_slice(&chunk);
+                        self.buffer.extend_from_slice(&chunk);
                         continue;
                     }
                     Some(Err(error)) => io::Error::other(error),
-                    None => io::Error::other("the form ends within its file"),
+                    None => io::Error::other("the form ends inside the file"),
                 };
-                self.at = At::Over;
-                return Some((Err(read), self));
+                self.state = ReadState::Done;
+                return Some((Err(error), self));
             }
         }
     }
 
-    /// Reads what follows the file, which is nothing but the form's end.
-    async fn behind(&mut self) -> io::Result<()> {
+    /// Reads the data after the file, which must be the end of the form.
+    async fn read_trailer(&mut self) -> io::Result<()> {
         while let Some(chunk) = self.stream.next().await {
-            self.held
+            self.buffer
                 .extend_from_slice(&chunk.map_err(io::Error::other)?);
-            if self.held.len() > AROUND_BYTES {
+            if self.buffer.len() > MAX_ENVELOPE_BYTES {
                 return Err(io::Error::other("the form has more than one file"));
             }
         }
-        match self.held[self.delimiter.len()..].starts_with(b"--") {
+        match self.buffer[self.delimiter.len()..].starts_with(b"--") {
             true => Ok(()),
             false => Err(io::Error::other("the form has more than one file")),
         }
@@ -217,7 +216,7 @@ mod tests {
     use axum::{body, http::HeaderValue};
     use std::{convert::Infallible, time::Duration};
 
-    const RATE: LeastRate = LeastRate {
+    const RATE: MinTransferRate = MinTransferRate {
         bytes_per_s: 1,
         grace: Duration::from_secs(600),
     };
@@ -251,13 +250,13 @@ mod tests {
     const END: &str = "\r\n------abc--\r\n";
 
     #[tokio::test]
-    async fn the_file_comes_as_it_was_however_the_form_is_cut() {
-        // Among them what looks like the delimiter's beginning.
+    async fn file_is_read_exactly_for_any_chunk_size() {
+        // The file contains prefixes of the delimiter.
         let file = b"PK\r\n\r\n------ab\r\n------\r\n\r\n\r\r\n--";
         let form = form(file, END);
         for size in 1..=form.len() {
             let headers = headers(Some(form.len()));
-            let read = FormFile::of(&headers, pieces(&form, size), RATE);
+            let read = FormFile::read(&headers, pieces(&form, size), RATE);
             let read = read.await.unwrap();
             assert_eq!(read.name, "a b.zip");
             assert_eq!(read.bytes, Some(file.len() as u64));
@@ -267,31 +266,31 @@ mod tests {
     }
 
     #[tokio::test]
-    async fn what_is_no_such_form_is_told() {
-        let cut = form(b"PK", "");
-        let two = form(b"PK", "\r\n------abc\r\nContent-Disposition: x\r\n\r\n");
-        for form in [cut, two] {
+    async fn malformed_forms_are_refused() {
+        let truncated = form(b"PK", "");
+        let two_files = form(b"PK", "\r\n------abc\r\nContent-Disposition: x\r\n\r\n");
+        for form in [truncated, two_files] {
             let headers = headers(None);
-            let read = FormFile::of(&headers, pieces(&form, 7), RATE);
+            let read = FormFile::read(&headers, pieces(&form, 7), RATE);
             let read = read.await.unwrap();
             assert_eq!(read.bytes, None);
             assert!(body::to_bytes(read.body, 1000).await.is_err());
         }
-        let endless = vec![b'x'; 3 * AROUND_BYTES];
-        for (form, words) in [
-            (endless.as_slice(), "has no head"),
+        let endless = vec![b'x'; 3 * MAX_ENVELOPE_BYTES];
+        for (form, expected) in [
+            (endless.as_slice(), "missing or too long"),
             (b"------abc\r\n", "ends before"),
-            (b"x\r\n\r\n", "does not begin"),
+            (b"x\r\n\r\n", "does not start"),
             (
                 b"------abc\r\nContent-Disposition: form-data; name=\"a\"\r\n\r\nb",
-                "no file",
+                "not a file",
             ),
         ] {
-            let read = FormFile::of(&headers(None), pieces(form, 1000), RATE).await;
+            let read = FormFile::read(&headers(None), pieces(form, 1000), RATE).await;
             let problem = read.err().unwrap();
-            assert!(problem.detail().contains(words), "{}", problem.detail());
+            assert!(problem.detail().contains(expected), "{}", problem.detail());
         }
-        let none = FormFile::of(&HeaderMap::new(), Body::empty(), RATE).await;
+        let none = FormFile::read(&HeaderMap::new(), Body::empty(), RATE).await;
         let kind = none.err().unwrap().kind();
         assert_eq!(kind, ProblemKind::UnsupportedMediaType);
     }

@@ -8,39 +8,38 @@ use faceoff_service::{app::AppState, conditions::ETag, problem::Problem};
 use faceoff_types::RULESET;
 use std::sync::atomic::Ordering;
 
-/// What surrounds the content of every page.
+/// Header, navigation and footer of every page.
 #[derive(Debug)]
 pub(super) struct Frame {
-    /// The season's name; empty where the page does not know it.
+    /// Name of the season; empty on pages that do not load it.
     pub(super) season: String,
     pub(super) ruleset: &'static str,
-    /// Something is amiss that everybody who waits should know of.
+    /// Notice about a problem of the server.
     pub(super) notice: Option<&'static str>,
-    /// The season is an archive's, in words; none of one that runs.
+    /// Notice that the season is archived; `None` for a running season.
     pub(super) archived: Option<String>,
-    /// Path of the navigation entry that this page is.
+    /// Path of the current page, for the navigation.
     pub(super) current: String,
     pub(super) style: &'static str,
     pub(super) script: &'static str,
     pub(super) icon: &'static str,
-    /// Has the season a tournament?
     has_tournaments: bool,
-    /// Address of the picture that a preview of a link to the page shows; none where the server does not know its own.
+    /// Address of the picture in link previews; `None` if the public address of the server is not configured.
     pub(super) preview: Option<String>,
 }
 
 impl Frame {
-    /// Of a page that shows what the store holds.
-    pub(super) fn of(app: &AppState, season: String, current: impl Into<String>) -> Self {
-        let short = app.store.room().is_short();
+    /// The frame of a page with content from the store.
+    pub(super) fn for_app(app: &AppState, season: String, current: impl Into<String>) -> Self {
+        let short = app.store.free_space().is_short();
         Self {
             notice: short.then_some(
-                "The server's disk has too little room: the queue pauses and uploads are refused. Nothing \
-                 is lost; work goes on by itself when there is room again.",
+                "The disk of the server is almost full: the queue is paused and uploads are refused. Nothing is lost; \
+                 evaluations resume automatically when there is enough space.",
             ),
-            archived: app.store.archived().map(|archived| {
+            archived: app.store.archived_season().map(|archived| {
                 format!(
-                    "Archived season: you see it as it was on {}. Nothing changes any more.",
+                    "Archived season as of {}. Nothing changes any more.",
                     archived.made_at.strftime("%Y-%m-%d at %H:%M UTC")
                 )
             }),
@@ -54,7 +53,7 @@ impl Frame {
         }
     }
 
-    /// Of a page about nothing that moves.
+    /// The frame of a page without content from the store.
     pub(super) fn new(season: String, current: impl Into<String>) -> Self {
         Self {
             season,
@@ -70,20 +69,20 @@ impl Frame {
         }
     }
 
-    /// The entries of the navigation: paths and names.
+    /// Path and name of each navigation entry.
     pub(super) fn entries(&self) -> impl Iterator<Item = (&'static str, &'static str)> {
         let tournaments = self
             .has_tournaments
             .then_some(("/tournaments", "Tournament"));
         [("/", "Board")].into_iter().chain(tournaments).chain([
             ("/season", "Season"),
-            ("/announcements", "News"),
+            ("/announcements", "Announcements"),
             ("/docs", "Docs"),
             ("/account", "Account"),
         ])
     }
 
-    /// Is the page below this entry of the navigation? The boards of the tasks are below the first one.
+    /// Is the page at or below this navigation entry? The boards of the tasks are below the first entry.
     pub(super) fn is_at(&self, entry: &str) -> bool {
         let below = if entry == "/" { "/tasks" } else { entry };
         let rest = self.current.strip_prefix(below);
@@ -91,12 +90,12 @@ impl Frame {
     }
 }
 
-/// Renders a page that has a tag, by which who has it already is told so (`layers.rs`).
-pub(super) fn render_tagged(page: &impl Template) -> Result<Response, PageProblem> {
+/// Renders a page with an ETag; `layers.rs` answers 304 if the client has this version.
+pub(super) fn render_with_etag(page: &impl Template) -> Result<Response, PageProblem> {
     let html = page
         .render()
         .map_err(|error| PageProblem(Problem::internal(error)))?;
-    let tag = ETag::of("page", &[&html]);
+    let tag = ETag::new("page", &[&html]);
     let headers = [
         (header::ETAG, tag.header()),
         (

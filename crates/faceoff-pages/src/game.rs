@@ -1,18 +1,18 @@
-//! `/games/{id}`: a game, live while it is played; what it came to and why, how that came about, and its replay.
+//! `/games/{id}`: a game: live view, result, course, analysis and replay.
 
-mod course;
+mod score_timeline;
 mod live;
-mod play;
+mod analysis;
 
 use super::{
     assets, figures,
     frame::{Frame, PageProblem, render},
     spoilers::Spoilers,
-    table_drawing::Ground,
+    table_drawing::TableOutline,
 };
 use askama::Template;
 use axum::{extract::State, response::Response};
-use course::TimeLine;
+use score_timeline::ScoreTimeline;
 use faceoff_api::{
     paths,
     views::game::{GameResultView, GameStatus, PurposeView},
@@ -23,41 +23,41 @@ use faceoff_service::{
     extract::PathParam,
     problem::Problem,
     viewer::Viewer,
-    views::{game, game_clips::GameClips, game_live::GameLive, season::SeasonHead},
+    views::{game, game_clips::GameClips, live_game::LiveGameView, season::SeasonHead},
 };
 use faceoff_types::{GameId, Side, SubmissionId, TeamId, TournamentId};
-use live::Live;
-use play::{Possession, Safety, Shots, Speeds};
+use live::LiveGame;
+use analysis::{Possession, Shots, Speeds, Violations};
 
-/// A line of the table: what it counts, and each side's number.
-struct Line {
-    what: &'static str,
+/// A row of the table of statistics.
+struct Statistic {
+    name: &'static str,
     sides: [String; 2],
 }
 
-/// Where the script finds the clips.
-struct Chunks {
+/// Addresses of the clips for the script.
+struct ReplayChunks {
     motion: String,
     observed: Option<String>,
     samples: u32,
 }
 
-/// A game whose result is told.
-struct Played {
+/// A result that is not hidden.
+struct GameResult {
     score: [u32; 2],
     winner: Option<String>,
     because: String,
     duration_min: String,
-    lines: Vec<Line>,
+    statistics: Vec<Statistic>,
 }
 
-/// How the result came about, by the clips.
-struct Play {
-    time_line: TimeLine,
+/// Course and analysis of a game, from its clips.
+struct GameSections {
+    timeline: ScoreTimeline,
     possession: Possession,
     shots: [Shots; 2],
     speeds: Option<Speeds>,
-    safety: [Safety; 2],
+    violations: [Violations; 2],
 }
 
 #[derive(Template)]
@@ -72,33 +72,36 @@ struct Page {
     team_ids: [TeamId; 2],
     submissions: [SubmissionId; 2],
     purpose: String,
-    /// Test games may be against a team that is not in the tournament.
-    is_of_round: bool,
+    /// Does the game belong to a round? Test games may have a team from outside the tournament.
+    is_round_game: bool,
     state: String,
-    /// The team by whose leaving it does not count.
-    taken_out_by: Option<String>,
+    /// The team whose leaving took the game out of the standings.
+    withdrawn_team: Option<String>,
     next: String,
-    /// Is it, or may it be, played by and by?
+    /// Is the game queued or running?
     is_open: bool,
-    live: Option<Live>,
-    /// Has it a result?
+    live: Option<LiveGame>,
     has_result: bool,
-    played: Option<Played>,
-    play: Option<Play>,
-    replay: Option<Chunks>,
-    ground: Ground,
+    result: Option<GameResult>,
+    sections: Option<GameSections>,
+    replay: Option<ReplayChunks>,
+    table: TableOutline,
     styles: [&'static str; 2],
     script: &'static str,
 }
 
 impl Page {
-    /// Where its stream is, of a game whose course may be told.
+    /// Address of the live stream, unless results are hidden.
     fn stream(&self) -> Option<String> {
-        (self.is_open && !self.spoilers.hide()).then(|| format!("{}/live", paths::game(self.id)))
+        (self.is_open && !self.spoilers.hides_results()).then(|| format!("{}/live", paths::game(self.id)))
     }
 
-    fn told(&self) -> String {
-        self.live.as_ref().map(Live::told).unwrap_or_default()
+    /// Text for screen readers after a live update.
+    fn live_text(&self) -> String {
+        self.live
+            .as_ref()
+            .map(LiveGame::live_text)
+           .unwrap_or_default()
     }
 }
 
@@ -111,35 +114,35 @@ pub(super) async fn page(
     let PathParam(id) = id?;
     let viewer = viewer?;
     let view = game::find(&app, viewer, id).await?;
-    let season = SeasonHead::now(&app).await?;
+    let season = SeasonHead::load(&app).await?;
     let teams = view.sides.each_ref().map(|side| side.team_name.to_string());
-    let is_hidden = spoilers.hide();
-    let (mut live, mut played, mut play, mut replay) = (None, None, None, None);
+    let is_hidden = spoilers.hides_results();
+    let (mut live, mut shown_result, mut sections, mut replay) = (None, None, None, None);
     match &view.status {
         GameStatus::Running { since, .. } if !is_hidden => {
             let now = app.config.clock.now();
-            live = GameLive::of(&app, id).map(|live| Live::of(&live, &teams, *since, now));
+            live = LiveGameView::find(&app, id).map(|live| LiveGame::new(&live, &teams, *since, now));
         }
         GameStatus::Played { result, .. } => {
-            let clips = GameClips::of(&app, viewer, id).await.ok();
-            // A game that was forfeited is shorter than the rules have it, which would tell how it ended.
+            let clips = GameClips::find(&app, viewer, id).await.ok();
+            // A forfeited game is shorter than the rules say: its length would reveal the result.
             let steps = match is_hidden {
-                true => rules_steps(&app, view.tournament).await?,
+                true => full_game_steps(&app, view.tournament).await?,
                 false => result.steps,
             };
-            replay = clips.as_ref().map(|clips| Chunks::of(id, clips, steps));
+            replay = clips.as_ref().map(|clips| ReplayChunks::new(id, clips, steps));
             if !is_hidden {
-                played = Some(Played::of(result));
+                shown_result = Some(GameResult::new(result));
                 if let Some(clips) = &clips {
                     let analysis = clips.analysis(&app, result.steps).await?;
-                    play = Some(Play::of(&analysis, &teams));
+                    sections = Some(GameSections::new(&analysis, &teams));
                 }
             }
         }
         _ => {}
     }
     render(&Page {
-        frame: Frame::of(
+        frame: Frame::for_app(
             &app,
             season.name,
             format!("/tournaments/{}", view.tournament),
@@ -149,76 +152,76 @@ pub(super) async fn page(
         tournament_name: view.tournament_name.to_string(),
         team_ids: view.sides.each_ref().map(|side| side.team),
         submissions: view.sides.each_ref().map(|side| side.submission),
-        is_of_round: matches!(view.purpose, PurposeView::Round { .. }),
-        purpose: in_words(&view.purpose),
-        state: state(&view.status, is_hidden),
-        taken_out_by: view.taken_out_by.map(|team| team.to_string()),
+        is_round_game: matches!(view.purpose, PurposeView::Round { .. }),
+        purpose: purpose_text(&view.purpose),
+        state: state_text(&view.status, is_hidden),
+        withdrawn_team: view.taken_out_by.map(|team| team.to_string()),
         next: view.next,
         is_open: matches!(view.status, GameStatus::Queued | GameStatus::Running { .. }),
         has_result: matches!(view.status, GameStatus::Played { .. }),
         teams,
         live,
-        played,
-        play,
+        result: shown_result,
+        sections,
         replay,
-        ground: Ground::new(),
+        table: TableOutline::new(),
         styles: [assets::EPISODES_STYLE.url(), assets::REPLAY_STYLE.url()],
         script: assets::REPLAY_SCRIPT.url(),
         spoilers,
     })
 }
 
-/// Control steps of each game of a tournament, if none forfeits.
-async fn rules_steps(app: &App, tournament: TournamentId) -> Result<u32, Problem> {
+/// Control steps of a full game of the tournament.
+async fn full_game_steps(app: &App, tournament: TournamentId) -> Result<u32, Problem> {
     Ok(app.store.tournament(tournament).await?.rules.steps)
 }
 
-impl Chunks {
-    fn of(id: GameId, clips: &GameClips, steps: u32) -> Self {
+impl ReplayChunks {
+    fn new(id: GameId, clips: &GameClips, steps: u32) -> Self {
         let api = paths::game(id);
-        let seen = Side::BOTH.into_iter().find(|side| clips.sees[side.index()]);
+        let visible_side = Side::BOTH.into_iter().find(|side| clips.can_see_observations[side.index()]);
         Self {
             motion: format!("{api}/motion/{{chunk}}"),
-            observed: seen.map(|side| format!("{api}/sides/{}/observed/{{chunk}}", side.number())),
+            observed: visible_side.map(|side| format!("{api}/sides/{}/observed/{{chunk}}", side.number())),
             samples: steps.saturating_add(1),
         }
     }
 }
 
-impl Play {
-    fn of(analysis: &GameAnalysis, teams: &[String; 2]) -> Self {
+impl GameSections {
+    fn new(analysis: &GameAnalysis, teams: &[String; 2]) -> Self {
         Self {
-            time_line: TimeLine::of(analysis, teams),
-            possession: Possession::of(analysis),
-            shots: [0, 1].map(|side| Shots::of(analysis, side, &teams[side])),
-            speeds: Speeds::of(analysis, teams),
-            safety: [0, 1].map(|side| Safety::of(analysis, side, &teams[side])),
+            timeline: ScoreTimeline::new(analysis, teams),
+            possession: Possession::new(analysis),
+            shots: [0, 1].map(|side| Shots::new(analysis, side, &teams[side])),
+            speeds: Speeds::new(analysis, teams),
+            violations: [0, 1].map(|side| Violations::new(analysis, side, &teams[side])),
         }
     }
 }
 
-impl Played {
-    fn of(result: &GameResultView) -> Self {
-        let line = |what, sides: [String; 2]| Line { what, sides };
-        let counts = |what, sides: [u32; 2]| line(what, sides.map(|count| count.to_string()));
+impl GameResult {
+    fn new(result: &GameResultView) -> Self {
+        let statistic = |name, sides: [String; 2]| Statistic { name, sides };
+        let counts = |name, sides: [u32; 2]| statistic(name, sides.map(|count| count.to_string()));
         let milliseconds = |of: [f64; 2]| of.map(|s| format!("{} ms", figures::milliseconds(s)));
         let times = &result.computation_time_s;
-        let lines = vec![
+        let statistics = vec![
             counts("Goals on the table", result.goals),
             counts("Fouls", result.fouls),
-            line("Penalty points", result.penalty_points.map(figures::one)),
-            line(
+            statistic("Penalty points", result.penalty_points.map(figures::one_decimal)),
+            statistic(
                 "Tier",
                 result.tiers.each_ref().map(|tier| tier.title().to_owned()),
             ),
             counts("Faults", result.faults),
-            counts("Answers too late", result.late_answers),
-            line(
+            counts("Late answers", result.late_answers),
+            statistic(
                 "Mean computation time",
                 milliseconds([times[0].mean, times[1].mean]),
             ),
-            line(
-                "Longest computation time",
+            statistic(
+                "Maximum computation time",
                 milliseconds([times[0].max, times[1].max]),
             ),
         ];
@@ -226,13 +229,13 @@ impl Played {
             score: result.score,
             winner: result.winner.as_ref().map(ToString::to_string),
             because: result.because.clone(),
-            duration_min: figures::one(f64::from(result.steps) * CONTROL_STEP_S / 60.0),
-            lines,
+            duration_min: figures::one_decimal(f64::from(result.steps) * CONTROL_STEP_S / 60.0),
+            statistics,
         }
     }
 }
 
-fn in_words(purpose: &PurposeView) -> String {
+fn purpose_text(purpose: &PurposeView) -> String {
     match purpose {
         PurposeView::Round {
             round,
@@ -247,28 +250,28 @@ fn in_words(purpose: &PurposeView) -> String {
             };
             format!("Round {round}, matchday {matchday}, meeting {meeting}{half}")
         }
-        PurposeView::Test { .. } => "A test game: it does not count".to_owned(),
-        PurposeView::Friendly { .. } => "A friendly game: it does not count".to_owned(),
+        PurposeView::Test { .. } => "Test game; it does not count".to_owned(),
+        PurposeView::Friendly { .. } => "Friendly game; it does not count".to_owned(),
         PurposeView::Replay { replay, round, .. } => {
-            format!("The schedule played again, time {replay}: a game of round {round}")
+            format!("Repetition {replay} of the schedule, game of round {round}; it does not count")
         }
     }
 }
 
-fn state(status: &GameStatus, is_hidden: bool) -> String {
+fn state_text(status: &GameStatus, is_hidden: bool) -> String {
     match status {
-        GameStatus::Queued => "It waits for a slot.".to_owned(),
+        GameStatus::Queued => "Waiting for a free slot.".to_owned(),
         GameStatus::Running { since, .. } => {
-            format!("It is being played since {}.", since.strftime("%H:%M UTC"))
+            format!("Running since {}.", since.strftime("%H:%M UTC"))
         }
         GameStatus::Played { finished_at, .. } => {
             format!("Played on {}.", finished_at.strftime("%Y-%m-%d, %H:%M UTC"))
         }
-        GameStatus::Broken { reason, .. } => format!("It was broken by our fault: {reason}"),
-        // Reasons are somebody's own words, and may tell how it went.
-        GameStatus::Void { .. } if is_hidden => "Its result was voided.".to_owned(),
-        GameStatus::Cancelled { .. } if is_hidden => "It is not played.".to_owned(),
-        GameStatus::Void { reason, .. } => format!("Its result was voided: {reason}"),
-        GameStatus::Cancelled { reason, .. } => format!("It is not played: {reason}"),
+        GameStatus::Broken { reason, .. } => format!("Failed because of a platform fault: {reason}"),
+        // The reason is free text and may reveal the result.
+        GameStatus::Void { .. } if is_hidden => "The result was voided.".to_owned(),
+        GameStatus::Cancelled { .. } if is_hidden => "Not played.".to_owned(),
+        GameStatus::Void { reason, .. } => format!("The result was voided: {reason}"),
+        GameStatus::Cancelled { reason, .. } => format!("Not played: {reason}"),
     }
 }

@@ -1,10 +1,9 @@
-//! A game in a list of games, and how it stands in words.
+//! A row of a list of games, with the state of the game as text.
 
-use super::figures::minute;
+use super::figures::utc_minute;
 use faceoff_api::views::game::{GameStatus, GameView, PurposeView};
 use faceoff_types::{GameId, RoundNumber, TeamId, TeamName};
 
-/// A game of a list.
 #[derive(Debug, Clone)]
 pub(super) struct GameRow {
     pub(super) id: GameId,
@@ -13,34 +12,35 @@ pub(super) struct GameRow {
     pub(super) is_second_half: bool,
     pub(super) teams: [TeamName; 2],
     pub(super) team_ids: [TeamId; 2],
-    pub(super) stands: Stands,
-    /// What came of it, or how it stands.
-    pub(super) told: String,
-    /// The team by whose leaving it does not count.
-    pub(super) taken_out_by: Option<TeamName>,
+    pub(super) state: GameState,
+    /// The result, or the state of the game.
+    pub(super) summary: String,
+    /// The team whose leaving took the game out of the standings.
+    pub(super) withdrawn_team: Option<TeamName>,
 }
 
-/// How a game of a list stands.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Stands {
-    Waits,
+pub(super) enum GameState {
+    Queued,
     Running,
-    /// With the score that counts, and which side won.
     Played {
+        /// With points for fouls.
         score: [u32; 2],
+        /// Index of the winning side; `None` for a draw.
         winner: Option<usize>,
     },
-    /// It has a result that is not told here.
-    Untold,
-    /// It is to be played again.
+    /// Played; the result is hidden.
+    Hidden,
+    /// Voided, to be played again.
     Void,
-    Broken,
+    /// Failed because of a platform fault, to be played again.
+    Failed,
     Cancelled,
 }
 
 impl GameRow {
-    /// Of a round's game, or of one that is played again; `None` of others. Without what it came to, if that `is_hidden`.
-    pub(super) fn of(view: &GameView, is_hidden: bool) -> Option<Self> {
+    /// The row of a game of a round; `None` for other games. `is_hidden`: without the result.
+    pub(super) fn new(view: &GameView, is_hidden: bool) -> Option<Self> {
         let PurposeView::Round {
             round,
             matchday,
@@ -57,75 +57,75 @@ impl GameRow {
             round,
             matchday,
             is_second_half: second_half,
-            stands: stands(&view.status, &teams, is_hidden),
-            told: told(&view.status, is_hidden),
-            taken_out_by: view.taken_out_by.clone(),
+            state: game_state(&view.status, &teams, is_hidden),
+            summary: summary(&view.status, is_hidden),
+            withdrawn_team: view.taken_out_by.clone(),
             team_ids: sides.map(|side| side.team),
             teams,
         })
     }
 
-    /// Which side won, of a game whose result is told.
+    /// The side that won; `None` for draws and without a visible result.
     pub(super) const fn winner(&self) -> Option<usize> {
-        match self.stands {
-            Stands::Played { winner, .. } => winner,
+        match self.state {
+            GameState::Played { winner, .. } => winner,
             _ => None,
         }
     }
 
-    /// As tables have it; a word where there is no score.
+    /// The score, or the state in a word.
     pub(super) fn score(&self) -> String {
-        match self.stands {
-            Stands::Played {
+        match self.state {
+            GameState::Played {
                 score: [home, away],
                 ..
             } => format!("{home} : {away}"),
-            Stands::Waits => "to come".to_owned(),
-            Stands::Running => "live".to_owned(),
-            Stands::Untold => "played".to_owned(),
-            Stands::Void => "void".to_owned(),
-            Stands::Broken => "broken".to_owned(),
-            Stands::Cancelled => "not played".to_owned(),
+            GameState::Queued => "queued".to_owned(),
+            GameState::Running => "live".to_owned(),
+            GameState::Hidden => "played".to_owned(),
+            GameState::Void => "void".to_owned(),
+            GameState::Failed => "failed".to_owned(),
+            GameState::Cancelled => "not played".to_owned(),
         }
     }
 
     pub(super) fn is_running(&self) -> bool {
-        self.stands == Stands::Running
+        self.state == GameState::Running
     }
 }
 
-fn stands(status: &GameStatus, teams: &[TeamName; 2], is_hidden: bool) -> Stands {
+fn game_state(status: &GameStatus, teams: &[TeamName; 2], is_hidden: bool) -> GameState {
     match status {
-        GameStatus::Queued => Stands::Waits,
-        GameStatus::Running { .. } => Stands::Running,
-        GameStatus::Played { .. } if is_hidden => Stands::Untold,
+        GameStatus::Queued => GameState::Queued,
+        GameStatus::Running { .. } => GameState::Running,
+        GameStatus::Played { .. } if is_hidden => GameState::Hidden,
         GameStatus::Played { result, .. } => {
             let is_winner = |team: &TeamName| result.winner.as_ref() == Some(team);
-            Stands::Played {
+            GameState::Played {
                 score: result.score,
                 winner: teams.iter().position(is_winner),
             }
         }
-        GameStatus::Broken { .. } => Stands::Broken,
-        GameStatus::Void { .. } => Stands::Void,
-        GameStatus::Cancelled { .. } => Stands::Cancelled,
+        GameStatus::Broken { .. } => GameState::Failed,
+        GameStatus::Void { .. } => GameState::Void,
+        GameStatus::Cancelled { .. } => GameState::Cancelled,
     }
 }
 
-fn told(status: &GameStatus, is_hidden: bool) -> String {
+fn summary(status: &GameStatus, is_hidden: bool) -> String {
     match status {
-        GameStatus::Queued => "waits for a slot".to_owned(),
-        GameStatus::Running { since, .. } => format!("being played since {}", minute(*since)),
+        GameStatus::Queued => "waiting for a free slot".to_owned(),
+        GameStatus::Running { since, .. } => format!("running since {}", utc_minute(*since)),
         GameStatus::Played { .. } if is_hidden => "result hidden".to_owned(),
         GameStatus::Played { result, .. } => match &result.winner {
             Some(winner) => format!("{winner} wins: {}", result.because),
-            None => format!("a draw: {}", result.because),
+            None => format!("draw: {}", result.because),
         },
-        GameStatus::Broken { .. } => "broken by the server’s fault, to be played again".to_owned(),
-        // Reasons are somebody's own words, and may tell how it went.
+        GameStatus::Broken { .. } => "platform fault, to be played again".to_owned(),
+        // The reason is free text and may reveal the result.
         GameStatus::Void { .. } if is_hidden => "voided, to be played again".to_owned(),
         GameStatus::Void { reason, .. } => format!("voided, to be played again: {reason}"),
-        GameStatus::Cancelled { .. } if is_hidden => "called off".to_owned(),
-        GameStatus::Cancelled { reason, .. } => format!("called off: {reason}"),
+        GameStatus::Cancelled { .. } if is_hidden => "not played".to_owned(),
+        GameStatus::Cancelled { reason, .. } => format!("not played: {reason}"),
     }
 }

@@ -1,11 +1,11 @@
-//! `/tournaments/{id}/teams/{a}/{b}`: two teams side by side, and their games.
+//! `/tournaments/{id}/teams/{a}/{b}`: comparison of two teams of a tournament, with their games.
 
 use super::{
     figures,
     frame::{Frame, PageProblem, render},
     game_row::GameRow,
     spoilers::Spoilers,
-    tournament_words::is_drawn_from_results,
+    tournament_text::is_drawn_from_results,
 };
 use askama::Template;
 use axum::{
@@ -19,44 +19,44 @@ use faceoff_service::{
     extract::PathParams,
     problem::{Problem, ProblemKind},
     viewer::Viewer,
-    views::{game, season::SeasonHead, tournament_sheet::TournamentSheet},
+    views::{game, season::SeasonHead, tournament_state::TournamentState},
 };
 use faceoff_types::{TeamId, TeamName, TournamentId};
 use std::{fmt::Display, str::FromStr};
 
-/// Two teams of a tournament: the parameters `{id}`, `{a}` and `{b}` of the path.
-pub(super) struct TwoTeams {
+/// The path parameters `{id}`, `{a}` and `{b}`.
+pub(super) struct TeamPairPath {
     tournament: TournamentId,
     teams: [TeamId; 2],
 }
 
-impl<S: Send + Sync> FromRequestParts<S> for TwoTeams {
+impl<S: Send + Sync> FromRequestParts<S> for TeamPairPath {
     type Rejection = Problem;
 
     async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self, Problem> {
         let PathParams([id, a, b]) =
             PathParams::<String, 3>::from_request_parts(parts, state).await?;
         Ok(Self {
-            tournament: parsed(&id)?,
-            teams: [parsed(&a)?, parsed(&b)?],
+            tournament: parse_id(&id)?,
+            teams: [parse_id(&a)?, parse_id(&b)?],
         })
     }
 }
 
-/// What cannot be an id is the id of nothing.
-fn parsed<T: FromStr<Err: Display>>(text: &str) -> Result<T, Problem> {
+/// Parses an id; text that is not an id is answered like an unknown one.
+fn parse_id<T: FromStr<Err: Display>>(text: &str) -> Result<T, Problem> {
     text.parse()
         .map_err(|error: T::Err| Problem::new(ProblemKind::NotFound, error.to_string()))
 }
 
-/// A line of the table: what it counts, and each team's number.
-struct Line {
-    what: &'static str,
+/// A row of the table of statistics.
+struct Statistic {
+    name: &'static str,
     teams: [String; 2],
 }
 
-/// A game's numbers, the page's first team first whoever is at home.
-struct Numbers {
+/// Statistics of a game as pairs; the first team of the page comes first, home or away.
+struct GameStatistics {
     game: GameRow,
     goals: String,
     fouls: String,
@@ -73,52 +73,51 @@ struct Page {
     tournament_name: String,
     ids: [TeamId; 2],
     names: [TeamName; 2],
-    /// Games with a result that counts.
+    /// Number of games that count.
     counted: usize,
-    lines: Vec<Line>,
+    statistics: Vec<Statistic>,
     games: Vec<GameRow>,
-    numbers: Vec<Numbers>,
+    game_statistics: Vec<GameStatistics>,
     has_halves: bool,
-    /// Games of rounds that were drawn from results are left out.
-    is_withheld: bool,
+    /// Are rounds omitted whose pairings would reveal hidden results?
+    has_hidden_rounds: bool,
 }
 
-/// Two teams.
 pub(super) async fn page(
     viewer: Result<Viewer, Problem>,
     State(app): State<App>,
     spoilers: Spoilers,
-    two: Result<TwoTeams, Problem>,
+    path: Result<TeamPairPath, Problem>,
 ) -> Result<Response, PageProblem> {
-    let TwoTeams { tournament, teams } = two?;
+    let TeamPairPath { tournament, teams } = path?;
     let viewer = viewer?;
-    let season = SeasonHead::now(&app).await?;
-    let sheet = TournamentSheet::find(&app, tournament).await?;
-    let is_in = |team: &TeamId| sheet.entrants.iter().any(|entrant| entrant.team == *team);
+    let season = SeasonHead::load(&app).await?;
+    let state = TournamentState::find(&app, tournament).await?;
+    let is_in = |team: &TeamId| state.entrants.iter().any(|entrant| entrant.team == *team);
     if teams[0] == teams[1] || !teams.iter().all(is_in) {
-        let detail = "two different teams of the tournament are put side by side, and one of these is not in it";
+        let detail = "expected two different teams of the tournament, got the same team twice or a team that is not in it";
         return Err(Problem::new(ProblemKind::NotFound, detail).into());
     }
-    let names = [sheet.name(teams[0])?, sheet.name(teams[1])?];
-    let views = game::of_rounds(&sheet, viewer, None)?;
-    let rules = &sheet.tournament.rules;
-    let is_theirs = |row: &GameRow| teams.iter().all(|team| row.team_ids.contains(team));
-    let mut is_withheld = false;
+    let names = [state.name(teams[0])?, state.name(teams[1])?];
+    let views = game::round_games(&state, viewer, None)?;
+    let rules = &state.tournament.rules;
+    let has_both_teams = |row: &GameRow| teams.iter().all(|team| row.team_ids.contains(team));
+    let mut has_hidden_rounds = false;
     let mut found = Vec::new();
     for view in &views {
-        let Some(row) = GameRow::of(view, spoilers.hide()) else {
+        let Some(row) = GameRow::new(view, spoilers.hides_results()) else {
             continue;
         };
-        // Whether they met there at all would tell of the rounds before.
-        if is_drawn_from_results(rules, row.round) && !spoilers.tell_round(row.round) {
-            is_withheld = true;
-        } else if is_theirs(&row) {
+        // Even the fact that the teams met would reveal results of earlier rounds.
+        if is_drawn_from_results(rules, row.round) && !spoilers.shows_round(row.round) {
+            has_hidden_rounds = true;
+        } else if has_both_teams(&row) {
             found.push((row, view));
         }
     }
     let played: Vec<(&GameRow, &GameResultView)> = found
         .iter()
-        .filter(|_| !spoilers.hide())
+        .filter(|_| !spoilers.hides_results())
         .filter_map(|(row, view)| match &view.status {
             GameStatus::Played { result, .. } => Some((row, &**result)),
             _ => None,
@@ -126,76 +125,80 @@ pub(super) async fn page(
         .collect();
     let counted: Vec<_> = played
         .iter()
-        .filter(|(row, _)| row.taken_out_by.is_none())
+        .filter(|(row, _)| row.withdrawn_team.is_none())
         .copied()
         .collect();
     render(&Page {
-        frame: Frame::of(&app, season.name, format!("/tournaments/{tournament}")),
+        frame: Frame::for_app(&app, season.name, format!("/tournaments/{tournament}")),
         tournament,
-        tournament_name: sheet.tournament.name.to_string(),
+        tournament_name: state.tournament.name.to_string(),
         ids: teams,
         counted: counted.len(),
-        lines: lines(&counted, &names),
-        numbers: played
+        statistics: statistics(&counted, &names),
+        game_statistics: played
             .iter()
-            .map(|(row, result)| Numbers::of(row, result, teams[0]))
+            .map(|(row, result)| GameStatistics::new(row, result, teams[0]))
             .collect(),
         games: found.iter().map(|(row, _)| row.clone()).collect(),
         has_halves: rules.mirrored,
         names,
-        is_withheld,
+        has_hidden_rounds,
         spoilers,
     })
 }
 
-/// Both teams' numbers over the games that count.
-fn lines(played: &[(&GameRow, &GameResultView)], names: &[TeamName; 2]) -> Vec<Line> {
+/// Statistics of both teams over the games that count.
+fn statistics(
+    played: &[(&GameRow, &GameResultView)],
+    names: &[TeamName; 2],
+) -> Vec<Statistic> {
     if played.is_empty() {
         return Vec::new();
     }
-    let sum = |team: usize, of: &dyn Fn(&GameResultView, usize) -> f64| -> f64 {
+    let sum = |team: usize, value: &dyn Fn(&GameResultView, usize) -> f64| -> f64 {
         played
             .iter()
-            .map(|(row, result)| of(result, side_of(row, &names[team])))
+            .map(|(row, result)| value(result, side_of(row, &names[team])))
             .sum()
     };
-    let both = |of: &dyn Fn(&GameResultView, usize) -> f64| [sum(0, of), sum(1, of)];
+    let both = |value: &dyn Fn(&GameResultView, usize) -> f64| [sum(0, value), sum(1, value)];
     let whole = |sums: [f64; 2]| sums.map(|sum| format!("{sum:.0}"));
     let won = |team: usize| {
-        let those = played.iter();
-        let those = those.filter(|(_, result)| result.winner.as_ref() == Some(&names[team]));
-        those.count().to_string()
+        let won = played
+            .iter()
+            .filter(|(_, result)| result.winner.as_ref() == Some(&names[team]));
+        won.count().to_string()
     };
     let drawn = played.iter().filter(|(_, result)| result.winner.is_none());
     let drawn = drawn.count().to_string();
-    // Each game has as many answers as control steps, but for what was held.
+    // Games are weighted by control steps: a game has about one answer per step.
     let steps: f64 = played
         .iter()
         .map(|(_, result)| f64::from(result.steps))
         .sum();
     let mean = both(&|result, side| result.computation_time_s[side].mean * f64::from(result.steps));
-    let line = |what, teams| Line { what, teams };
+    let statistic = |name, teams| Statistic { name, teams };
     vec![
-        line("Games won", [won(0), won(1)]),
-        line("Games drawn", [drawn.clone(), drawn]),
-        line(
+        statistic("Games won", [won(0), won(1)]),
+        statistic("Games drawn", [drawn.clone(), drawn]),
+        statistic(
             "Goals on the table",
             whole(both(&|result, side| f64::from(result.goals[side]))),
         ),
-        line(
+        statistic(
             "Fouls",
             whole(both(&|result, side| f64::from(result.fouls[side]))),
         ),
-        line(
+        statistic(
             "Penalty points",
-            both(&|result, side| result.penalty_points[side]).map(figures::one),
+            both(&|result, side| result.penalty_points[side]).map(figures::one_decimal),
         ),
-        line(
+        statistic(
             "Faults",
             whole(both(&|result, side| f64::from(result.faults[side]))),
         ),
-        line(
-            "Mean computation time, by control steps",
+        statistic(
+            "Mean computation time",
             mean.map(|sum| format!("{} ms", figures::milliseconds(sum / steps.max(1.0)))),
         ),
     ]
@@ -206,8 +209,8 @@ fn side_of(game: &GameRow, team: &TeamName) -> usize {
     usize::from(game.teams[1] == *team)
 }
 
-impl Numbers {
-    fn of(game: &GameRow, result: &GameResultView, first: TeamId) -> Self {
+impl GameStatistics {
+    fn new(game: &GameRow, result: &GameResultView, first: TeamId) -> Self {
         let side = usize::from(game.team_ids[1] == first);
         let pair = |numbers: [String; 2]| {
             let [own, other] = [&numbers[side], &numbers[1 - side]];
@@ -217,7 +220,7 @@ impl Numbers {
         Self {
             goals: pair(result.goals.map(|goals| goals.to_string())),
             fouls: pair(result.fouls.map(|fouls| fouls.to_string())),
-            penalty_points: pair(result.penalty_points.map(figures::one)),
+            penalty_points: pair(result.penalty_points.map(figures::one_decimal)),
             mean_ms: pair([times[0].mean, times[1].mean].map(figures::milliseconds)),
             game: game.clone(),
         }

@@ -1,4 +1,4 @@
-//! `/help`: what agents find on this server.
+//! `/help`: runtimes, machine and limits of agents on this server.
 
 use super::frame::{Frame, PageProblem, render};
 use askama::Template;
@@ -15,7 +15,7 @@ struct Page {
     contests: Vec<Contest>,
 }
 
-/// A column of the limits' table.
+/// A column of the table of limits: a stage or a tournament.
 struct Contest {
     name: String,
     runtimes: String,
@@ -23,17 +23,17 @@ struct Contest {
 }
 
 impl Page {
-    /// The limits as rows: what, and of each contest how much.
+    /// Rows of the table of limits: name, and a value per contest.
     fn rows(&self) -> Vec<(&'static str, Vec<String>)> {
-        let row = |what, value: fn(&AgentLimits) -> String| {
-            let values = self.contests.iter().map(|one| value(&one.limits));
-            (what, values.collect())
+        let row = |name, value: fn(&AgentLimits) -> String| {
+            let values = self.contests.iter().map(|contest| value(&contest.limits));
+            (name, values.collect())
         };
         vec![
-            row("CPU time per time", |limits| {
-                format!("{} CPU", limits.resources.cpus)
+            row("CPUs", |limits| {
+                limits.resources.cpus.to_string()
             }),
-            row("Memory, with caches and scratch files", |limits| {
+            row("Memory, including caches and scratch files", |limits| {
                 mebibytes(limits.resources.memory_bytes)
             }),
             row("Scratch files in /tmp", |limits| {
@@ -45,7 +45,7 @@ impl Page {
             row("Largest file written", |limits| {
                 mebibytes(limits.resources.file_size_bytes)
             }),
-            row("Open files of a process", |limits| {
+            row("Open files per process", |limits| {
                 limits.resources.open_files.to_string()
             }),
             row("Bundle, packed", |limits| {
@@ -54,15 +54,15 @@ impl Page {
             row("Bundle, unpacked", |limits| {
                 mebibytes(limits.bundle.unpacked_bytes)
             }),
-            row("To start", |limits| format!("{} s", limits.time.startup_s)),
-            row("To answer a reset", |limits| {
+            row("Time to start", |limits| format!("{} s", limits.time.startup_s)),
+            row("Time to answer a reset", |limits| {
                 format!("{} s", limits.time.reset_s)
             }),
-            row("To answer a step, at most", |limits| {
+            row("Time to answer a step, maximum", |limits| {
                 format!("{} s", limits.time.step_s)
             }),
             row(
-                "To answer a step, in the mean of an upload's check",
+                "Time to answer a step, mean in validation",
                 |limits| format!("{} s", limits.time.mean_s),
             ),
         ]
@@ -79,7 +79,7 @@ fn mebibytes(bytes: u64) -> String {
 }
 
 pub(super) async fn page(State(app): State<App>) -> Result<Response, PageProblem> {
-    let view = runtimes::now(&app).await?;
+    let view = runtimes::build(&app).await?;
     let season = app
         .store
         .season()
@@ -87,7 +87,7 @@ pub(super) async fn page(State(app): State<App>) -> Result<Response, PageProblem
         .map_err(faceoff_service::problem::Problem::from)?;
     let stages = view.stages.iter().map(|stage| Contest {
         name: match stage.phase {
-            PhaseView::Upcoming => format!("{} (opens later)", stage.name),
+            PhaseView::Upcoming => format!("{} (not open yet)", stage.name),
             PhaseView::Open | PhaseView::Closed => stage.name.to_string(),
         },
         runtimes: stage.runtimes.join(", "),
@@ -99,7 +99,7 @@ pub(super) async fn page(State(app): State<App>) -> Result<Response, PageProblem
         limits: tournament.limits.clone(),
     });
     render(&Page {
-        frame: Frame::of(&app, season.name, "/help"),
+        frame: Frame::for_app(&app, season.name, "/help"),
         contests: stages.chain(tournaments).collect(),
         view,
     })

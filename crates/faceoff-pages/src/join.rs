@@ -1,8 +1,8 @@
-//! `/join/CODE`: where an invitation is accepted.
+//! `/join/CODE`: accepting an invitation.
 
 use super::{
     frame::{Frame, PageProblem, render},
-    sign_in::signed_in,
+    sign_in::redirect_to_account,
 };
 use askama::Template;
 use axum::{
@@ -10,36 +10,37 @@ use axum::{
     response::{IntoResponse, Response},
 };
 use faceoff_api::{
-    requests::{FoundedTeam, Join},
+    requests::{FoundedTeam, JoinRequest},
     token::hash_token,
     views::announcement::TermsView,
 };
 use faceoff_service::{
-    acts::{joining::join, signing_in::session_end},
+    services::{accounts::join, sessions::session_expiry},
     app::App,
     extract::{PageForm, PathParam},
     problem::{Problem, ProblemKind},
     views::{announcement, season::SeasonHead},
 };
-use faceoff_store::{Code, InvitedAs, RegistrationState, TokenKind};
+use faceoff_store::{CodeStatus, InvitationRole, RegistrationState, TokenKind};
 use faceoff_types::DivisionName;
 use serde::Deserialize;
 
-/// What the code is good for, as the page tells it.
+/// What the code of the link offers.
 enum Offer {
-    /// To become an organiser, a member of the named team, or a founder.
     Organiser,
+    /// Membership of the named team.
     Member(String),
     Founder,
+    /// A new password for an existing user.
     Return,
-    /// The registration of the named team waits.
+    /// The registration of the named team is waiting for approval.
     Waiting(String),
-    /// It was refused, with the reason.
+    /// The registration of the named team was refused, with the reason.
     Refused(String, String),
 }
 
 impl Offer {
-    /// Is there something to accept?
+    /// Can the offer be accepted?
     const fn is_open(&self) -> bool {
         !matches!(self, Self::Waiting(_) | Self::Refused(..))
     }
@@ -53,8 +54,8 @@ struct Page {
     terms: Option<TermsView>,
     divisions: Vec<DivisionName>,
     form: Form,
-    least_chars: usize,
-    refused: Option<String>,
+    min_password_chars: usize,
+    error: Option<String>,
 }
 
 #[derive(Debug, Clone, Default, Deserialize)]
@@ -69,36 +70,36 @@ pub(super) struct Form {
     accepted_terms: String,
 }
 
-/// What was filled in.
-fn filled(text: &str) -> Option<String> {
+/// Trimmed text; `None` if it is empty.
+fn non_empty(text: &str) -> Option<String> {
     let text = text.trim();
     (!text.is_empty()).then(|| text.to_owned())
 }
 
-/// The team of a form, if one is named in it.
-pub(super) fn founded(
+/// The new team of a form, if the form names one.
+pub(super) fn parse_team(
     name: &str,
     affiliation: &str,
     link: &str,
     division: &str,
 ) -> Result<Option<FoundedTeam>, Problem> {
-    let Some(name) = filled(name) else {
+    let Some(name) = non_empty(name) else {
         return Ok(None);
     };
-    let division = filled(division).map(|name| name.parse()).transpose();
+    let division = non_empty(division).map(|name| name.parse()).transpose();
     Ok(Some(FoundedTeam {
         name: name
             .parse()
             .map_err(|error| Problem::invalid("the team's name", error))?,
-        affiliation: filled(affiliation),
-        link: filled(link),
+        affiliation: non_empty(affiliation),
+        link: non_empty(link),
         division: division.map_err(|error| Problem::invalid("division", error))?,
     }))
 }
 
-/// The version of the terms that was accepted by ticking a box.
-pub(super) fn accepted(text: &str) -> Result<Option<u32>, Problem> {
-    filled(text)
+/// The version of the terms that the user accepted.
+pub(super) fn parse_accepted_terms(text: &str) -> Result<Option<u32>, Problem> {
+    non_empty(text)
         .map(|version| version.parse())
         .transpose()
         .map_err(|error| Problem::invalid("accepted_terms", error))
@@ -108,32 +109,32 @@ async fn page_with(
     app: &App,
     code: &str,
     form: Form,
-    refused: Option<String>,
+    error: Option<String>,
 ) -> Result<Response, PageProblem> {
     let now = app.config.clock.now();
-    let found = app.store.code(hash_token(code), now).await;
+    let found = app.store.code_status(hash_token(code), now).await;
     let offer = match found.map_err(Problem::from)? {
-        Code::Open(invitation, team) => match invitation.invited_as {
-            InvitedAs::Organiser => Offer::Organiser,
-            InvitedAs::Member(_) => {
+        CodeStatus::Open(invitation, team) => match invitation.role {
+            InvitationRole::Organiser => Offer::Organiser,
+            InvitationRole::Member(_) => {
                 Offer::Member(team.map(|name| name.to_string()).unwrap_or_default())
             }
-            InvitedAs::Founder => Offer::Founder,
-            InvitedAs::Return(_) => Offer::Return,
+            InvitationRole::Founder => Offer::Founder,
+            InvitationRole::PasswordReset(_) => Offer::Return,
         },
-        Code::Waiting(registration) => Offer::Waiting(registration.team_name.to_string()),
-        Code::Refused(registration) => {
+        CodeStatus::Pending(registration) => Offer::Waiting(registration.team_name.to_string()),
+        CodeStatus::Refused(registration) => {
             let reason = match registration.state {
                 RegistrationState::Refused { reason, .. } => reason,
-                RegistrationState::Waiting | RegistrationState::Approved { .. } => String::new(),
+                RegistrationState::Pending | RegistrationState::Approved { .. } => String::new(),
             };
             Offer::Refused(registration.team_name.to_string(), reason)
         }
     };
     let terms = app.store.terms().await.map_err(Problem::from)?;
-    let season = SeasonHead::now(app).await?.name;
+    let season = SeasonHead::load(app).await?.name;
     render(&Page {
-        frame: Frame::of(app, season, "/join"),
+        frame: Frame::for_app(app, season, "/join"),
         offer,
         terms: terms.into_iter().next().map(announcement::terms),
         divisions: app.store.divisions().await.map_err(Problem::from)?,
@@ -141,8 +142,8 @@ async fn page_with(
             password: String::new(),
             ..form
         },
-        least_chars: faceoff_service::passwords::MIN_CHARS,
-        refused,
+        min_password_chars: faceoff_service::passwords::MIN_CHARS,
+        error,
     })
 }
 
@@ -153,43 +154,43 @@ pub(super) async fn page(
     page_with(&app, &code, Form::default(), None).await
 }
 
-/// Joins and leads to the account, or says on the same page what is missing.
+/// Joins and redirects to the account, or shows an error on the same page.
 pub(super) async fn submit(
     State(app): State<App>,
     PathParam(code): PathParam<String>,
     PageForm(form): PageForm<Form>,
 ) -> Result<Response, PageProblem> {
-    match joined(&app, &code, &form).await {
+    match accept_invitation(&app, &code, &form).await {
         Ok(response) => Ok(response),
-        // What the page itself tells of a code, or is nobody's mistake, is no remark beside the form.
-        Err(PageProblem(problem)) if problem.kind() == ProblemKind::InvitationSpent => {
+        // An invalid invitation has its own page; server errors are not shown beside the form.
+        Err(PageProblem(problem)) if problem.kind() == ProblemKind::InvitationInvalid => {
             Err(problem.into())
         }
         Err(PageProblem(problem)) if problem.kind().status().is_client_error() => {
             let status = problem.kind().status();
-            let refused = Some(problem.detail().to_owned());
-            let page = page_with(&app, &code, form, refused).await?;
+            let error = Some(problem.detail().to_owned());
+            let page = page_with(&app, &code, form, error).await?;
             Ok((status, page).into_response())
         }
         Err(problem) => Err(problem),
     }
 }
 
-async fn joined(app: &App, code: &str, form: &Form) -> Result<Response, PageProblem> {
-    let name = filled(&form.name).map(|name| name.parse()).transpose();
-    let request = Join {
+async fn accept_invitation(app: &App, code: &str, form: &Form) -> Result<Response, PageProblem> {
+    let name = non_empty(&form.name).map(|name| name.parse()).transpose();
+    let request = JoinRequest {
         code: code.to_owned(),
         name: name.map_err(|error| Problem::invalid("name", error))?,
         password: (!form.password.is_empty()).then(|| form.password.clone()),
-        team: founded(
+        team: parse_team(
             &form.team_name,
             &form.affiliation,
             &form.link,
             &form.division,
         )?,
-        accepted_terms: accepted(&form.accepted_terms)?,
+        accepted_terms: parse_accepted_terms(&form.accepted_terms)?,
     };
-    let until = session_end(app.config.clock.now());
+    let until = session_expiry(app.config.clock.now());
     let (_, secret) = join(app, request, TokenKind::Session, Some(until)).await?;
-    signed_in(app, secret.as_str())
+    redirect_to_account(app, secret.as_str())
 }

@@ -1,6 +1,6 @@
-//! The pages: server-rendered, complete without JavaScript. One file per page; the templates are in
-//! `web/templates`, the styles in `web/static`, all compiled into the binary. What they show is in
-//! [`faceoff_api::views`], how that is made in [`faceoff_service::views`].
+//! The pages: server-rendered, complete without JavaScript. One file per page; templates are in `web/templates`, styles in
+//! `web/static`, all compiled into the binary. Views are defined in [`faceoff_api::views`] and built in
+//! [`faceoff_service::views`].
 
 mod ablation;
 mod account;
@@ -8,15 +8,15 @@ mod announcements;
 mod assets;
 mod baselines;
 mod board;
-mod broken_places;
+mod violation_map;
 mod chart;
 mod comparison;
-mod desk;
-mod desk_frame;
+mod dashboard;
+mod dashboard_frame;
 mod docs;
 mod embeddable;
-mod entry;
-mod episode_words;
+mod submission_row;
+mod episode_text;
 mod episodes;
 mod evaluation;
 mod feed;
@@ -29,7 +29,7 @@ mod head_to_head;
 mod help;
 mod join;
 mod organiser;
-mod packed;
+mod compressed_text;
 mod problems;
 mod query;
 mod register;
@@ -39,20 +39,20 @@ mod robots;
 mod season;
 mod side_by_side;
 mod sign_in;
-mod signed_in;
+mod page_auth;
 mod spoilers;
-mod standing;
+mod board_status;
 mod table_drawing;
-mod tables;
+mod csv_downloads;
 mod team;
 mod tournament;
-mod tournament_words;
+mod tournament_text;
 mod tournaments;
-mod unknown;
+mod not_found;
 
 pub use embeddable::Embeddable;
 pub use spoilers::SPOILERS_PATH;
-pub use unknown::{for_whom, unknown_method, unknown_path};
+pub use not_found::{problem_response, method_not_allowed, path_not_found};
 
 use axum::{
     Router,
@@ -77,12 +77,12 @@ pub fn router(patience: Duration, api: Arc<Value>) -> Router<App> {
             get(comparison::pair::page),
         )
         .route("/evaluations/{id}/episodes", get(episodes::page))
-        .route("/evaluations/{id}/episodes.csv", get(tables::episodes))
+        .route("/evaluations/{id}/episodes.csv", get(csv_downloads::episodes))
         .route(
             "/evaluations/{id}/answer-times.csv",
-            get(tables::answer_times),
+            get(csv_downloads::answer_times),
         )
-        .route("/submissions/{id}/ablation.csv", get(tables::ablation))
+        .route("/submissions/{id}/ablation.csv", get(csv_downloads::ablation))
         .route(
             "/evaluations/{id}/episodes/{task}/{episode}",
             get(replay::page),
@@ -110,7 +110,7 @@ pub fn router(patience: Duration, api: Arc<Value>) -> Router<App> {
         .route("/account", get(account::page))
         .route("/join/{code}", get(join::page).post(join::submit))
         .route("/register", get(register::page).post(register::submit))
-        .merge(desk::router())
+        .merge(dashboard::router())
         .merge(organiser::router())
         .route(feed::FEED_PATH, get(feed::feed))
         .route("/robots.txt", get(robots::robots))
@@ -118,6 +118,6 @@ pub fn router(patience: Duration, api: Arc<Value>) -> Router<App> {
         .merge(assets::router())
         .layer(middleware::from_fn_with_state(patience, timeouts::time_out))
         .layer(DefaultBodyLimit::max(MAX_JSON_BYTES))
-        // It may take long as long as it moves, and is watched by what receives it.
-        .merge(desk::uploads())
+        // Uploads have no fixed timeout: the receiver checks their least data rate.
+        .merge(dashboard::uploads())
 }

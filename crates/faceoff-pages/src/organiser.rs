@@ -1,11 +1,11 @@
-//! `/organiser`: what an organiser looks after, and decides.
+//! `/organiser`: the organiser dashboard.
 
 mod attention;
 mod day;
-mod decide;
+mod decision_page;
 mod log;
 mod messages;
-mod order;
+mod decision;
 mod stage;
 mod stage_form;
 mod stages;
@@ -13,14 +13,14 @@ mod storage;
 mod teams;
 mod workers;
 
-use super::desk::access;
+use super::dashboard::access;
 use axum::{
     Router,
     routing::{get, post},
 };
 use faceoff_service::app::App;
 
-/// All pages of the desk.
+/// All pages of the dashboard.
 pub(super) fn router() -> Router<App> {
     Router::new()
         .route("/organiser", get(attention::page))
@@ -42,10 +42,10 @@ pub(super) fn router() -> Router<App> {
         .route("/organiser/storage", get(storage::page))
         .route("/organiser/workers", get(workers::page))
         .route("/organiser/log", get(log::page))
-        .route("/log", get(log::moved))
+        .route("/log", get(log::redirect_old_path))
         .route(
-            "/organiser/decide/{*order}",
-            get(decide::page).post(decide::submit),
+            "/organiser/decide/{*decision}",
+            get(decision_page::page).post(decision_page::submit),
         )
         .merge(access::router("/organiser"))
 }

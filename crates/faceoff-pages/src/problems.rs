@@ -1,4 +1,4 @@
-//! `/problems`: what each kind of error means; the `type` of every problem points here.
+//! `/problems`: the kinds of errors. The `type` of every problem links to this page.
 
 use super::frame::{Frame, PageProblem, render};
 use askama::Template;

@@ -1,12 +1,12 @@
-//! Addresses with a query, as the pages' links have them.
+//! Addresses with a query string, for links of the pages.
 
 use serde::Serialize;
 
-/// A path with what asks for something below it; without anything to ask, the path alone.
-pub(crate) fn asking(path: &str, query: &impl Serialize) -> String {
+/// The path with `query` as its query string; the path alone if the query is empty.
+pub(crate) fn with_query(path: &str, query: &impl Serialize) -> String {
     match serde_urlencoded::to_string(query) {
         Ok(query) if !query.is_empty() => format!("{path}?{query}"),
-        // All that pages ask are texts and numbers by name, which can be written.
+        // Queries of pages are flat lists of texts and numbers: writing them cannot fail.
         Ok(_) | Err(_) => path.to_owned(),
     }
 }
@@ -16,12 +16,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_has_a_meaning_in_a_query_is_written_as_text() {
-        let asked = [("next", Some("/desk?a=b&c d")), ("left", None)];
+    fn special_characters_in_a_query_are_escaped() {
+        let query = [("next", Some("/desk?a=b&c d")), ("left", None)];
         assert_eq!(
-            asking("/sign-in", &asked),
+            with_query("/sign-in", &query),
             "/sign-in?next=%2Fdesk%3Fa%3Db%26c+d"
         );
-        assert_eq!(asking("/", &[("left", None::<&str>)]), "/");
+        assert_eq!(with_query("/", &[("left", None::<&str>)]), "/");
     }
 }

@@ -1,8 +1,8 @@
-//! `/register`: where a team says that it wants to take part.
+//! `/register`: registration of a team.
 
 use super::{
     frame::{Frame, PageProblem, render},
-    join::{accepted, founded},
+    join::{parse_accepted_terms, parse_team},
 };
 use askama::Template;
 use axum::{
@@ -11,11 +11,11 @@ use axum::{
     response::{IntoResponse, Response},
 };
 use faceoff_api::{
-    requests::Register,
+    requests::RegistrationRequest,
     views::{announcement::TermsView, invitation::NewRegistrationView},
 };
 use faceoff_service::{
-    acts::registering::registered,
+    services::registrations,
     app::App,
     extract::PageForm,
     problem::Problem,
@@ -32,7 +32,7 @@ struct Page {
     terms: Option<TermsView>,
     divisions: Vec<DivisionName>,
     form: Form,
-    refused: Option<String>,
+    error: Option<String>,
     done: Option<NewRegistrationView>,
 }
 
@@ -50,19 +50,19 @@ pub(super) struct Form {
 async fn page_with(
     app: &App,
     form: Form,
-    refused: Option<String>,
+    error: Option<String>,
     done: Option<NewRegistrationView>,
 ) -> Result<Response, PageProblem> {
     let season = app.store.season().await.map_err(Problem::from)?;
     let terms = app.store.terms().await.map_err(Problem::from)?;
-    let name = SeasonHead::now(app).await?.name;
+    let name = SeasonHead::load(app).await?.name;
     render(&Page {
-        frame: Frame::of(app, name, "/register"),
-        is_open: season.takes_registrations && season.closed_at.is_none(),
+        frame: Frame::for_app(app, name, "/register"),
+        is_open: season.registration_open && season.closed_at.is_none(),
         terms: terms.into_iter().next().map(announcement::terms),
         divisions: app.store.divisions().await.map_err(Problem::from)?,
         form,
-        refused,
+        error,
         done,
     })
 }
@@ -71,35 +71,35 @@ pub(super) async fn page(State(app): State<App>) -> Result<Response, PageProblem
     page_with(&app, Form::default(), None, None).await
 }
 
-async fn register(app: &App, form: &Form) -> Result<NewRegistrationView, Problem> {
-    let team = founded(
+async fn register_team(app: &App, form: &Form) -> Result<NewRegistrationView, Problem> {
+    let team = parse_team(
         &form.team_name,
         &form.affiliation,
         &form.link,
         &form.division,
     )?;
-    let request = Register {
-        team: team.ok_or_else(|| Problem::invalid("the team's name", "expected one, got none"))?,
+    let request = RegistrationRequest {
+        team: team.ok_or_else(|| Problem::invalid("the team's name", "expected a name, got none"))?,
         contact: form.contact.clone(),
-        accepted_terms: accepted(&form.accepted_terms)?,
+        accepted_terms: parse_accepted_terms(&form.accepted_terms)?,
     };
-    registered(app, request).await
+    registrations::register(app, request).await
 }
 
-/// Registers the team and shows its link, or says on the same page what is missing.
+/// Registers the team and shows its link, or shows an error on the same page.
 pub(super) async fn submit(
     State(app): State<App>,
     PageForm(form): PageForm<Form>,
 ) -> Result<Response, PageProblem> {
-    match register(&app, &form).await {
+    match register_team(&app, &form).await {
         Ok(done) => {
             let page = page_with(&app, Form::default(), None, Some(done)).await?;
             Ok((StatusCode::CREATED, page).into_response())
         }
         Err(problem) if problem.kind().status().is_client_error() => {
             let status = problem.kind().status();
-            let refused = Some(problem.detail().to_owned());
-            let page = page_with(&app, form, refused, None).await?;
+            let error = Some(problem.detail().to_owned());
+            let page = page_with(&app, form, error, None).await?;
             Ok((status, page).into_response())
         }
         Err(problem) => Err(problem.into()),

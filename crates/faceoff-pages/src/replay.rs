@@ -1,8 +1,8 @@
-//! `/evaluations/{id}/episodes/{task}/{episode}`: an episode, drawn; and the same without anything around it, for other sites.
+//! `/evaluations/{id}/episodes/{task}/{episode}`: the replay of an episode; and the replay alone, to embed in other sites.
 
 use super::{
     assets,
-    episode_words::in_words,
+    episode_text::describe_violation,
     frame::{Frame, PageProblem, render},
     replay_section::ReplaySection,
 };
@@ -16,13 +16,13 @@ use faceoff_service::{
     episode_path::EpisodePath,
     problem::Problem,
     viewer::Viewer,
-    views::{clips::Clips, season::SeasonHead, sight::Sight},
+    views::{clips::Clips, season::SeasonHead, visibility::Visibility},
 };
 use faceoff_types::{EvaluationId, Task};
 use jiff::civil::Date;
 
-/// What both pages need.
-struct Shown {
+/// Content of both pages.
+struct EpisodeReplay {
     id: EvaluationId,
     task: Task,
     episode: u32,
@@ -30,28 +30,28 @@ struct Shown {
     day: Date,
     success: bool,
     why: String,
-    broken: Vec<String>,
-    late: u32,
+    violations: Vec<String>,
+    late_answers: u32,
     duration_s: String,
     replay: ReplaySection,
     script: &'static str,
     styles: [&'static str; 2],
-    before: Option<String>,
-    after: Option<String>,
+    previous: Option<String>,
+    next: Option<String>,
 }
 
 #[derive(Template)]
 #[template(path = "replay.html")]
 struct Page {
     frame: Frame,
-    shown: Shown,
+    view: EpisodeReplay,
 }
 
 #[derive(Template)]
 #[template(path = "replay_embedded.html")]
-struct Embedded {
+struct EmbeddedPage {
     frame: Frame,
-    shown: Shown,
+    view: EpisodeReplay,
 }
 
 pub(super) async fn page(
@@ -59,44 +59,44 @@ pub(super) async fn page(
     State(app): State<App>,
     path: Result<EpisodePath, Problem>,
 ) -> Result<Response, PageProblem> {
-    let shown = Shown::of(&app, viewer?, path?).await?;
-    let season = SeasonHead::now(&app).await?;
+    let view = EpisodeReplay::load(&app, viewer?, path?).await?;
+    let season = SeasonHead::load(&app).await?;
     render(&Page {
-        frame: Frame::of(&app, season.name, ""),
-        shown,
+        frame: Frame::for_app(&app, season.name, ""),
+        view,
     })
 }
 
-/// The replay alone, as anybody sees it, whoever is signed in: pages of other sites may hold it.
+/// The replay alone, for other sites: always the public view, whether or not the visitor is signed in.
 pub(super) async fn embedded(
     State(app): State<App>,
     path: Result<EpisodePath, Problem>,
 ) -> Result<Response, PageProblem> {
-    let shown = Shown::of(&app, Viewer::Anybody, path?).await?;
-    let mut answer = render(&Embedded {
+    let view = EpisodeReplay::load(&app, Viewer::Visitor, path?).await?;
+    let mut response = render(&EmbeddedPage {
         frame: Frame::new(String::new(), ""),
-        shown: Shown {
+        view: EpisodeReplay {
             replay: ReplaySection {
                 observed: None,
                 is_embedded: true,
-                ..shown.replay
+                ..view.replay
             },
-            ..shown
+            ..view
         },
     })?;
-    answer.extensions_mut().insert(Embeddable);
-    Ok(answer)
+    response.extensions_mut().insert(Embeddable);
+    Ok(response)
 }
 
-impl Shown {
-    async fn of(app: &App, viewer: Viewer, path: EpisodePath) -> Result<Self, Problem> {
+impl EpisodeReplay {
+    async fn load(app: &App, viewer: Viewer, path: EpisodePath) -> Result<Self, Problem> {
         let EpisodePath { id, task, episode } = path;
-        let sight = Sight::of(app, viewer).await?;
-        let clips = Clips::of(app, &sight, id).await?;
-        let shown = clips.episode(task, episode).await?;
-        let line = &shown.line;
+        let visibility = Visibility::load(app, viewer).await?;
+        let clips = Clips::find(app, &visibility, id).await?;
+        let clip = clips.episode(task, episode).await?;
+        let line = &clip.line;
         let team = app.store.team(clips.evaluation.team).await?;
-        let day = clips.evaluation.of.date;
+        let day = clips.evaluation.stage_day.date;
         let api = format!("{}/episodes/{task}/{episode}", paths::evaluation(id));
         Ok(Self {
             id,
@@ -106,19 +106,19 @@ impl Shown {
             day,
             success: line.success,
             why: line.why.clone(),
-            broken: line.broken.iter().map(in_words).collect(),
-            late: line.late,
+            violations: line.broken.iter().map(describe_violation).collect(),
+            late_answers: line.late,
             duration_s: format!("{:.2}", f64::from(line.steps) * CONTROL_STEP_S),
-            replay: ReplaySection::of(
-                &shown,
+            replay: ReplaySection::new(
+                &clip,
                 &api,
                 format!("{task}, episode {episode}, {}", team.name),
                 format!("{}, {task} {episode}, {day}", team.name),
             ),
             script: assets::REPLAY_SCRIPT.url(),
             styles: [assets::EPISODES_STYLE.url(), assets::REPLAY_STYLE.url()],
-            before: shown.has_before.then(|| page_path(id, task, episode - 1)),
-            after: shown.has_after.then(|| page_path(id, task, episode + 1)),
+            previous: clip.has_before.then(|| page_path(id, task, episode - 1)),
+            next: clip.has_after.then(|| page_path(id, task, episode + 1)),
         })
     }
 }

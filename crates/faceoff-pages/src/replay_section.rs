@@ -1,58 +1,59 @@
-//! A replay on a page: its picture that does not move, and where the script finds what it draws.
+//! A replay on a page: a still picture, and the addresses of the clips for the script.
 
-use super::table_drawing::{self, Dot, Ground};
+use super::table_drawing::{self, Dot, TableOutline};
 use faceoff_replay::{
     Clip,
     model::{PUCK, TOOL},
 };
 use faceoff_service::views::clip_file::Episode;
 
-/// A replay of an episode, as `replay_section.html` has it.
+/// A replay of an episode in `replay_section.html`.
 pub(super) struct ReplaySection {
-    /// The element's: a page may hold several.
+    /// Id of the HTML element; a page may have several replays.
     pub(super) id: &'static str,
-    /// Of what, for whoever does not see it.
+    /// Accessible name.
     pub(super) name: String,
-    /// How pictures and files that are saved are called.
+    /// Base name of saved pictures and files.
     pub(super) title: String,
     pub(super) why: String,
     pub(super) steps: u32,
     pub(super) still: Still,
-    /// Addresses of the clips.
+    /// Address of the clip of the motion.
     pub(super) motion: String,
+    /// Address of the clip of observations and commands, if the viewer may see it.
     pub(super) observed: Option<String>,
-    /// On somebody else's page?
+    /// Is the replay embedded in another site?
     pub(super) is_embedded: bool,
-    /// Replays of a page that have this name run in step.
-    pub(super) together: Option<&'static str>,
+    /// Replays of a page in the same group are synchronised.
+    pub(super) sync_group: Option<&'static str>,
 }
 
 impl ReplaySection {
-    /// Of an episode whose clips are below the address `api`.
-    pub(super) fn of(episode: &Episode, api: &str, name: String, title: String) -> Self {
+    /// `api`: address of the clips of the episode.
+    pub(super) fn new(episode: &Episode, api: &str, name: String, title: String) -> Self {
         Self {
             id: "replay",
             name,
             title,
             why: episode.line.why.clone(),
             steps: episode.line.steps,
-            still: Still::of(&episode.motion, episode.observed.as_ref()),
+            still: Still::new(&episode.motion, episode.observed.as_ref()),
             motion: format!("{api}/motion"),
             observed: episode.observed.as_ref().map(|_| format!("{api}/observed")),
             is_embedded: false,
-            together: None,
+            sync_group: None,
         }
     }
 }
 
-/// The episode as a picture that does not move.
+/// The episode as a still picture.
 pub(super) struct Still {
-    pub(super) ground: Ground,
-    pub(super) puck_way: String,
-    pub(super) mallet_way: String,
-    pub(super) opponent_way: String,
-    /// Where the agent was told that the puck is.
-    pub(super) seen: String,
+    pub(super) table: TableOutline,
+    pub(super) puck_path: String,
+    pub(super) mallet_path: String,
+    pub(super) opponent_path: String,
+    /// Observed positions of the puck.
+    pub(super) observed: String,
     pub(super) contacts: String,
     pub(super) start: Dot,
     pub(super) puck: Dot,
@@ -62,22 +63,22 @@ pub(super) struct Still {
 }
 
 impl Still {
-    fn of(motion: &Clip, observed: Option<&Clip>) -> Self {
-        let [puck, mallet] = [motion.puck_places(), motion.mallet_places(0)];
+    fn new(motion: &Clip, observed: Option<&Clip>) -> Self {
+        let [puck, mallet] = [motion.puck_positions(), motion.mallet_positions(0)];
         let contacts = motion.header.contacts.iter();
         let contacts: Vec<[f64; 2]> = contacts.map(|contact| [contact.x, contact.y]).collect();
         let millimetres = |m: f64| (m * 1e4).round() / 10.0;
         let dot = |place: Option<&[f64; 2]>| Dot::at(place.copied().unwrap_or_default());
         Self {
-            ground: Ground::new(),
+            table: TableOutline::new(),
             start: dot(puck.first()),
             puck: dot(puck.last()),
             mallet: dot(mallet.last()),
-            puck_way: table_drawing::way(&puck),
-            mallet_way: table_drawing::way(&mallet),
-            opponent_way: table_drawing::way(&motion.mallet_places(1)),
-            seen: observed
-                .map_or_else(String::new, |clip| table_drawing::dots(&clip.seen_places())),
+            puck_path: table_drawing::path(&puck),
+            mallet_path: table_drawing::path(&mallet),
+            opponent_path: table_drawing::path(&motion.mallet_positions(1)),
+            observed: observed
+                .map_or_else(String::new, |clip| table_drawing::dots(&clip.observed_puck_positions())),
             contacts: table_drawing::squares(&contacts),
             puck_radius: millimetres(PUCK.radius_m),
             mallet_radius: millimetres(TOOL.cylinder_radius_m),

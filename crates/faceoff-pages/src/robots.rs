@@ -1,9 +1,9 @@
-//! `/robots.txt`: what those who walk the web may read.
+//! `/robots.txt`: rules for crawlers.
 
 use axum::response::IntoResponse;
 
-/// Pages and documentation; not what belongs to one person, and no lists without an end. It hides nothing: what is not for
-/// everybody asks who is there.
+/// Allows public pages and the documentation; excludes personal pages and endless lists. It protects nothing: private pages
+/// need a session.
 const ROBOTS: &str = "User-agent: *
 Disallow: /api/
 Disallow: /account

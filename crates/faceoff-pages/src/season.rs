@@ -1,5 +1,5 @@
-//! `/season`: for sceptics. The commitment, the secret once it is public, and how every draw follows
-//! from it.
+//! `/season`: stages, evaluation days and seeds. It has everything to verify the seeds: the commitment, the secret once it is
+//! public, and the derivation.
 
 use super::frame::{Frame, PageProblem, render};
 use askama::Template;
@@ -24,17 +24,17 @@ struct Page {
 }
 
 impl Page {
-    fn there(&self, stage: &StageView, at: &Timestamp) -> String {
-        let there = at.to_zoned(stage.zone.time_zone());
-        format!("{} {}", there.strftime("%Y-%m-%d %H:%M:%S"), stage.zone)
+    fn local_time(&self, stage: &StageView, at: &Timestamp) -> String {
+        let local = at.to_zoned(stage.zone.time_zone());
+        format!("{} {}", local.strftime("%Y-%m-%d %H:%M:%S"), stage.zone)
     }
 
-    fn name(&self, id: &StageId) -> String {
+    fn stage_name(&self, id: &StageId) -> String {
         let stage = self.season.stages.iter().find(|stage| stage.id == *id);
         stage.map_or_else(|| id.to_string(), |stage| stage.name.to_string())
     }
 
-    /// What is to be played, with the name of its stage; for organisers alone.
+    /// Load of coming days with the name of the stage; organisers only.
     fn loads(&self) -> Vec<(&str, &DayLoad)> {
         let stages = self.season.stages.iter();
         stages
@@ -45,13 +45,13 @@ impl Page {
             .collect()
     }
 
-    /// The stage whose id enters no seed, if there is one.
-    fn unnamed(&self) -> Option<&str> {
+    /// A stage of an older version, whose id is not part of its seeds.
+    fn stage_without_seed(&self) -> Option<&str> {
         let stage = self.season.stages.iter().find(|stage| !stage.names_seeds);
         stage.map(|stage| stage.name.as_str())
     }
 
-    /// The hexadecimal digits of a stage's id.
+    /// Id of a stage as hexadecimal digits, for the example.
     fn example_stage(&self) -> String {
         let stage = self.season.stages.iter().find(|stage| stage.names_seeds);
         stage.map_or_else(
@@ -65,15 +65,15 @@ pub(super) async fn page(
     viewer: Result<Viewer, Problem>,
     State(app): State<App>,
 ) -> Result<Response, PageProblem> {
-    let season = season::now(&app, viewer?).await?;
+    let season = season::build(&app, viewer?).await?;
     let instant = |at: Timestamp| at.strftime("%Y-%m-%d %H:%M:%S UTC").to_string();
     let tournaments = app.store.tournaments().await.map_err(Problem::from)?;
     render(&Page {
         tournaments: tournaments
             .into_iter()
-            .map(|one| (one.id, one.name))
+            .map(|tournament| (tournament.id, tournament.name))
             .collect(),
-        frame: Frame::of(&app, season.name.clone(), "/season"),
+        frame: Frame::for_app(&app, season.name.clone(), "/season"),
         opened: instant(season.created_at),
         closed: season.closed_at.map(instant),
         season,

@@ -1,8 +1,8 @@
-//! `/sign-in` and `/sign-out`: a session by name and password.
+//! `/sign-in` and `/sign-out`: starting and ending a browser session.
 
 use super::{
     frame::{Frame, PageProblem, render},
-    signed_in::own_place,
+    page_auth::return_path,
 };
 use askama::Template;
 use axum::{
@@ -11,12 +11,12 @@ use axum::{
     response::{AppendHeaders, IntoResponse, Redirect, Response},
 };
 use faceoff_service::{
-    acts::signing_in::sign_in, app::App, auth::Caller, extract::PageForm, problem::ProblemKind,
+    services::sessions::sign_in, app::App, auth::Caller, extract::PageForm, problem::ProblemKind,
     session, views::season::SeasonHead,
 };
 use serde::Deserialize;
 
-/// Where one is led who wanted to be nowhere else.
+/// Default target after signing in.
 const ACCOUNT: &str = "/account";
 
 #[derive(Template)]
@@ -24,8 +24,8 @@ const ACCOUNT: &str = "/account";
 struct Page {
     frame: Frame,
     name: String,
-    refused: Option<String>,
-    /// Where one wanted to be; empty: nowhere.
+    error: Option<String>,
+    /// Path to return to; empty: the account.
     next: String,
 }
 
@@ -37,48 +37,47 @@ pub(super) struct Form {
     next: String,
 }
 
-/// Where one is led afterwards.
 #[derive(Default, Deserialize)]
 #[serde(default)]
-pub(super) struct Wanted {
+pub(super) struct NextQuery {
     next: String,
 }
 
-fn own(next: &str) -> String {
-    own_place(next).unwrap_or_default().to_owned()
+fn valid_next(next: &str) -> String {
+    return_path(next).unwrap_or_default().to_owned()
 }
 
 async fn page_with(
     app: &App,
     name: String,
-    refused: Option<String>,
+    error: Option<String>,
     next: String,
 ) -> Result<Response, PageProblem> {
-    let season = SeasonHead::now(app).await?.name;
+    let season = SeasonHead::load(app).await?.name;
     render(&Page {
-        frame: Frame::of(app, season, "/sign-in"),
+        frame: Frame::for_app(app, season, "/sign-in"),
         name,
-        refused,
+        error,
         next,
     })
 }
 
 pub(super) async fn page(
     State(app): State<App>,
-    Query(Wanted { next }): Query<Wanted>,
+    Query(NextQuery { next }): Query<NextQuery>,
 ) -> Result<Response, PageProblem> {
-    page_with(&app, String::new(), None, own(&next)).await
+    page_with(&app, String::new(), None, valid_next(&next)).await
 }
 
-/// Signs in and leads to where one wanted to be, or to the account, or says on the same page why not.
+/// Signs in and redirects to the requested page or the account; shows an error on the same page.
 pub(super) async fn submit(
     State(app): State<App>,
     PageForm(form): PageForm<Form>,
 ) -> Result<Response, PageProblem> {
     match sign_in(&app, &form.name, form.password).await {
         Ok((_, secret)) => {
-            let next = own_place(&form.next).unwrap_or(ACCOUNT);
-            led_to(&app, secret.as_str(), next)
+            let next = return_path(&form.next).unwrap_or(ACCOUNT);
+            redirect_with_session(&app, secret.as_str(), next)
         }
         Err(problem)
             if matches!(
@@ -87,27 +86,27 @@ pub(super) async fn submit(
             ) =>
         {
             let status = problem.kind().status();
-            let refused = Some(problem.detail().to_owned());
-            let next = own(&form.next);
-            let page = page_with(&app, form.name, refused, next).await?;
+            let error = Some(problem.detail().to_owned());
+            let next = valid_next(&form.next);
+            let page = page_with(&app, form.name, error, next).await?;
             Ok((status, page).into_response())
         }
         Err(problem) => Err(problem.into()),
     }
 }
 
-/// To the account, with the cookie of a session that has begun.
-pub(super) fn signed_in(app: &App, secret: &str) -> Result<Response, PageProblem> {
-    led_to(app, secret, ACCOUNT)
+/// Redirects to the account with the cookie of a new session.
+pub(super) fn redirect_to_account(app: &App, secret: &str) -> Result<Response, PageProblem> {
+    redirect_with_session(app, secret, ACCOUNT)
 }
 
-fn led_to(app: &App, secret: &str, path: &str) -> Result<Response, PageProblem> {
+fn redirect_with_session(app: &App, secret: &str, path: &str) -> Result<Response, PageProblem> {
     let cookie = session::set_cookie(&app.config, Some(secret))?;
     let cookie = AppendHeaders([(header::SET_COOKIE, cookie)]);
     Ok((cookie, Redirect::to(path)).into_response())
 }
 
-/// Ends the session and leads to the board.
+/// Ends the session and redirects to the board.
 pub(super) async fn sign_out(
     caller: Caller,
     State(app): State<App>,

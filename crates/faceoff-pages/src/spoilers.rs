@@ -1,9 +1,9 @@
-//! Who does not want to know yet how games ended: a choice that pages about games remember in a cookie, for whoever looks,
-//! signed in or not. `/spoilers` takes it.
+//! Hiding results of games: visitors choose it with a form that posts to `/spoilers`, and a cookie stores the choice. It works
+//! without an account.
 
 use super::{
     frame::PageProblem,
-    signed_in::{SPOILED, own_place_of},
+    page_auth::{SPOILER_RETURN_PATHS, return_path_below},
 };
 use axum::{
     extract::{FromRequestParts, Query, State},
@@ -15,47 +15,47 @@ use faceoff_types::RoundNumber;
 use serde::Deserialize;
 use std::convert::Infallible;
 
-/// Where the choice is sent.
+/// Path of the form.
 pub const SPOILERS_PATH: &str = "/spoilers";
-const NAME: &str = "spoilers";
+const COOKIE: &str = "spoilers";
 const HIDDEN: &str = "hidden";
-const AGE_S: u32 = 365 * 24 * 3600;
-/// What asks for a game's result all the same.
-const RESULT: &str = "result";
-/// What asks who meets whom in a round that follows from results, with the round's number behind it.
-const ROUND: &str = "round-";
+const MAX_AGE_S: u32 = 365 * 24 * 3600;
+/// Query value that shows the result of a game all the same.
+const SHOW_RESULT: &str = "result";
+/// Query prefix that shows the pairings up to a round; the number of the round follows.
+const SHOW_ROUND: &str = "round-";
 
-/// What a page about games shows of their results.
+/// Which results a page shows.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Spoilers {
-    /// Has the visitor chosen not to see any?
+    /// Has the visitor chosen to hide results?
     pub(super) are_hidden: bool,
-    /// What is asked for all the same.
+    /// The query parameter `show`.
     show: Option<String>,
-    /// The page without its query, which the choice leads back to.
+    /// Path of the page, to return to after the choice.
     pub(super) path: String,
 }
 
 impl Spoilers {
-    /// Is nothing told of how games ended?
-    pub(super) fn hide(&self) -> bool {
-        self.are_hidden && self.show.as_deref() != Some(RESULT)
+    /// Are results hidden on this page?
+    pub(super) fn hides_results(&self) -> bool {
+        self.are_hidden && self.show.as_deref() != Some(SHOW_RESULT)
     }
 
-    /// May be told who plays in a round that was drawn from results?
-    pub(super) fn tell_round(&self, round: RoundNumber) -> bool {
+    /// Are the pairings of a round visible that depend on results?
+    pub(super) fn shows_round(&self, round: RoundNumber) -> bool {
         let shown = self
             .show
             .as_deref()
-            .and_then(|show| show.strip_prefix(ROUND));
+            .and_then(|show| show.strip_prefix(SHOW_ROUND));
         let shown: Option<u32> = shown.and_then(|number| number.parse().ok());
-        !self.hide() || shown.is_some_and(|shown| round.get() <= shown)
+        !self.hides_results() || shown.is_some_and(|shown| round.get() <= shown)
     }
 }
 
 #[derive(Default, Deserialize)]
 #[serde(default)]
-struct Asked {
+struct ShowQuery {
     show: Option<String>,
 }
 
@@ -63,17 +63,16 @@ impl FromRequestParts<App> for Spoilers {
     type Rejection = Infallible;
 
     async fn from_request_parts(parts: &mut Parts, app: &App) -> Result<Self, Infallible> {
-        let asked = Query::<Asked>::from_request_parts(parts, app).await;
-        let Query(asked) = asked.unwrap_or_default();
+        let query = Query::<ShowQuery>::from_request_parts(parts, app).await;
+        let Query(query) = query.unwrap_or_default();
         Ok(Self {
-            are_hidden: session::named(&parts.headers, NAME) == Some(HIDDEN),
-            show: asked.show,
+            are_hidden: session::cookie_value(&parts.headers, COOKIE) == Some(HIDDEN),
+            show: query.show,
             path: parts.uri.path().to_owned(),
         })
     }
 }
 
-/// What the switch sends.
 #[derive(Deserialize)]
 pub(super) struct Choice {
     results: Results,
@@ -87,19 +86,19 @@ enum Results {
     Shown,
 }
 
-/// Remembers the choice, and leads back.
+/// Stores the choice in a cookie and redirects back.
 pub(super) async fn choose(
     State(app): State<App>,
     PageForm(Choice { results, next }): PageForm<Choice>,
 ) -> Result<Response, PageProblem> {
     let (value, age) = match results {
-        Results::Hidden => (HIDDEN, AGE_S),
+        Results::Hidden => (HIDDEN, MAX_AGE_S),
         Results::Shown => ("", 0),
     };
-    let secure = session::secure(&app.config);
-    let cookie = format!("{NAME}={value}; Path=/; HttpOnly; SameSite=Lax; Max-Age={age}{secure}");
+    let secure = session::secure_attribute(&app.config);
+    let cookie = format!("{COOKIE}={value}; Path=/; HttpOnly; SameSite=Lax; Max-Age={age}{secure}");
     let cookie = HeaderValue::try_from(cookie).map_err(Problem::internal)?;
-    let next = own_place_of(&SPOILED, &next).unwrap_or("/tournaments");
+    let next = return_path_below(&SPOILER_RETURN_PATHS, &next).unwrap_or("/tournaments");
     let cookie = AppendHeaders([(header::SET_COOKIE, cookie)]);
     Ok((cookie, Redirect::to(next)).into_response())
 }

@@ -1,24 +1,23 @@
-//! The table from above, as SVG elements of a template: places, paths and marks in millimetres, x towards the opponent, y up the page.
+//! The table from above as SVG: positions, paths and marks in millimetres, x towards the opponent, y up the page.
 
 use faceoff_replay::model::TABLE;
 use std::fmt::Write;
 
-/// A place or a way in the drawing's units.
-pub(super) type Place = [f64; 2];
+/// x and y in the table frame, in metres.
+pub(super) type Position = [f64; 2];
 
-/// The table on which the rest is drawn.
+/// Outline of the table, below everything else.
 #[derive(Debug)]
-pub(super) struct Ground {
-    /// What is seen, with a margin.
+pub(super) struct TableOutline {
     pub(super) view_box: String,
     /// Surface, middle line, goals.
     pub(super) elements: String,
 }
 
-/// What is shown around the table, mm.
+/// Margin around the table, mm.
 const MARGIN: f64 = 60.0;
 
-impl Ground {
+impl TableOutline {
     pub(super) fn new() -> Self {
         let [half_length, half_width, goal] = [
             TABLE.half_length_m(),
@@ -45,16 +44,16 @@ impl Ground {
     }
 }
 
-/// In millimetres, y turned downwards as SVG has it.
-fn drawn([x, y]: Place) -> [f64; 2] {
+/// To millimetres, with y downwards as in SVG.
+fn to_svg([x, y]: Position) -> [f64; 2] {
     [(x * 1e3).round(), (-y * 1e3).round() + 0.0]
 }
 
-/// A way through places, as the data of an SVG path; empty without places.
-pub(super) fn way(places: &[Place]) -> String {
+/// A line through positions as SVG path data; empty without positions.
+pub(super) fn path(positions: &[Position]) -> String {
     let mut out = String::new();
-    for (index, place) in places.iter().enumerate() {
-        let [x, y] = drawn(*place);
+    for (index, position) in positions.iter().enumerate() {
+        let [x, y] = to_svg(*position);
         let letter = if index == 0 { 'M' } else { 'L' };
         // Writing to a string does not fail.
         let _written = write!(out, "{letter}{x} {y}");
@@ -62,47 +61,47 @@ pub(super) fn way(places: &[Place]) -> String {
     out
 }
 
-/// Dots at places: a path of lines without length, whose round ends are seen.
-pub(super) fn dots(places: &[Place]) -> String {
+/// Dots at positions: lines of zero length, of which only the round ends are visible.
+pub(super) fn dots(positions: &[Position]) -> String {
     let mut out = String::new();
-    for place in places {
-        let [x, y] = drawn(*place);
+    for position in positions {
+        let [x, y] = to_svg(*position);
         let _written = write!(out, "M{x} {y}h0");
     }
     out
 }
 
-/// Crosses at places, 28 mm wide.
-pub(super) fn crosses(places: &[Place]) -> String {
+/// Crosses at positions, 28 mm wide.
+pub(super) fn crosses(positions: &[Position]) -> String {
     let mut out = String::new();
-    for place in places {
-        let [x, y] = drawn(*place);
+    for position in positions {
+        let [x, y] = to_svg(*position);
         let _written = write!(out, "M{} {}l28 28m0 -28l-28 28", x - 14.0, y - 14.0);
     }
     out
 }
 
-/// Squares around places, 26 mm wide.
-pub(super) fn squares(places: &[Place]) -> String {
+/// Squares around positions, 26 mm wide.
+pub(super) fn squares(positions: &[Position]) -> String {
     let mut out = String::new();
-    for place in places {
-        let [x, y] = drawn(*place);
+    for position in positions {
+        let [x, y] = to_svg(*position);
         let _written = write!(out, "M{} {}h26v26h-26z", x - 13.0, y - 13.0);
     }
     out
 }
 
-/// Triangles around places, 28 mm wide.
-pub(super) fn triangles(places: &[Place]) -> String {
+/// Triangles around positions, 28 mm wide.
+pub(super) fn triangles(positions: &[Position]) -> String {
     let mut out = String::new();
-    for place in places {
-        let [x, y] = drawn(*place);
+    for position in positions {
+        let [x, y] = to_svg(*position);
         let _written = write!(out, "M{x} {}l14 24h-28z", y - 14.0);
     }
     out
 }
 
-/// A place's numbers for attributes.
+/// A position in SVG coordinates, for attributes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Dot {
     pub(super) x: f64,
@@ -110,8 +109,8 @@ pub(super) struct Dot {
 }
 
 impl Dot {
-    pub(super) fn at(place: Place) -> Self {
-        let [x, y] = drawn(place);
+    pub(super) fn at(position: Position) -> Self {
+        let [x, y] = to_svg(position);
         Self { x, y }
     }
 }
@@ -121,10 +120,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn up_the_table_is_up_the_page() {
-        assert_eq!(way(&[[0.1, 0.2], [-0.1, 0.0]]), "M100 -200L-100 0");
+    fn positive_y_is_up_the_page() {
+        assert_eq!(path(&[[0.1, 0.2], [-0.1, 0.0]]), "M100 -200L-100 0");
         assert_eq!(dots(&[[0.0, -0.0004]]), "M0 0h0");
         assert_eq!(crosses(&[[0.0, 0.1]]), "M-14 -114l28 28m0 -28l-28 28");
-        assert_eq!(way(&[]), "");
+        assert_eq!(path(&[]), "");
     }
 }

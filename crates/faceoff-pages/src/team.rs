@@ -1,15 +1,15 @@
-//! `/teams/{id}`: what a team came to, day by day, and what it has entered.
+//! `/teams/{id}`: results of a team by day, and its submissions.
 
 mod days;
 
 use super::{
     chart::Panel,
-    entry::Entry,
+    submission_row::SubmissionRow,
     frame::{Frame, PageProblem, render},
 };
 use askama::Template;
 use axum::{extract::State, response::Response};
-use days::{Broken, Day, Now};
+use days::{DayResult, LatestResult, TaskViolations};
 use faceoff_api::{
     requests::{HistoryQuery, TeamPageQuery},
     views::{evaluation::EvaluationView, ruling::RulingView, team::TeamView},
@@ -20,8 +20,8 @@ use faceoff_service::{
     problem::Problem,
     viewer::Viewer,
     views::{
-        evaluation, history, season::SeasonHead, sight::Sight, stage, submission, team,
-        tournament::entered_by,
+        evaluation, history, season::SeasonHead, visibility::Visibility, stage, submission, team,
+        tournament::entered_tournaments,
     },
 };
 use faceoff_types::{StageDay, StageName, TeamId, TournamentId};
@@ -34,25 +34,24 @@ struct Page {
     stage: String,
     /// The other stages: name and query.
     others: Vec<(String, String)>,
-    /// Its scores are not for the viewer.
+    /// Are the scores hidden from the viewer?
     is_hidden: bool,
     frozen: Option<RulingView>,
-    /// Those that it has entered: ids and names.
+    /// Tournaments of the team.
     tournaments: Vec<(TournamentId, StageName)>,
-    now: Option<Now>,
+    latest: Option<LatestResult>,
     panels: Vec<Panel>,
     /// The newest first.
-    days: Vec<Day>,
-    broken: Vec<Broken>,
-    /// Of today, without a result.
-    under_way: Vec<EvaluationView>,
-    /// For the team itself and for organisers; nobody else sees what was not played.
-    entered: Option<Vec<Entry>>,
-    /// The query that asks the API for the same days.
-    of_days: String,
+    days: Vec<DayResult>,
+    violations: Vec<TaskViolations>,
+    /// Running and queued evaluations of today.
+    open_evaluations: Vec<EvaluationView>,
+    /// Visible to the team and organisers only.
+    submissions: Option<Vec<SubmissionRow>>,
+    /// Query of the API for the same days.
+    history_query: String,
 }
 
-/// A team, in a stage.
 pub(super) async fn page(
     viewer: Result<Viewer, Problem>,
     State(app): State<App>,
@@ -61,14 +60,14 @@ pub(super) async fn page(
 ) -> Result<Response, PageProblem> {
     let (PathParam(id), QueryParams(query)) = (id?, query?);
     let viewer = viewer?;
-    let sight = Sight::of(&app, viewer).await?;
-    let season = SeasonHead::now(&app).await?;
+    let visibility = Visibility::load(&app, viewer).await?;
+    let season = SeasonHead::load(&app).await?;
     let team = team::find(&app, id).await?;
     let history = HistoryQuery {
         stage: query.stage,
         ..HistoryQuery::default()
     };
-    let mut history = history::asked(&app, &sight, history).await?;
+    let mut history = history::query(&app, &visibility, history).await?;
     history.rows.retain(|row| row.team_id == id);
     let stage = app
         .store
@@ -82,47 +81,47 @@ pub(super) async fn page(
         .map_err(Problem::from)?;
     let rules = revisions
         .into_iter()
-        .find(|one| one.number == history.revision)
-        .ok_or_else(|| Problem::internal("days without their rules"))?;
+        .find(|revision| revision.number == history.revision)
+        .ok_or_else(|| Problem::internal("history without its revision"))?;
     let variation = rules.rules.variation;
     let today: StageDay = stage.day(app.config.clock.now());
-    let mut under_way = evaluation::current(&app, &sight, today).await?;
-    under_way.retain(|of| of.team == id && !of.status.is_final());
-    let entered = match viewer {
+    let mut open_evaluations = evaluation::current(&app, &visibility, today).await?;
+    open_evaluations.retain(|evaluation| evaluation.team == id && !evaluation.status.is_final());
+    let sees_submissions = match viewer {
         Viewer::Organiser => true,
         Viewer::Team(own) => own == id,
-        Viewer::Anybody => false,
+        Viewer::Visitor => false,
     };
-    let entered = match entered {
-        true => Some(submission::of_team(&app, id).await?),
+    let submissions = match sees_submissions {
+        true => Some(submission::team_submissions(&app, id).await?),
         false => None,
     };
     let others = stage::all(&app).await?;
     let others = others.into_iter().filter(|of| of.id != stage.id);
     render(&Page {
-        tournaments: entered_by(&app, id).await?,
-        frame: Frame::of(&app, season.name, ""),
+        tournaments: entered_tournaments(&app, id).await?,
+        frame: Frame::for_app(&app, season.name, ""),
         stage: stage.name.to_string(),
         others: others
             .map(|of| (of.name.to_string(), format!("?stage={}", of.id)))
             .collect(),
-        is_hidden: sight.is_hidden(stage.id),
-        now: history
+        is_hidden: visibility.is_hidden(stage.id),
+        latest: history
             .rows
             .last()
-            .map(|row| Now::of(row, &variation.tier_bounds)),
+            .map(|row| LatestResult::new(row, &variation.tier_bounds)),
         panels: days::panels(&history.rows, &variation),
-        broken: days::broken(&history.rows),
+        violations: days::violations(&history.rows),
         days: history
             .rows
             .iter()
             .rev()
-            .map(|row| Day::of(row, &variation))
+            .map(|row| DayResult::new(row, &variation))
             .collect(),
-        of_days: format!("?stage={}&revision={}", stage.id, history.revision),
+        history_query: format!("?stage={}&revision={}", stage.id, history.revision),
         frozen: history.frozen,
-        under_way,
-        entered: entered.map(|all| all.iter().map(Entry::from).collect()),
+        open_evaluations,
+        submissions: submissions.map(|all| all.iter().map(SubmissionRow::from).collect()),
         team,
     })
 }

@@ -1,6 +1,6 @@
-//! `/tournaments/{id}`: standings, who met whom, who plays whom when, ratings, and with what everybody plays.
+//! `/tournaments/{id}`: standings, cross table, schedule, ratings and entrants of a tournament.
 
-mod cross;
+mod cross_table;
 mod entrants;
 mod ratings;
 mod schedule;
@@ -10,22 +10,22 @@ use super::{
     frame::{Frame, PageProblem, render},
     game_row::GameRow,
     spoilers::Spoilers,
-    tournament_words,
+    tournament_text,
 };
 use askama::Template;
 use axum::{extract::State, response::Response};
-use cross::Cross;
+use cross_table::CrossTable;
 use entrants::Entrant;
-use faceoff_api::views::{certainty::CertaintyView, tournament::TournamentView};
-use faceoff_scoring::tournament::schedule::TableOf;
+use faceoff_api::views::{champion_shares::ChampionSharesView, tournament::TournamentView};
+use faceoff_scoring::tournament::schedule::TableScope;
 use faceoff_service::{
     app::App,
     extract::PathParam,
     problem::{Problem, ProblemKind},
     viewer::Viewer,
     views::{
-        game, ratings::ratings, replays::certainty, season::SeasonHead, tournament,
-        tournament_sheet::TournamentSheet,
+        game, ratings::ratings, replays::champion_shares, season::SeasonHead, tournament,
+        tournament_state::TournamentState,
     },
 };
 use faceoff_types::{RoundNumber, TeamId, TeamName, TournamentId};
@@ -34,10 +34,9 @@ use schedule::Round;
 use standings::Standings;
 use std::collections::BTreeMap;
 
-/// How strong the submissions are.
-enum Strengths {
+enum RatingsSection {
     Tables(Vec<RatingTable>),
-    /// Why there are none.
+    /// Why there are no ratings.
     None(String),
 }
 
@@ -50,42 +49,41 @@ struct Page {
     view: TournamentView,
     phase: String,
     format: String,
-    /// Is the table as it stays?
+    /// Are the standings final?
     is_final: bool,
-    /// Games that are being played.
     running: Vec<GameRow>,
     standings: Vec<Standings>,
-    /// Teams that are in no table, since no game of theirs has a result.
+    /// Teams without a result, which are not in the standings yet.
     unplayed: Vec<TeamName>,
-    crosses: Vec<Cross>,
-    /// Each two teams that meet: the path of their page, and their names.
+    cross_tables: Vec<CrossTable>,
+    /// Pairs of teams with a game: path of their page, and their names.
     pairs: Vec<(String, String)>,
     /// The newest first.
     rounds: Vec<Round>,
-    strengths: Strengths,
+    ratings: RatingsSection,
     certainty: Option<Certainty>,
     entrants: Vec<Entrant>,
 }
 
-/// How often each team was champion when the schedule was played again.
+/// How often each team became champion in repetitions of the schedule.
 struct Certainty {
-    told: String,
-    /// Team, times, percent, interval.
+    summary: String,
+    /// Team, first places, percent, interval.
     champions: Vec<(TeamName, u32, String, String)>,
 }
 
 impl Page {
-    /// What comes next; a pause's reason is the organiser's own words.
+    /// The next step, without the reason of a pause if results are hidden: it is free text.
     fn next(&self) -> &str {
-        match self.spoilers.hide() && self.view.head.paused.is_some() {
-            true => "No game begins: the tournament is paused.",
+        match self.spoilers.hides_results() && self.view.head.paused.is_some() {
+            true => "The tournament is paused; no games start.",
             false => &self.view.head.next,
         }
     }
 
-    /// What has changed, in a sentence.
-    fn told(&self) -> String {
-        if self.spoilers.hide() {
+    /// Text for screen readers after a live update.
+    fn live_text(&self) -> String {
+        if self.spoilers.hides_results() {
             return String::new();
         }
         let first = self.standings.first().and_then(|table| table.rows.first());
@@ -107,60 +105,60 @@ pub(super) async fn page(
 ) -> Result<Response, PageProblem> {
     let PathParam(id) = id?;
     let viewer = viewer?;
-    let season = SeasonHead::now(&app).await?;
-    let sheet = TournamentSheet::find(&app, id).await?;
-    let view = tournament::of(&sheet)?;
-    let is_hidden = spoilers.hide();
-    let games: Vec<GameRow> = game::of_rounds(&sheet, viewer, None)?
+    let season = SeasonHead::load(&app).await?;
+    let state = TournamentState::find(&app, id).await?;
+    let view = tournament::view(&state)?;
+    let is_hidden = spoilers.hides_results();
+    let games: Vec<GameRow> = game::round_games(&state, viewer, None)?
         .iter()
-        .filter_map(|game| GameRow::of(game, is_hidden))
+        .filter_map(|game| GameRow::new(game, is_hidden))
         .collect();
-    let told: Vec<&GameRow> = games
+    let visible: Vec<&GameRow> = games
         .iter()
-        .filter(|game| !schedule::is_withheld(&view, game.round, &spoilers))
+        .filter(|game| !schedule::is_hidden(&view, game.round, &spoilers))
         .collect();
     let standings = match is_hidden {
         true => Vec::new(),
         false => view
             .tables
             .iter()
-            .map(|table| Standings::of(&sheet, table))
+            .map(|table| Standings::new(&state, table))
             .collect::<Result<_, _>>()?,
     };
-    let strengths = match is_hidden {
-        true => Strengths::None(String::new()),
-        false => strengths(&app, &view).await?,
+    let ratings = match is_hidden {
+        true => RatingsSection::None(String::new()),
+        false => ratings_section(&app, &view).await?,
     };
     let unplayed = view.entrants.iter().filter(|entrant| {
         let is_in = |table: &Standings| table.rows.iter().any(|row| row.team_id == entrant.team);
         !is_hidden && entrant.left.is_none() && !standings.iter().any(is_in)
     });
     let page = Page {
-        frame: Frame::of(&app, season.name, format!("/tournaments/{id}")),
+        frame: Frame::for_app(&app, season.name, format!("/tournaments/{id}")),
         id,
-        phase: tournament_words::phase(&view.head),
-        format: tournament_words::format(&view.rules),
+        phase: tournament_text::phase_label(&view.head),
+        format: tournament_text::describe_format(&view.rules),
         is_final: view.head.champion.is_some(),
-        running: told
+        running: visible
             .iter()
             .filter(|game| game.is_running())
             .map(|game| GameRow::clone(game))
             .collect(),
         unplayed: unplayed.map(|entrant| entrant.team_name.clone()).collect(),
-        crosses: crosses(&sheet, &view, &told, is_hidden)?,
-        pairs: pairs(id, &told),
+        cross_tables: cross_tables(&state, &view, &visible, is_hidden)?,
+        pairs: pairs(id, &visible),
         rounds: view
             .rounds
             .iter()
             .rev()
-            .map(|round| Round::of(&view, round, &games, &spoilers))
+            .map(|round| Round::new(&view, round, &games, &spoilers))
             .collect(),
-        strengths,
+        ratings,
         certainty: match is_hidden {
             true => None,
-            false => Certainty::of(&*certainty(&app, id).await?),
+            false => Certainty::new(&*champion_shares(&app, id).await?),
         },
-        entrants: entrants::of(&app, &view, &spoilers).await?,
+        entrants: entrants::entrants(&app, &view, &spoilers).await?,
         standings,
         spoilers,
         view,
@@ -168,63 +166,63 @@ pub(super) async fn page(
     render(&page)
 }
 
-async fn strengths(app: &App, view: &TournamentView) -> Result<Strengths, Problem> {
+async fn ratings_section(app: &App, view: &TournamentView) -> Result<RatingsSection, Problem> {
     let rated = match ratings(app, view.head.id).await {
         Err(problem) if problem.kind() == ProblemKind::Conflict => {
-            return Ok(Strengths::None(problem.detail().to_owned()));
+            return Ok(RatingsSection::None(problem.detail().to_owned()));
         }
         rated => rated?,
     };
     let rounds = entrants::rounds_by_submission(view);
     let tables = ratings::tables(&rated, &rounds);
     Ok(match tables.is_empty() {
-        true => Strengths::None("No game that counts has a result yet.".to_owned()),
-        false => Strengths::Tables(tables),
+        true => RatingsSection::None("No finished games yet.".to_owned()),
+        false => RatingsSection::Tables(tables),
     })
 }
 
-/// One of all teams, or one of the final and of each group. Whose results are hidden has the teams by name: their places
-/// would tell of them.
-fn crosses(
-    sheet: &TournamentSheet,
+/// A cross table of all teams, or one for the final and one for each group. With hidden results teams are sorted by name,
+/// because their ranks would reveal results.
+fn cross_tables(
+    state: &TournamentState,
     view: &TournamentView,
     games: &[&GameRow],
     is_hidden: bool,
-) -> Result<Vec<Cross>, Problem> {
-    let mut crosses = Vec::new();
+) -> Result<Vec<CrossTable>, Problem> {
+    let mut cross_tables = Vec::new();
     for table in &view.tables {
-        let of_round = |wanted: RoundNumber| {
-            let those = games
+        let round_games = |round: RoundNumber| {
+            let matching = games
                 .iter()
                 .copied()
-                .filter(move |game| game.round == wanted);
-            those.collect::<Vec<_>>()
+                .filter(move |game| game.round == round);
+            matching.collect::<Vec<_>>()
         };
-        let own = match table.of {
-            TableOf::Tournament => games.to_vec(),
-            TableOf::Group(_) => of_round(RoundNumber::FIRST),
-            TableOf::Final => of_round(RoundNumber::SECOND),
+        let own = match table.scope {
+            TableScope::Tournament => games.to_vec(),
+            TableScope::Group(_) => round_games(RoundNumber::FIRST),
+            TableScope::Final => round_games(RoundNumber::SECOND),
         };
         let placed = table.standings.iter().map(|standing| {
-            let id = sheet.team(&standing.team)?;
+            let id = state.team(&standing.team)?;
             Ok((id, standing.team.clone()))
         });
         let mut teams = placed.collect::<Result<Vec<(TeamId, TeamName)>, Problem>>()?;
-        add_unplayed(&mut teams, table.of, &own);
+        add_unranked(&mut teams, table.scope, &own);
         if is_hidden {
             teams.sort_by(|(_, a), (_, b)| a.cmp(b));
         }
-        // Of hidden games nobody is told who plays.
-        if table.of == TableOf::Final && own.is_empty() {
+        // Pairings of hidden games are hidden, too.
+        if table.scope == TableScope::Final && own.is_empty() {
             continue;
         }
-        crosses.push(Cross::of(standings::title(table.of), &teams, &own));
+        cross_tables.push(CrossTable::new(standings::title(table.scope), &teams, &own));
     }
-    crosses.retain(|cross| cross.rows.len() > 1);
-    Ok(crosses)
+    cross_tables.retain(|table| table.rows.len() > 1);
+    Ok(cross_tables)
 }
 
-/// Each two teams of some games once, by name.
+/// Pairs of teams with a game, sorted by name.
 fn pairs(id: TournamentId, games: &[&GameRow]) -> Vec<(String, String)> {
     let mut pairs = BTreeMap::new();
     for game in games {
@@ -238,16 +236,16 @@ fn pairs(id: TournamentId, games: &[&GameRow]) -> Vec<(String, String)> {
     pairs.into_values().collect()
 }
 
-/// Those that have a game and no place yet.
-fn add_unplayed(teams: &mut Vec<(TeamId, TeamName)>, of: TableOf, games: &[&GameRow]) {
-    if matches!(of, TableOf::Group(_)) {
+/// Appends teams that have a game but no rank yet.
+fn add_unranked(teams: &mut Vec<(TeamId, TeamName)>, of: TableScope, games: &[&GameRow]) {
+    if matches!(of, TableScope::Group(_)) {
         return;
     }
     let mut others = Vec::new();
     for game in games {
         for (id, name) in game.team_ids.iter().zip(&game.teams) {
-            let is_there = |(other, _): &(TeamId, TeamName)| other == id;
-            if !teams.iter().any(is_there) && !others.iter().any(is_there) {
+            let is_listed = |(other, _): &(TeamId, TeamName)| other == id;
+            if !teams.iter().any(is_listed) && !others.iter().any(is_listed) {
                 others.push((*id, name.clone()));
             }
         }
@@ -257,12 +255,12 @@ fn add_unplayed(teams: &mut Vec<(TeamId, TeamName)>, of: TableOf, games: &[&Game
 }
 
 impl Certainty {
-    fn of(view: &CertaintyView) -> Option<Self> {
+    fn new(view: &ChampionSharesView) -> Option<Self> {
         if view.replays == 0 {
             return None;
         }
         let champions = view.champions.iter().map(|share| {
-            let percent = |share: f64| super::figures::one(100.0 * share);
+            let percent = |share: f64| super::figures::one_decimal(100.0 * share);
             let [low, high] = share.share_ci95.map(percent);
             (
                 share.team.clone(),
@@ -272,9 +270,9 @@ impl Certainty {
             )
         });
         Some(Self {
-            told: format!(
-                "The schedule was ordered to be played {} times more, with fresh seeds and the same submissions; {} of them \
-                 are complete ({} of {} games). These games count nowhere.",
+            summary: format!(
+                "The schedule is repeated {} times with new seeds and the same submissions; {} repetitions are complete \
+                 ({} of {} games). These games do not count.",
                 view.replays, view.complete, view.games_played, view.games
             ),
             champions: champions.collect(),

@@ -1,9 +1,9 @@
-//! `/tournaments`: all of the season, the newest first.
+//! `/tournaments`: the tournaments of the season, newest first.
 
 use super::{
     frame::{Frame, PageProblem, render},
     spoilers::Spoilers,
-    tournament_words,
+    tournament_text,
 };
 use askama::Template;
 use axum::{extract::State, response::Response};
@@ -27,10 +27,10 @@ struct Page {
 }
 
 impl Page {
-    /// What comes next of one; a pause's reason is the organiser's own words.
+    /// The next step of a tournament, without the reason of a pause if results are hidden: it is free text.
     fn next<'a>(&self, row: &'a Row) -> &'a str {
-        match self.spoilers.hide() && row.head.paused.is_some() {
-            true => "No game begins: it is paused.",
+        match self.spoilers.hides_results() && row.head.paused.is_some() {
+            true => "The tournament is paused; no games start.",
             false => &row.head.next,
         }
     }
@@ -40,15 +40,15 @@ pub(super) async fn page(
     State(app): State<App>,
     spoilers: Spoilers,
 ) -> Result<Response, PageProblem> {
-    let season = SeasonHead::now(&app).await?;
+    let season = SeasonHead::load(&app).await?;
     let mut heads = tournament::heads(&app).await?;
     heads.reverse();
     render(&Page {
-        frame: Frame::of(&app, season.name, "/tournaments"),
+        frame: Frame::for_app(&app, season.name, "/tournaments"),
         rows: heads
             .into_iter()
             .map(|head| Row {
-                phase: tournament_words::phase(&head),
+                phase: tournament_text::phase_label(&head),
                 head,
             })
             .collect(),

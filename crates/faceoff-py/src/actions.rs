@@ -1,6 +1,6 @@
-//! What the numbers of an action mean.
+//! Conversion of actions to commands.
 
-use crate::errors::argument;
+use crate::errors::argument_error;
 use faceoff_sim::{
     Interpolation, JOINTS, SUBSTEPS,
     model::{CONTROL_STEP_S, INITIAL_Q, LIMIT_FRACTION, LINKS},
@@ -12,43 +12,43 @@ use serde::{Deserialize, Serialize};
 /// Acceleration limits are this many times the velocity limits, 1/s.
 const ACCELERATION_PER_VELOCITY: f64 = 10.0;
 
-/// What the numbers of an action mean.
+/// Meaning of the numbers of an action.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum ActionMode {
-    /// Fractions, in [−1, 1]: of a position, how far from the last commanded one, where 1 is what 95 % of the
-    /// joint's velocity limit reaches in the time; of a velocity, of 95 % of its limit; of an acceleration, of its
-    /// limit. Positions stay within 95 % of the joint's range.
+    /// Fractions in [−1, 1]. A position is a change from the last commanded one, where 1 is the change at 95 % of
+    /// the joint's velocity limit. Velocities are relative to 95 % of their limit, accelerations to their limit.
+    /// Positions stay within 95 % of the joint's range.
     Delta,
-    /// Fractions, in [−1, 1]: a position of 0 is the start pose, ±1 are 95 % of the joint's range; the rest as
-    /// above.
+    /// Fractions in [−1, 1]. A position of 0 is the start pose, ±1 is 95 % of the joint's range; velocities and
+    /// accelerations as for `Delta`.
     Absolute,
     /// rad, rad/s and rad/s², as agents send them to the server.
     Raw,
 }
 
-/// How actions are read.
+/// Format of an environment's actions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Actions {
-    /// What their numbers mean.
+    /// Meaning of their numbers.
     pub mode: ActionMode,
-    /// How they become trajectories.
+    /// Conversion to trajectories.
     pub interpolation: Interpolation,
-    /// Bring numbers that are too large to their bounds.
+    /// Clip numbers to their bounds.
     pub clip: bool,
 }
 
-/// What a row of an action holds.
+/// Quantity in a row of an action.
 #[derive(Clone, Copy)]
 enum Quantity {
-    /// After this fraction of the control step.
+    /// Position after this fraction of the control step.
     Position(f64),
     Velocity,
     Acceleration,
 }
 
 impl Actions {
-    /// Numbers in an action.
+    /// Count of numbers in an action.
     pub fn len(&self) -> usize {
         self.interpolation.len()
     }
@@ -61,55 +61,55 @@ impl Actions {
         }
     }
 
-    /// Are all these numbers ones that an action may have? `place` names the action that is not.
+    /// Checks the numbers of consecutive actions. `label` describes the action with this index in an error message.
     ///
     /// # Errors
-    /// The first that is none.
-    pub fn check(&self, actions: &[f64], place: impl Fn(usize) -> String) -> PyResult<()> {
+    /// The first number that is not finite or is out of bounds.
+    pub fn check(&self, actions: &[f64], label: impl Fn(usize) -> String) -> PyResult<()> {
         let limit = if self.clip { f64::MAX } else { self.limit() };
-        // One pass without branches, since there is hardly ever anything to tell.
+        // One pass without branches: errors are rare.
         if actions.iter().all(|x| x.abs() <= limit) {
             return Ok(());
         }
-        let (at, number) = actions
+        let (position, number) = actions
             .iter()
             .enumerate()
             .find(|(_, x)| x.is_nan() || x.abs() > limit)
             .unwrap_or((0, &f64::NAN));
-        let (of, index) = (place(at / self.len()), at % self.len());
+        let (label, index) = (label(position / self.len()), position % self.len());
         Err(if number.is_finite() {
             let hint = "clip it, or make the environment with clip_actions=True";
-            argument(
+            argument_error(
                 "action",
                 format!("numbers from -{limit} to {limit}"),
-                format!("{number} at index {index}{of}; {hint}"),
+                format!("{number} at index {index}{label}; {hint}"),
             )
         } else {
-            argument(
+            argument_error(
                 "action",
                 "finite numbers",
-                format!("{number} at index {index}{of}"),
+                format!("{number} at index {index}{label}"),
             )
         })
     }
 
-    /// Turns an action, checked before, into what is commanded, and remembers its last position in `commanded`, rad.
+    /// Converts a checked action to a command, and stores its last position in `commanded`, rad.
     pub fn command(&self, action: &[f64], commanded: &mut [f64; JOINTS], out: &mut [f64]) {
         let limit = self.limit();
         let bound = |x: f64| if self.clip { x.clamp(-limit, limit) } else { x };
-        let from = *commanded;
-        for (row, (given, command)) in action
+        let previous = *commanded;
+        for (row, (input, command)) in action
             .chunks_exact(JOINTS)
             .zip(out.chunks_exact_mut(JOINTS))
             .enumerate()
         {
             let quantity = self.quantity(row);
             for joint in 0..JOINTS {
-                let fraction = bound(given[joint]);
+                let fraction = bound(input[joint]);
                 command[joint] = match self.mode {
                     ActionMode::Raw => fraction,
-                    ActionMode::Delta => scaled(quantity, joint, fraction, Some(from[joint])),
-                    ActionMode::Absolute => scaled(quantity, joint, fraction, None),
+                    ActionMode::Delta => scale(quantity, joint, fraction, Some(previous[joint])),
+                    ActionMode::Absolute => scale(quantity, joint, fraction, None),
                 };
             }
             if matches!(quantity, Quantity::Position(_)) {
@@ -132,14 +132,14 @@ impl Actions {
     }
 }
 
-/// What a fraction stands for; a position starts `from` somewhere, or else from the middle.
-fn scaled(quantity: Quantity, joint: usize, fraction: f64, from: Option<f64>) -> f64 {
+/// Converts a fraction to rad, rad/s or rad/s². A position is relative to `previous`, or else to the start pose.
+fn scale(quantity: Quantity, joint: usize, fraction: f64, previous: Option<f64>) -> f64 {
     let range = LIMIT_FRACTION * LINKS[joint].range_rad;
     let velocity = LINKS[joint].velocity_limit_rad_s;
-    match (quantity, from) {
-        (Quantity::Position(part), Some(from)) => {
+    match (quantity, previous) {
+        (Quantity::Position(part), Some(previous)) => {
             let reach = LIMIT_FRACTION * velocity * CONTROL_STEP_S * part;
-            (from + fraction * reach).clamp(-range, range)
+            (previous + fraction * reach).clamp(-range, range)
         }
         (Quantity::Position(_), None) => {
             let centre = INITIAL_Q[joint];

@@ -1,6 +1,6 @@
-//! The simulator's own batch, so that the environments can be timed beside it.
+//! The simulator's batch, as the reference for benchmarks of the environments.
 
-use crate::errors::{argument, broken, fenced};
+use crate::errors::{argument_error, simulator_error, catch_panic};
 use faceoff_sim::{
     Batch as SimBatch, BatchSetup, Interpolation, JOINTS, PerturbationSettings, Plant,
     model::INITIAL_Q,
@@ -9,7 +9,7 @@ use faceoff_types::{Factors, Seed};
 use pyo3::prelude::*;
 use rayon::ThreadPool;
 
-/// Worlds whose arms are held.
+/// A batch of worlds whose arms hold still.
 #[pyclass(module = "faceoff._native")]
 pub struct Batch {
     batch: SimBatch,
@@ -19,15 +19,15 @@ pub struct Batch {
 
 #[pymethods]
 impl Batch {
-    /// In the ideal simulator, with cubic interpolation.
+    /// Worlds of the ideal simulator, with cubic interpolation.
     #[new]
     fn new(task: &str, worlds: u32, threads: usize) -> PyResult<Self> {
         let task = task
             .parse()
-            .map_err(|_| argument("task", "hit, defend or prepare", task))?;
-        let hold = Interpolation::Cubic.held(&INITIAL_Q);
+            .map_err(|_| argument_error("task", "hit, defend or prepare", task))?;
+        let hold = Interpolation::Cubic.hold_position(&INITIAL_Q);
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
-        fenced(|| {
+        catch_panic(|| {
             Ok(Self {
                 batch: SimBatch::new(BatchSetup {
                     task,
@@ -39,7 +39,7 @@ impl Batch {
                     worlds,
                 }),
                 actions: hold[..2 * JOINTS].repeat(worlds as usize),
-                pool: pool.map_err(|error| broken(&error.to_string()))?,
+                pool: pool.map_err(|error| simulator_error(&error.to_string()))?,
             })
         })
     }
@@ -52,7 +52,7 @@ impl Batch {
             pool,
         } = self;
         py.detach(|| {
-            fenced(|| {
+            catch_panic(|| {
                 pool.install(|| {
                     batch.step(actions);
                 });

@@ -1,4 +1,4 @@
-//! What goes wrong, as Python's exceptions.
+//! Errors as Python exceptions.
 
 use pyo3::{import_exception, prelude::*};
 use std::{
@@ -11,36 +11,36 @@ import_exception!(faceoff.errors, ArgumentError);
 import_exception!(faceoff.errors, OrderError);
 import_exception!(faceoff.errors, ClosedError);
 
-/// Runs what may panic: `PanicException` is no `Exception`, and would pass by the handlers of those who
-/// call us.
+/// Runs `work` and converts a panic to an error: `PanicException` is not an `Exception`, so callers' handlers would
+/// not catch it.
 ///
 /// # Errors
-/// The closure's, or [`Error`] with the panic's words.
-pub fn fenced<T>(work: impl FnOnce() -> PyResult<T>) -> PyResult<T> {
+/// The closure's error, or [`Error`] with the panic's message.
+pub fn catch_panic<T>(work: impl FnOnce() -> PyResult<T>) -> PyResult<T> {
     match catch_unwind(AssertUnwindSafe(work)) {
         Ok(result) => result,
-        Err(panic) => Err(broken(&words(panic.as_ref()))),
+        Err(panic) => Err(simulator_error(&panic_message(panic.as_ref()))),
     }
 }
 
 /// The error of a simulator that failed.
-pub fn broken(words: &str) -> PyErr {
+pub fn simulator_error(message: &str) -> PyErr {
     Error::new_err(format!(
-        "the simulator failed, which is a fault of faceoff: {words}; make a new environment, and please report it"
+        "the simulator failed, which is a fault of faceoff: {message}; make a new environment, and please report it"
     ))
 }
 
-/// What a panic says of itself.
-pub fn words(panic: &(dyn Any + Send)) -> String {
+/// The message of a panic.
+pub fn panic_message(panic: &(dyn Any + Send)) -> String {
     panic
         .downcast_ref::<&str>()
-        .map(|words| (*words).to_owned())
+        .map(|message| (*message).to_owned())
         .or_else(|| panic.downcast_ref::<String>().cloned())
-        .unwrap_or_else(|| "a panic without words".to_owned())
+        .unwrap_or_else(|| "a panic without a message".to_owned())
 }
 
-/// An argument that cannot be.
-pub fn argument(
+/// The error of an invalid argument.
+pub fn argument_error(
     name: &str,
     expected: impl std::fmt::Display,
     got: impl std::fmt::Display,

@@ -1,10 +1,10 @@
-//! The evaluator, for a policy in Python.
+//! The evaluator for a policy in Python.
 
 use crate::{
     actions::{ActionMode, Actions},
-    errors::{OrderError, argument, broken, fenced},
+    errors::{OrderError, argument_error, simulator_error, catch_panic},
 };
-use faceoff_episode::{Answered, Arena, Course, Nowhere};
+use faceoff_episode::{AnswerTiming, Arena, RunningEpisode, NullSink};
 use faceoff_scoring::{StepTimes, score_evaluation, score_task};
 use faceoff_sim::{Interpolation, JOINTS, PerturbationSettings, model::INITIAL_Q};
 use faceoff_types::{EpisodeOutcome, Phase, Profile, Ruleset, Seed, Task, TaskResult, Variation};
@@ -12,14 +12,14 @@ use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
 use std::collections::BTreeMap;
 
-/// No time is measured in here: a policy in the same process is no agent.
-const UNTIMED: Answered = Answered {
+/// No time is measured: the policy runs in this process, not in an agent's.
+const UNTIMED: AnswerTiming = AnswerTiming {
     computation_time_s: 0.0,
     host_time_s: 0.0,
     cpu_time_s: None,
 };
 
-/// What all episodes of an evaluation share.
+/// State shared by all episodes of an evaluation.
 #[pyclass(frozen, module = "faceoff._native")]
 pub struct Evaluation {
     arena: Arena,
@@ -30,8 +30,8 @@ pub struct Evaluation {
 
 #[pymethods]
 impl Evaluation {
-    /// Of a profile's name, a seed as on the command line, the season's seed of the mismatch if it is another than that
-    /// which follows, and magnitudes of perturbations in JSON.
+    /// `profile` is a name, `seed` as on the command line. `mismatch_seed` is derived from `seed` if absent.
+    /// `perturbations` are magnitudes in JSON.
     #[new]
     fn new(
         py: Python<'_>,
@@ -42,10 +42,10 @@ impl Evaluation {
     ) -> PyResult<Self> {
         let profile: Profile = profile
             .parse()
-            .map_err(|error| argument("profile", "a profile", error))?;
+            .map_err(|error| argument_error("profile", "a profile", error))?;
         let read = |name, text: &str| -> PyResult<Seed> {
             text.parse()
-                .map_err(|error: faceoff_types::ParseSeedError| argument(name, "a seed", error))
+                .map_err(|error: faceoff_types::ParseSeedError| argument_error(name, "a seed", error))
         };
         let seed = read("seed", seed)?;
         let season = match mismatch_seed {
@@ -53,14 +53,14 @@ impl Evaluation {
             None => seed.model_mismatch(),
         };
         let magnitudes: PerturbationSettings = serde_json::from_str(perturbations)
-            .map_err(|error| argument("perturbations", "magnitudes of factors", error))?;
+            .map_err(|error| argument_error("perturbations", "magnitudes of factors", error))?;
         magnitudes
             .check()
-            .map_err(|error| argument("perturbations", "magnitudes that a world has", error))?;
+            .map_err(|error| argument_error("perturbations", "magnitudes that a world has", error))?;
         let arena = py.detach(|| {
-            fenced(|| {
+            catch_panic(|| {
                 let ruleset = Ruleset::CURRENT;
-                Ok(Arena::by(ruleset, profile, &magnitudes, seed, season))
+                Ok(Arena::with_ruleset(ruleset, profile, &magnitudes, seed, season))
             })
         })?;
         Ok(Self {
@@ -74,7 +74,7 @@ impl Evaluation {
         })
     }
 
-    /// An episode at its start, for a policy of this interpolation and these actions.
+    /// Begins an episode for a policy with this interpolation and action format.
     fn begin(
         &self,
         task: &str,
@@ -82,33 +82,33 @@ impl Evaluation {
         interpolation: Option<i64>,
         action_mode: &str,
         clip_actions: bool,
-    ) -> PyResult<PolicyCourse> {
+    ) -> PyResult<PolicyEpisode> {
         let interpolation = Interpolation::from_code(interpolation)
-            .map_err(|error| argument("interpolation", "1, 2, 3, 4, 5, -1 or None", error.0))?;
+            .map_err(|error| argument_error("interpolation", "1, 2, 3, 4, 5, -1 or None", error.0))?;
         let mode = match action_mode {
             "delta" => ActionMode::Delta,
             "absolute" => ActionMode::Absolute,
             "raw" => ActionMode::Raw,
-            other => return Err(argument("action_mode", "delta, absolute or raw", other)),
+            other => return Err(argument_error("action_mode", "delta, absolute or raw", other)),
         };
         let actions = Actions {
             mode,
             interpolation,
             clip: clip_actions,
         };
-        let task = task_named(task)?;
-        let course = fenced(|| {
+        let task = parse_task(task)?;
+        let running = catch_panic(|| {
             let interpolation = Some(interpolation);
-            Ok(Course::begin(
+            Ok(RunningEpisode::begin(
                 &self.arena,
                 task,
                 episode,
                 interpolation,
-                Nowhere,
+                NullSink,
             ))
         })?;
-        Ok(PolicyCourse {
-            course,
+        Ok(PolicyEpisode {
+            running,
             actions,
             commanded: INITIAL_Q,
             command: vec![0.0; actions.len()],
@@ -116,22 +116,22 @@ impl Evaluation {
         })
     }
 
-    /// Scores outcomes, each as JSON and in any order: what `results.json` holds, as JSON.
+    /// Scores outcomes, each as JSON and in any order; returns the content of `results.json`.
     fn score(&self, outcomes: Vec<String>) -> PyResult<String> {
         let mut by_task = BTreeMap::<Task, Vec<EpisodeOutcome>>::new();
         for outcome in &outcomes {
             let outcome: EpisodeOutcome = serde_json::from_str(outcome)
-                .map_err(|error| argument("outcomes", "what episodes returned", error))?;
+                .map_err(|error| argument_error("outcomes", "what episodes returned", error))?;
             by_task.entry(outcome.task).or_default().push(outcome);
         }
-        let result = fenced(|| {
+        let result = catch_panic(|| {
             let tasks: BTreeMap<Task, TaskResult> = by_task
                 .into_iter()
                 .map(|(task, mut outcomes)| {
                     outcomes.sort_unstable_by_key(|outcome| outcome.episode);
                     let steps = outcomes.iter().map(|outcome| u64::from(outcome.steps));
                     let steps: u64 = steps.sum();
-                    let mut times = StepTimes::of(steps);
+                    let mut times = StepTimes::for_steps(steps);
                     (0..steps).for_each(|_| times.add(0.0));
                     let bounds = &self.variation.tier_bounds;
                     (task, score_task(&outcomes, &times, bounds))
@@ -146,14 +146,14 @@ impl Evaluation {
                 tasks,
             ))
         })?;
-        serde_json::to_string(&result).map_err(|error| broken(&error.to_string()))
+        serde_json::to_string(&result).map_err(|error| simulator_error(&error.to_string()))
     }
 }
 
-/// An episode under way, played by a policy.
+/// A running episode of a policy.
 #[pyclass(module = "faceoff._native")]
-pub struct PolicyCourse {
-    course: Course<Nowhere>,
+pub struct PolicyEpisode {
+    running: RunningEpisode<NullSink>,
     actions: Actions,
     commanded: [f64; JOINTS],
     command: Vec<f64>,
@@ -161,17 +161,17 @@ pub struct PolicyCourse {
 }
 
 #[pymethods]
-impl PolicyCourse {
-    /// What the policy is told: 23 numbers with an opponent on the table, 20 without, as the protocol has them.
+impl PolicyEpisode {
+    /// The observation of the protocol: 23 numbers with an opponent on the table, 20 without.
     fn observation<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
         let question = self
-            .course
+            .running
             .question()
-            .map_err(|error| broken(&error.to_string()))?;
+            .map_err(|error| simulator_error(&error.to_string()))?;
         Ok(PyArray1::from_slice(py, question.observation))
     }
 
-    /// Plays a control step. The outcome, as JSON, comes with the episode's end.
+    /// Runs a control step. Returns the outcome as JSON at the episode's end.
     fn answer(
         &mut self,
         py: Python<'_>,
@@ -185,11 +185,11 @@ impl PolicyCourse {
         let action = action.as_slice()?;
         if action.len() != self.actions.len() {
             let expected = format!("{} numbers", self.actions.len());
-            return Err(argument("action", expected, action.len()));
+            return Err(argument_error("action", expected, action.len()));
         }
         self.actions.check(action, |_| String::new())?;
         let Self {
-            course,
+            running,
             actions,
             commanded,
             command,
@@ -197,10 +197,10 @@ impl PolicyCourse {
         } = self;
         actions.command(action, commanded, command);
         let outcome = py.detach(|| {
-            fenced(|| {
-                Ok(match course.answer(command, UNTIMED) {
+            catch_panic(|| {
+                Ok(match running.answer(command, UNTIMED) {
                     Ok(outcome) => outcome,
-                    Err(fault) => Some(course.failed(Phase::Step, fault, None)),
+                    Err(fault) => Some(running.outcome_after_fault(Phase::Step, fault, None)),
                 })
             })
         });
@@ -208,11 +208,11 @@ impl PolicyCourse {
         outcome?
             .map(|outcome| serde_json::to_string(&outcome))
             .transpose()
-            .map_err(|error| broken(&error.to_string()))
+            .map_err(|error| simulator_error(&error.to_string()))
     }
 }
 
-fn task_named(name: &str) -> PyResult<Task> {
+fn parse_task(name: &str) -> PyResult<Task> {
     name.parse()
-        .map_err(|_| argument("task", "hit, defend or prepare", name))
+        .map_err(|_| argument_error("task", "hit, defend or prepare", name))
 }

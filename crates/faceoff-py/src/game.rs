@@ -1,8 +1,8 @@
-//! A game of two robots, as Python's half drives it.
+//! A game of two robots, driven by the Python half.
 
 use crate::{
     actions::{ActionMode, Actions},
-    errors::{ClosedError, OrderError, argument, broken, fenced},
+    errors::{ClosedError, OrderError, argument_error, simulator_error, catch_panic},
     observation,
 };
 use faceoff_sim::{
@@ -14,7 +14,7 @@ use numpy::{PyReadonlyArray1, PyReadwriteArray2, PyUntypedArrayMethods};
 use pyo3::{prelude::*, types::PyDict};
 use serde::Deserialize;
 
-/// How a game is played, as Python's half states it in JSON. Pairs are robot 1's first.
+/// Setup of a game, written by the Python half in JSON. In pairs robot 1 comes first.
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Setup {
@@ -26,7 +26,7 @@ struct Setup {
     mismatch_seed: Option<Seed>,
 }
 
-/// A game under way. When it is over is Python's half to decide.
+/// A game. The Python half decides when it ends.
 #[pyclass(module = "faceoff._native")]
 pub struct Game {
     setup: Setup,
@@ -39,7 +39,7 @@ enum State {
     Unstarted,
     Playing(Box<faceoff_sim::Game>),
     Closed,
-    Broken,
+    Failed,
 }
 
 #[pymethods]
@@ -47,11 +47,11 @@ impl Game {
     #[new]
     fn new(setup: &str) -> PyResult<Self> {
         let setup: Setup = serde_json::from_str(setup)
-            .map_err(|error| argument("setup", "what the environments write", error))?;
+            .map_err(|error| argument_error("setup", "what the environments write", error))?;
         setup
             .perturbations
             .check()
-            .map_err(|error| argument("perturbations", "magnitudes that a world has", error))?;
+            .map_err(|error| argument_error("perturbations", "magnitudes that a world has", error))?;
         let actions = [0, 1].map(|robot| Actions {
             mode: setup.action_mode[robot],
             interpolation: setup.interpolation[robot],
@@ -65,7 +65,7 @@ impl Game {
         })
     }
 
-    /// Begins the game of a seed: of number 0 the one that `faceoff play` plays with it. Writes what both are told,
+    /// Begins game `number` of a seed; number 0 is that of `faceoff play`. Writes the observations of both robots,
     /// [2][23].
     fn reset(
         &mut self,
@@ -75,7 +75,7 @@ impl Game {
         mut observations: PyReadwriteArray2<'_, f32>,
     ) -> PyResult<()> {
         if matches!(self.state, State::Closed) {
-            return Err(closed());
+            return Err(closed_error());
         }
         let root = Seed::from_number(seed);
         let setup = &self.setup;
@@ -85,7 +85,7 @@ impl Game {
             .fold(Factors::NONE, |set, factor| set.with(*factor));
         let season = setup.mismatch_seed.unwrap_or_else(|| root.model_mismatch());
         let game = py.detach(|| {
-            fenced(|| {
+            catch_panic(|| {
                 Ok(faceoff_sim::Game::new(GameSetup {
                     interpolation: setup.interpolation,
                     factors,
@@ -98,21 +98,21 @@ impl Game {
                 }))
             })
         })?;
-        write(&game, &mut observations)?;
+        write_observations(&game, &mut observations)?;
         self.commanded = [INITIAL_Q; 2];
         self.state = State::Playing(Box::new(game));
         Ok(())
     }
 
-    /// One control step of both robots; an arm without an action holds. Writes what both are told, and returns what it
-    /// led to.
+    /// One control step of both robots; an arm without an action holds. Writes the observations of both, and returns
+    /// the results of the step.
     fn step<'py>(
         &mut self,
         py: Python<'py>,
         actions: [Option<PyReadonlyArray1<'py, f64>>; 2],
         mut observations: PyReadwriteArray2<'_, f32>,
     ) -> PyResult<Bound<'py, PyDict>> {
-        let game = self.state.playing()?;
+        let game = self.state.running_game()?;
         let mut commands: [Option<Vec<f64>>; 2] = [None, None];
         let mut commanded = self.commanded;
         for (robot, action) in actions.iter().enumerate() {
@@ -121,70 +121,70 @@ impl Game {
             let reader = &self.actions[robot];
             if action.len() != reader.len() {
                 let expected = format!("{} numbers for robot {}", reader.len(), robot + 1);
-                return Err(argument("action", expected, action.len()));
+                return Err(argument_error("action", expected, action.len()));
             }
             reader.check(action, |_| format!(" of robot {}", robot + 1))?;
             let mut command = vec![0.0; reader.len()];
             reader.command(action, &mut commanded[robot], &mut command);
             commands[robot] = Some(command);
         }
-        let played = py.detach(|| {
-            fenced(|| {
+        let step = py.detach(|| {
+            catch_panic(|| {
                 Ok(game.step([0, 1].map(|robot| match &commands[robot] {
                     Some(command) => Command::Act(command),
                     None => Command::Late,
                 })))
             })
         });
-        let played = match played {
-            Ok(played) => played,
+        let step = match step {
+            Ok(step) => step,
             Err(error) => {
-                self.state = State::Broken;
+                self.state = State::Failed;
                 return Err(error);
             }
         };
-        self.commanded = match played.rally_end {
+        self.commanded = match step.rally_end {
             Some(_) => [INITIAL_Q; 2],
             None => commanded,
         };
-        write(game, &mut observations)?;
-        tell(py, game, &played)
+        write_observations(game, &mut observations)?;
+        step_dict(py, game, &step)
     }
 
-    /// The true state: the puck's 6 numbers in the table's frame; of each robot joint positions and velocities, 7 each,
-    /// and the end effector's 3 in its own base frame.
+    /// The true state: the puck's 6 numbers in the table's frame; for each robot 7 joint positions, 7 joint velocities
+    /// and the end effector's 3 coordinates in its own base frame.
     fn state(&mut self) -> PyResult<(Vec<f64>, [Vec<f64>; 2])> {
-        Ok(flat(&self.state.playing()?.state()))
+        Ok(flatten(&self.state.running_game()?.state()))
     }
 
-    /// Gives the game up.
+    /// Releases the game.
     fn close(&mut self) {
         self.state = State::Closed;
     }
 }
 
 impl State {
-    fn playing(&mut self) -> PyResult<&mut faceoff_sim::Game> {
+    fn running_game(&mut self) -> PyResult<&mut faceoff_sim::Game> {
         match self {
             Self::Playing(game) => Ok(game),
             Self::Unstarted => Err(OrderError::new_err(
                 "expected reset() first, got another call",
             )),
-            Self::Closed => Err(closed()),
-            Self::Broken => Err(broken("an earlier step did")),
+            Self::Closed => Err(closed_error()),
+            Self::Failed => Err(simulator_error("an earlier step failed")),
         }
     }
 }
 
-fn closed() -> PyErr {
+fn closed_error() -> PyErr {
     ClosedError::new_err("expected an open environment, got one that was closed: make a new one")
 }
 
-fn write(game: &faceoff_sim::Game, observations: &mut PyReadwriteArray2<'_, f32>) -> PyResult<()> {
+fn write_observations(game: &faceoff_sim::Game, observations: &mut PyReadwriteArray2<'_, f32>) -> PyResult<()> {
     const LEN: usize = OBSERVATION_WITH_OPPONENT_LEN;
     if observations.shape() != [2, LEN] {
         let got = format!("one of shape {:?}", observations.shape());
-        return Err(argument(
+        return Err(argument_error(
             "observations",
             format!("an array of shape (2, {LEN})"),
             got,
@@ -197,13 +197,13 @@ fn write(game: &faceoff_sim::Game, observations: &mut PyReadwriteArray2<'_, f32>
     Ok(())
 }
 
-fn tell<'py>(
+fn step_dict<'py>(
     py: Python<'py>,
     game: &faceoff_sim::Game,
-    played: &GameStep,
+    step: &GameStep,
 ) -> PyResult<Bound<'py, PyDict>> {
-    let told = PyDict::new(py);
-    let (kind, by) = match played.rally_end {
+    let result = PyDict::new(py);
+    let (kind, by) = match step.rally_end {
         None => (None, None),
         Some(RallyEnd::Goal { by }) => (Some("goal"), Some(by)),
         Some(RallyEnd::Foul { by }) => (Some("foul"), Some(by)),
@@ -211,23 +211,23 @@ fn tell<'py>(
         Some(RallyEnd::LeftTable) => (Some("left_table"), None),
         Some(RallyEnd::Diverged { .. }) => (Some("diverged"), None),
     };
-    let constraints = played
+    let constraints = step
         .constraints
         .map(|values| [values.ee, values.link, values.joint_pos, values.joint_vel]);
-    told.set_item("rally_end", kind)?;
-    told.set_item("by", by)?;
-    told.set_item("constraints", constraints)?;
-    told.set_item("diverged", played.divergence.map_or([false; 2], |of| of.by))?;
-    told.set_item("goals", game.referee().goals)?;
-    told.set_item("fouls", game.referee().fouls)?;
-    told.set_item("score", game.referee().score())?;
-    let (puck, robots) = flat(&played.state);
-    told.set_item("puck", puck)?;
-    told.set_item("robots", robots)?;
-    Ok(told)
+    result.set_item("rally_end", kind)?;
+    result.set_item("by", by)?;
+    result.set_item("constraints", constraints)?;
+    result.set_item("diverged", step.divergence.map_or([false; 2], |divergence| divergence.by))?;
+    result.set_item("goals", game.referee().goals)?;
+    result.set_item("fouls", game.referee().fouls)?;
+    result.set_item("score", game.referee().score())?;
+    let (puck, robots) = flatten(&step.state);
+    result.set_item("puck", puck)?;
+    result.set_item("robots", robots)?;
+    Ok(result)
 }
 
-fn flat(state: &GameState) -> (Vec<f64>, [Vec<f64>; 2]) {
+fn flatten(state: &GameState) -> (Vec<f64>, [Vec<f64>; 2]) {
     let robots =
         [0, 1].map(|robot| [&state.q[robot][..], &state.dq[robot], &state.ee[robot]].concat());
     (state.puck.to_vec(), robots)

@@ -1,8 +1,8 @@
-//! The native half of the Python package `faceoff`: the simulator, the evaluator and the arm's kinematics, for programs
-//! in Python.
+//! The native half of the Python package `faceoff`: the simulator, the evaluator and the arm's kinematics, for Python
+//! programs.
 //!
-//! This crate turns arguments into the types of the other crates, and their results into arrays. It
-//! decides nothing about the simulation, and no panic of the other crates leaves it as one.
+//! This crate converts arguments to the types of the other crates, and their results to arrays. It has
+//! no simulation logic, and converts panics to exceptions.
 
 #![warn(missing_docs)]
 
@@ -25,11 +25,11 @@ mod worlds;
 
 use pyo3::prelude::*;
 
-/// `faceoff._native`; what users import is the Python package around it.
+/// `faceoff._native`; users import the Python package around it.
 #[pymodule]
 mod _native {
     use crate::{
-        errors::{argument, fenced},
+        errors::{argument_error, catch_panic},
         observation::BOUNDS,
         outputs::FACTS,
         world::STATE_LEN,
@@ -40,17 +40,17 @@ mod _native {
     #[pymodule_export]
     use crate::{
         batch::Batch,
-        evaluate::{Evaluation, PolicyCourse},
+        evaluate::{Evaluation, PolicyEpisode},
         game::Game,
         kinematics::{
             arm_constraints, arm_forward, arm_frames, arm_heights, arm_inverse, arm_jacobian,
-            arm_numbers, arm_posture_velocities, arm_velocities,
+            arm_constants, arm_posture_velocities, arm_velocities,
         },
         snapshot::{Snapshot, load_snapshot},
         worlds::Worlds,
     };
 
-    /// Least and greatest values of an observation with an opponent; without one it is the first 20.
+    /// Lowest and highest values of an observation with an opponent; without one the first 20 apply.
     #[pyfunction]
     fn observation_bounds() -> Vec<[f32; 2]> {
         BOUNDS.to_vec()
@@ -75,16 +75,16 @@ mod _native {
     /// Lengths of an action's nested arrays, outermost first, for an interpolation's code.
     #[pyfunction]
     fn action_shape(interpolation: Option<i64>) -> PyResult<Vec<usize>> {
-        let known = faceoff_types::Interpolation::from_code(interpolation);
-        let known = known
-            .map_err(|error| argument("interpolation", "1, 2, 3, 4, 5, -1 or None", error.0))?;
-        Ok(known.shape().to_vec())
+        let interpolation = faceoff_types::Interpolation::from_code(interpolation);
+        let interpolation = interpolation
+            .map_err(|error| argument_error("interpolation", "1, 2, 3, 4, 5, -1 or None", error.0))?;
+        Ok(interpolation.shape().to_vec())
     }
 
-    /// Panics, so that a test sees what comes of it.
+    /// Panics, for the test of the conversion to an exception.
     #[pyfunction]
     fn provoke_panic() -> PyResult<()> {
-        fenced(|| -> PyResult<()> { panic!("provoked") })
+        catch_panic(|| -> PyResult<()> { panic!("provoked") })
     }
 
     #[pymodule_init]

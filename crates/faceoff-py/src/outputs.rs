@@ -1,4 +1,4 @@
-//! Where a step's results are written: a row per world, of arrays that lie in Python's memory or in ours.
+//! Output arrays of a step, a row per world, in memory of Python or of this crate.
 
 use crate::{
     observation,
@@ -7,35 +7,36 @@ use crate::{
 };
 use rayon::prelude::*;
 
-/// Numbers that are told of a world after a step; see [`write_facts`].
+/// Count of numbers in a world's row of facts; see [`write_facts`].
 pub const FACTS: usize = 12;
 
-/// Rows of all worlds, or of some that follow each other.
+/// Rows of all worlds, or of consecutive ones.
 pub struct Outputs<'a> {
-    /// Numbers in an observation.
+    /// Count of numbers in an observation.
     pub observation_len: usize,
-    /// [worlds][observation]: what the agent is told next.
+    /// [worlds][observation]: the next observation.
     pub observations: &'a mut [f32],
-    /// [worlds][observation]: what the step led to, where a new episode has begun since; others are left as they
-    /// are. Empty if nobody asks.
+    /// [worlds][observation]: the last observation of an episode whose successor has begun; other rows are not
+    /// written. Empty if not requested.
     pub final_observations: &'a mut [f32],
-    /// [worlds]
+    /// [worlds]: rewards of the step.
     pub rewards: &'a mut [f64],
-    /// [worlds]
+    /// [worlds]: whether the task ended the episode.
     pub terminated: &'a mut [bool],
-    /// [worlds]
+    /// [worlds]: whether the horizon ended the episode.
     pub truncated: &'a mut [bool],
-    /// [worlds][[`FACTS`]]
+    /// [worlds][[`FACTS`]]: see [`write_facts`].
     pub facts: &'a mut [f64],
-    /// [worlds][[`STATE_LEN`]]: the true state that the step led to. Empty if nobody asks.
+    /// [worlds][[`STATE_LEN`]]: the true state after the step. Empty if not requested.
     pub states: &'a mut [f64],
-    /// [worlds][[`STATE_LEN`]]: the true state now, of the new episode where one has begun. Empty if nobody asks.
+    /// [worlds][[`STATE_LEN`]]: the present true state, that of the new episode if one has begun. Empty if not
+    /// requested.
     pub next_states: &'a mut [f64],
 }
 
 impl<'a> Outputs<'a> {
-    /// Cut into pieces of `worlds` rows, in order.
-    pub fn pieces(self, worlds: usize) -> Vec<Outputs<'a>> {
+    /// Splits the rows into chunks of `worlds` rows, in order.
+    pub fn split(self, worlds: usize) -> Vec<Outputs<'a>> {
         let count = self.rewards.len().div_ceil(worlds);
         let len = self.observation_len;
         let mut observations = self.observations.chunks_mut(len * worlds);
@@ -61,7 +62,7 @@ impl<'a> Outputs<'a> {
             .collect()
     }
 
-    /// Writes what is told of a world that was reset, or restored.
+    /// Writes the row of a world that was reset or restored.
     pub fn write_start(&mut self, row: usize, world: &World) {
         self.write_observation(row, world);
         self.write_state(row, world);
@@ -74,30 +75,30 @@ impl<'a> Outputs<'a> {
         self.truncated[row] = false;
     }
 
-    /// What the agent is told next.
+    /// Writes the next observation.
     pub fn write_observation(&mut self, row: usize, world: &World) {
         let len = self.observation_len;
-        let place = &mut self.observations[row * len..][..len];
-        observation::write(world.episode.observation(), place);
+        let target = &mut self.observations[row * len..][..len];
+        observation::write(world.episode.observation(), target);
     }
 
-    /// What the step led to, before a new episode begins.
+    /// Writes the last observation of an episode, before a new one begins.
     pub fn write_final_observation(&mut self, row: usize, world: &World) {
         let len = self.observation_len;
         if !self.final_observations.is_empty() {
-            let place = &mut self.final_observations[row * len..][..len];
-            observation::write(world.episode.observation(), place);
+            let target = &mut self.final_observations[row * len..][..len];
+            observation::write(world.episode.observation(), target);
         }
     }
 
-    /// The state that the step led to.
+    /// Writes the state after the step.
     pub fn write_state(&mut self, row: usize, world: &World) {
         if !self.states.is_empty() {
             self.states[row * STATE_LEN..][..STATE_LEN].copy_from_slice(&world.state());
         }
     }
 
-    /// The state now.
+    /// Writes the present state.
     pub fn write_next_state(&mut self, row: usize, world: &World) {
         if !self.next_states.is_empty() {
             self.next_states[row * STATE_LEN..][..STATE_LEN].copy_from_slice(&world.state());
@@ -105,26 +106,26 @@ impl<'a> Outputs<'a> {
     }
 }
 
-/// Writes what is told of a world: the code of its end (−1: under way), success, the episode's number, steps played, the
-/// values of the constraints ee, link, joint_pos and joint_vel, and whether each was broken in this episode.
+/// Writes a world's facts: the code of the episode's end (−1 while it runs), success, the episode's number, its steps, the
+/// values of the constraints ee, link, joint_pos and joint_vel, and whether each was violated in this episode.
 pub fn write_facts(world: &World, constraints: &[f64; 4], facts: &mut [f64]) {
-    let broken = world.episode.violations();
+    let violations = world.episode.violations();
     facts[0] = world.end.map_or(-1.0, |end| f64::from(end as u8));
     facts[1] = f64::from(u8::from(world.succeeds()));
     facts[2] = f64::from(world.origin.number);
     facts[3] = f64::from(world.episode.steps());
     facts[4..8].copy_from_slice(constraints);
-    for (fact, broken) in
+    for (fact, is_violated) in
         facts[8..]
             .iter_mut()
-            .zip([broken.ee, broken.link, broken.joint_pos, broken.joint_vel])
+            .zip([violations.ee, violations.link, violations.joint_pos, violations.joint_vel])
     {
-        *fact = f64::from(u8::from(broken));
+        *fact = f64::from(u8::from(is_violated));
     }
 }
 
-/// Rows in memory of our own, for a step that goes on while Python does something else.
-pub struct OwnRows {
+/// Rows in memory of this crate, for a step that runs in the background.
+pub struct OwnedRows {
     observation_len: usize,
     observations: Vec<f32>,
     final_observations: Vec<f32>,
@@ -136,8 +137,8 @@ pub struct OwnRows {
     next_states: Vec<f64>,
 }
 
-impl OwnRows {
-    /// Of so many worlds; true states only if somebody asks.
+impl OwnedRows {
+    /// Zeroed rows for `worlds` worlds; true states only if requested.
     pub fn new(setup: &Setup, worlds: usize, states: bool) -> Self {
         let observation_len = setup.observation_len();
         let states = if states { worlds * STATE_LEN } else { 0 };
@@ -154,7 +155,7 @@ impl OwnRows {
         }
     }
 
-    /// To be written.
+    /// The rows for writing.
     pub fn rows(&mut self) -> Outputs<'_> {
         Outputs {
             observation_len: self.observation_len,
@@ -169,31 +170,31 @@ impl OwnRows {
         }
     }
 
-    /// Copies all to rows of the same lengths; true states and final observations only where they are asked for.
+    /// Copies all values to rows of the same lengths; true states and final observations only if requested.
     pub fn copy_to(&self, to: &mut Outputs<'_>) {
         to.observations.copy_from_slice(&self.observations);
         to.rewards.copy_from_slice(&self.rewards);
         to.terminated.copy_from_slice(&self.terminated);
         to.truncated.copy_from_slice(&self.truncated);
         to.facts.copy_from_slice(&self.facts);
-        copy_if_asked(&self.final_observations, to.final_observations);
-        copy_if_asked(&self.states, to.states);
-        copy_if_asked(&self.next_states, to.next_states);
+        copy_if_present(&self.final_observations, to.final_observations);
+        copy_if_present(&self.states, to.states);
+        copy_if_present(&self.next_states, to.next_states);
     }
 }
 
-fn copy_if_asked<T: Copy>(from: &[T], to: &mut [T]) {
+fn copy_if_present<T: Copy>(from: &[T], to: &mut [T]) {
     if !to.is_empty() && !from.is_empty() {
         to.copy_from_slice(from);
     }
 }
 
-/// Pieces with the worlds that they are of, to be worked on by several threads.
-pub fn with_worlds<'a, 'w>(
+/// Chunks of worlds with their rows, for parallel processing.
+pub fn chunks_with_worlds<'a, 'w>(
     worlds: &'w mut [World],
     outputs: Outputs<'a>,
-    at_a_time: usize,
+    chunk_size: usize,
 ) -> impl IndexedParallelIterator<Item = (&'w mut [World], Outputs<'a>)> {
-    let pieces = outputs.pieces(at_a_time);
-    worlds.par_chunks_mut(at_a_time).zip(pieces.into_par_iter())
+    let chunks = outputs.split(chunk_size);
+    worlds.par_chunks_mut(chunk_size).zip(chunks.into_par_iter())
 }

@@ -1,63 +1,63 @@
-//! Threads of an environment's own.
+//! The thread pool of an environment.
 
-use crate::errors::broken;
+use crate::errors::simulator_error;
 use pyo3::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use std::{mem, process};
 
-/// A thread pool that is made when it is needed first, in each process anew.
+/// A thread pool that each process starts on first use.
 ///
-/// A process that was forked has a pool's memory and none of its threads: whoever gave it work would wait for ever, and
-/// so would whoever took it down. It is left where it is.
+/// A forked process inherits a pool's memory without its threads. Submitting work to that pool, or dropping it, would
+/// block forever, so it is leaked.
 #[derive(Debug)]
 pub struct Pool {
     threads: usize,
-    made: Option<(u32, ThreadPool)>,
+    pool: Option<(u32, ThreadPool)>,
 }
 
 impl Pool {
-    /// Of so many threads.
+    /// A pool of `threads` threads, not yet started.
     pub const fn new(threads: usize) -> Self {
         Self {
             threads,
-            made: None,
+            pool: None,
         }
     }
 
-    /// Its number of threads.
+    /// The number of threads.
     pub const fn threads(&self) -> usize {
         self.threads
     }
 
-    /// This process's own.
+    /// The pool of this process, started if necessary.
     ///
     /// # Errors
-    /// If the system gives no threads.
-    pub fn here(&mut self) -> PyResult<&ThreadPool> {
-        self.leave_inherited();
-        let pool = match self.made.take() {
+    /// If the system cannot start threads.
+    pub fn get_or_start(&mut self) -> PyResult<&ThreadPool> {
+        self.forget_inherited();
+        let pool = match self.pool.take() {
             Some((_, pool)) => pool,
             None => ThreadPoolBuilder::new()
                 .num_threads(self.threads)
                 .thread_name(|index| format!("faceoff-{index}"))
                 .build()
-                .map_err(|error| broken(&error.to_string()))?,
+                .map_err(|error| simulator_error(&error.to_string()))?,
         };
-        let (_, pool) = self.made.insert((process::id(), pool));
+        let (_, pool) = self.pool.insert((process::id(), pool));
         Ok(pool)
     }
 
-    fn leave_inherited(&mut self) {
-        if let Some((made_by, _)) = &self.made
-            && *made_by != process::id()
+    fn forget_inherited(&mut self) {
+        if let Some((process_id, _)) = &self.pool
+            && *process_id != process::id()
         {
-            mem::forget(self.made.take());
+            mem::forget(self.pool.take());
         }
     }
 }
 
 impl Drop for Pool {
     fn drop(&mut self) {
-        self.leave_inherited();
+        self.forget_inherited();
     }
 }

@@ -1,17 +1,17 @@
-//! The reward that the environments give unless told another one.
+//! The default reward of the environments.
 
 use faceoff_scoring::{EE_POINTS, JOINT_POS_POINTS, JOINT_VEL_POINTS, LINK_POINTS};
 use faceoff_sim::{Episode, table::geometry::TABLE};
 use faceoff_types::{Task, Violations};
 
-/// For a success, at the episode's end.
+/// Reward of a success at the episode's end.
 pub const SUCCESS: f64 = 10.0;
-/// What a metre between mallet and puck takes from how promising a state is.
+/// Decrease of the potential per metre between mallet and puck.
 const PER_METRE_TO_PUCK: f64 = 0.5;
-/// What a metre per second of the puck does, where it is to be stopped.
+/// Decrease of the potential per m/s of the puck's speed in `defend`.
 const PER_METRE_PER_SECOND: f64 = 1.0;
 
-/// How promising a state is, in points: what the reward of a step follows, by its difference.
+/// Potential of a state, in points; the reward of a step contains its change (potential-based shaping).
 pub fn potential(task: Task, episode: &Episode) -> f64 {
     let world = episode.world();
     let puck = world.puck();
@@ -19,17 +19,17 @@ pub fn potential(task: Task, episode: &Episode) -> f64 {
     let [mallet_x, mallet_y, _] = world.kinematics(0).end_effector.origin.lane(0);
     let (dx, dy) = (mallet_x - TABLE.base_x_m - x, mallet_y - y);
     let distance = (dx * dx + dy * dy).sqrt();
-    let apart = PER_METRE_TO_PUCK * distance.min(1.0);
+    let distance_cost = PER_METRE_TO_PUCK * distance.min(1.0);
     let value = match task {
-        Task::Hit => x.clamp(-1.0, 1.0) - apart,
-        Task::Defend => -PER_METRE_PER_SECOND * puck.speed().min(5.0) - apart,
-        Task::Prepare => -y.abs().min(1.0) - apart,
+        Task::Hit => x.clamp(-1.0, 1.0) - distance_cost,
+        Task::Defend => -PER_METRE_PER_SECOND * puck.speed().min(5.0) - distance_cost,
+        Task::Prepare => -y.abs().min(1.0) - distance_cost,
     };
-    // A world that diverges has numbers without a meaning.
+    // The numbers of a diverged world are meaningless.
     if value.is_finite() { value } else { 0.0 }
 }
 
-/// Points of the constraints that are broken `after` a step and were not `before` it, in this episode.
+/// Penalty points of the constraints whose first violation in this episode was in the last step.
 pub fn new_points(before: Violations, after: Violations) -> f64 {
     [
         (before.ee, after.ee, EE_POINTS),

@@ -1,14 +1,14 @@
-//! NumPy's memory, as rows to be written.
+//! NumPy arrays as output rows.
 
 use crate::{
-    errors::argument,
+    errors::argument_error,
     outputs::{FACTS, Outputs},
     world::STATE_LEN,
 };
 use numpy::{PyReadwriteArray1, PyReadwriteArray2, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 
-/// Arrays with a row per world, made by Python's half: observations, final observations, rewards, terminated,
+/// Arrays with a row per world, allocated by the Python half: observations, final observations, rewards, terminated,
 /// truncated, facts, true states and next true states; see [`Outputs`].
 #[derive(FromPyObject)]
 pub struct Rows<'py>(
@@ -23,15 +23,15 @@ pub struct Rows<'py>(
 );
 
 impl Rows<'_> {
-    /// As slices of `worlds` rows.
+    /// The arrays as slices of `worlds` rows.
     ///
     /// # Errors
-    /// If an array has another shape, or does not lie in one piece.
+    /// If an array has another shape or is not contiguous.
     pub fn outputs(&mut self, worlds: usize, observation_len: usize) -> PyResult<Outputs<'_>> {
         let wide = |name, shape: &[usize], width, optional| match shape {
             [rows, columns] if *rows == worlds && *columns == width => Ok(()),
             [0, _] if optional => Ok(()),
-            other => Err(argument(
+            other => Err(argument_error(
                 name,
                 format!("an array of shape ({worlds}, {width})"),
                 format!("one of shape {other:?}"),
@@ -42,7 +42,7 @@ impl Rows<'_> {
                 return Ok(());
             }
             let expected = format!("an array of length {worlds}");
-            Err(argument(name, expected, format!("one of length {len}")))
+            Err(argument_error(name, expected, format!("one of length {len}")))
         };
         wide("observations", self.0.shape(), observation_len, false)?;
         wide("final observations", self.1.shape(), observation_len, true)?;

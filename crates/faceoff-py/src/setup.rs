@@ -1,8 +1,8 @@
-//! What all worlds of an environment share.
+//! Setup shared by all worlds of an environment.
 
 use crate::{
     actions::{ActionMode, Actions},
-    errors::argument,
+    errors::argument_error,
 };
 use faceoff_sim::{Episode, Plant};
 use faceoff_types::{
@@ -11,38 +11,38 @@ use faceoff_types::{
 use pyo3::prelude::*;
 use serde::{Deserialize, Serialize};
 
-/// What is played and how, as Python's half states it in JSON.
+/// Setup of an environment, written by the Python half in JSON.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Setup {
-    /// The task.
+    /// The task of all episodes.
     pub task: Task,
-    /// How actions become trajectories.
+    /// Conversion of actions to trajectories.
     pub interpolation: Interpolation,
-    /// What an action's numbers mean.
+    /// Meaning of an action's numbers.
     pub action_mode: ActionMode,
-    /// Bring numbers that are too large to their bounds, instead of refusing them.
+    /// Clip numbers to their bounds instead of refusing them.
     pub clip_actions: bool,
-    /// Perturbations.
+    /// Active factors of perturbation.
     pub factors: Vec<Factor>,
-    /// Their magnitudes.
+    /// Magnitudes of the factors.
     pub perturbations: PerturbationSettings,
-    /// The season's plant; `None` draws each world's from its own seed.
+    /// Seed of the plant; `None` draws the plant of each world from the world's seed.
     pub mismatch_seed: Option<Seed>,
-    /// Control steps after which an episode is cut off.
+    /// Control steps after which an episode is truncated.
     pub max_episode_steps: u32,
 }
 
 impl Setup {
-    /// Reads what Python's half has checked already, but for magnitudes.
+    /// Parses a setup. The Python half has checked all but the magnitudes.
     ///
     /// # Errors
-    /// If it is none.
+    /// If the setup is invalid.
     pub fn read(json: &str) -> PyResult<Self> {
         let setup: Self = serde_json::from_str(json)
-            .map_err(|error| argument("setup", "what the environments write", error))?;
+            .map_err(|error| argument_error("setup", "what the environments write", error))?;
         if !(1..=EPISODE_STEPS).contains(&setup.max_episode_steps) {
-            return Err(argument(
+            return Err(argument_error(
                 "max_episode_steps",
                 format!("1 to {EPISODE_STEPS}"),
                 setup.max_episode_steps,
@@ -51,15 +51,15 @@ impl Setup {
         setup
             .perturbations
             .check()
-            .map_err(|error| argument("perturbations", "magnitudes that a world has", error))?;
+            .map_err(|error| argument_error("perturbations", "magnitudes that a world has", error))?;
         let magnitudes = &setup.perturbations;
         let is_drawn = setup.factors.contains(&Factor::ModelMismatch);
-        // Thousands of draws in vain would look like a hang.
+        // Thousands of unsuccessful draws would look like a hang.
         if is_drawn
             && magnitudes.model_mismatch != PerturbationSettings::default().model_mismatch
             && !Plant::can_be_drawn(magnitudes, Seed::from_number(0))
         {
-            return Err(argument(
+            return Err(argument_error(
                 "perturbations",
                 "magnitudes of model_mismatch under which a plant has such a static error",
                 "some under which none was found",
@@ -75,7 +75,7 @@ impl Setup {
             .fold(Factors::NONE, |set, factor| set.with(*factor))
     }
 
-    /// How this setup's actions are read.
+    /// The format of this setup's actions.
     pub fn actions(&self) -> Actions {
         Actions {
             mode: self.action_mode,
@@ -84,18 +84,18 @@ impl Setup {
         }
     }
 
-    /// Numbers in an observation.
+    /// Count of numbers in an observation.
     pub fn observation_len(&self) -> usize {
         faceoff_sim::channel::observation::len(self.task)
     }
 
-    /// The plant of a world whose seed this is.
+    /// The plant of a world with this seed.
     pub fn plant(&self, seed: Seed) -> Plant {
         let season = self.mismatch_seed.unwrap_or_else(|| seed.model_mismatch());
         Plant::under(self.factor_set(), &self.perturbations, season)
     }
 
-    /// An episode at its start.
+    /// A new episode; `puck` replaces its initial state of the puck.
     pub fn episode(
         &self,
         plant: &Plant,

@@ -1,7 +1,7 @@
-//! The exact state of a world, to come back to.
+//! Saved states of worlds.
 
 use crate::{
-    errors::{argument, fenced},
+    errors::{argument_error, catch_panic},
     setup::Setup,
     world::{Origin, World, check_puck},
 };
@@ -12,8 +12,8 @@ use pyo3::{
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
-/// The exact state of a world. In memory it is a copy; pickled it is the episode and its actions so far, which are
-/// played again when it is loaded.
+/// The exact state of a world. In memory it is a copy; pickled it is the episode with its actions so far, which are
+/// simulated again on loading.
 #[pyclass(frozen, module = "faceoff._native")]
 pub struct Snapshot {
     pub setup: Arc<Setup>,
@@ -22,7 +22,7 @@ pub struct Snapshot {
 
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Written {
+struct SavedState {
     faceoff: String,
     setup: Setup,
     seed: u64,
@@ -33,7 +33,7 @@ struct Written {
 
 #[pymethods]
 impl Snapshot {
-    /// What the environment plays: as it was made with.
+    /// The seed of the world.
     #[getter]
     fn seed(&self) -> u64 {
         self.world.origin.seed
@@ -45,7 +45,7 @@ impl Snapshot {
         self.world.origin.number
     }
 
-    /// Control steps played.
+    /// Control steps of the episode so far.
     #[getter]
     fn steps(&self) -> u32 {
         self.world.episode.steps()
@@ -61,7 +61,7 @@ impl Snapshot {
         )
     }
 
-    // A world that was started anew and played equally is the same, to the last bit.
+    // A snapshot is immutable, so a copy is the same object.
     fn __copy__(slf: Py<Self>) -> Py<Self> {
         slf
     }
@@ -74,7 +74,7 @@ impl Snapshot {
         &self,
         py: Python<'py>,
     ) -> PyResult<(Bound<'py, PyAny>, (Bound<'py, PyBytes>,))> {
-        let written = Written {
+        let saved = SavedState {
             faceoff: env!("CARGO_PKG_VERSION").to_owned(),
             setup: Setup::clone(&self.setup),
             seed: self.world.origin.seed,
@@ -82,43 +82,43 @@ impl Snapshot {
             puck: self.world.origin.puck,
             actions: self.world.actions.clone(),
         };
-        let json = serde_json::to_vec(&written)
-            .map_err(|error| argument("state", "one that can be written", error))?;
+        let json = serde_json::to_vec(&saved)
+            .map_err(|error| argument_error("state", "one that can be saved", error))?;
         let load = py.import("faceoff._native")?.getattr("load_snapshot")?;
         Ok((load, (PyBytes::new(py, &json),)))
     }
 }
 
-/// Reads a pickled state and plays it again.
+/// Loads a pickled state by simulating its episode again.
 #[pyfunction]
 pub fn load_snapshot(py: Python<'_>, data: &[u8]) -> PyResult<Snapshot> {
-    let written: Written = serde_json::from_slice(data)
-        .map_err(|error| argument("state", "one that faceoff has pickled", error))?;
-    let here = env!("CARGO_PKG_VERSION");
-    if written.faceoff != here {
-        return Err(argument(
+    let saved: SavedState = serde_json::from_slice(data)
+        .map_err(|error| argument_error("state", "one that faceoff has pickled", error))?;
+    let own_version = env!("CARGO_PKG_VERSION");
+    if saved.faceoff != own_version {
+        return Err(argument_error(
             "state",
             format!(
-                "one pickled by this version of faceoff, {here}, which alone plays it again exactly"
+                "one pickled by this version of faceoff, {own_version}, which alone plays it again exactly"
             ),
             format!(
                 "one of version {}",
-                faceoff_types::harmless(&written.faceoff)
+                faceoff_types::escape_unprintable(&saved.faceoff)
             ),
         ));
     }
-    let setup = serde_json::to_string(&written.setup)
-        .map_err(|error| argument("state", "a setup that can be read", error))?;
+    let setup = serde_json::to_string(&saved.setup)
+        .map_err(|error| argument_error("state", "a setup that can be read", error))?;
     let setup = Setup::read(&setup)?;
-    if let Some(puck) = &written.puck {
+    if let Some(puck) = &saved.puck {
         check_puck(setup.task, puck)?;
     }
     let origin = Origin {
-        seed: written.seed,
-        number: written.episode,
-        puck: written.puck,
+        seed: saved.seed,
+        number: saved.episode,
+        puck: saved.puck,
     };
-    let world = py.detach(|| fenced(|| World::replay(&setup, origin, written.actions)))?;
+    let world = py.detach(|| catch_panic(|| World::replay(&setup, origin, saved.actions)))?;
     Ok(Snapshot {
         setup: Arc::new(setup),
         world,

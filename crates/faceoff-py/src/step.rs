@@ -1,4 +1,4 @@
-//! A control step of some worlds.
+//! A control step of several worlds.
 
 use crate::{
     outputs::{FACTS, Outputs, write_facts},
@@ -9,19 +9,19 @@ use faceoff_sim::{ConstraintValues, Episode, StepOutcome, step_together};
 use faceoff_types::EpisodeEnd;
 use serde::Deserialize;
 
-/// What becomes of a world whose episode has ended.
+/// When a world whose episode has ended begins the next one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Autoreset {
-    /// Its next step begins the next episode, whatever the action.
+    /// The next step begins the next episode and ignores the action.
     NextStep,
-    /// The step that ends it begins the next one.
+    /// The step that ends the episode begins the next one.
     SameStep,
-    /// It waits for a reset; a step before that is refused.
+    /// Only a reset begins the next episode; steps before it are refused.
     Disabled,
 }
 
-/// Steps worlds that follow each other; `actions` is [worlds][action], checked.
+/// Steps consecutive worlds; `actions` is [worlds][action], checked.
 pub fn step(
     setup: &Setup,
     autoreset: Autoreset,
@@ -51,12 +51,12 @@ pub fn step(
         .enumerate()
         .filter(|(row, _)| is_stepped[*row]);
     for ((row, world), outcome) in stepped.zip(&outcomes) {
-        let stepped = world.stepped(setup, outcome);
-        outputs.rewards[row] = stepped.reward;
+        let result = world.apply_step(setup, outcome);
+        outputs.rewards[row] = result.reward;
         outputs.terminated[row] = !matches!(world.end, None | Some(EpisodeEnd::Horizon));
         outputs.truncated[row] = world.end == Some(EpisodeEnd::Horizon);
         let facts = &mut outputs.facts[row * FACTS..][..FACTS];
-        write_facts(world, &stepped.constraints, facts);
+        write_facts(world, &result.constraints, facts);
         outputs.write_state(row, world);
         if world.end.is_some() && autoreset == Autoreset::SameStep {
             outputs.write_final_observation(row, world);
@@ -67,7 +67,7 @@ pub fn step(
     }
 }
 
-/// Steps the episodes of the worlds that are to be stepped; an outcome for each of those.
+/// Steps the episodes of the worlds marked in `is_stepped`; returns an outcome for each of them.
 fn step_episodes(
     worlds: &mut [World],
     is_stepped: &[bool],

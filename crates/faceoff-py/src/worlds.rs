@@ -1,8 +1,8 @@
-//! The worlds of an environment, as Python's half drives them.
+//! The worlds of an environment, driven by the Python half.
 
 use crate::{
-    errors::{ClosedError, OrderError, argument, broken, fenced, words},
-    outputs::{OwnRows, with_worlds},
+    errors::{ClosedError, OrderError, argument_error, simulator_error, catch_panic, panic_message},
+    outputs::{OwnedRows, chunks_with_worlds},
     pool::Pool,
     rows::Rows,
     setup::Setup,
@@ -22,12 +22,12 @@ use std::{
     },
 };
 
-/// Lanes in which worlds are stepped: a thread's piece is a multiple of it.
+/// Worlds that the simulator steps in SIMD lanes; the size of a chunk is a multiple of it.
 const LANES: usize = 4;
-/// Pieces per thread, so that one whose worlds take longer does not keep the others waiting.
-const PIECES_PER_THREAD: usize = 4;
+/// Chunks per thread, for balancing: worlds take different times.
+const CHUNKS_PER_THREAD: usize = 4;
 
-/// Worlds of one setup; environments of one world and of many are both made of them.
+/// Worlds of one setup, for environments of one world or of many.
 #[pyclass(module = "faceoff._native")]
 pub struct Worlds {
     setup: Arc<Setup>,
@@ -38,36 +38,36 @@ pub struct Worlds {
 }
 
 enum State {
-    /// Nothing is under way; no worlds before the first reset.
+    /// No step is running; empty before the first reset.
     Idle(Vec<World>),
-    /// A step that was sent.
-    Sent(Sent),
+    /// A step that was sent is running.
+    Sent(SentStep),
     Closed,
     /// A step panicked.
-    Broken,
+    Failed,
 }
 
-struct Sent {
-    by_process: u32,
-    result: Mutex<Receiver<Result<Stepped, String>>>,
+struct SentStep {
+    process_id: u32,
+    result: Mutex<Receiver<Result<StepOutput, String>>>,
 }
 
-/// Worlds after a step, and what it led to.
-type Stepped = (Vec<World>, OwnRows);
+/// Worlds after a step, and its results.
+type StepOutput = (Vec<World>, OwnedRows);
 
 #[pymethods]
 impl Worlds {
-    /// Checked arguments of Python's half; worlds come with the first reset.
+    /// Arguments were checked by the Python half. The first reset creates the worlds.
     #[new]
     fn new(setup: &str, count: usize, threads: usize, autoreset: &str) -> PyResult<Self> {
         let autoreset = match autoreset {
             "next_step" => Autoreset::NextStep,
             "same_step" => Autoreset::SameStep,
             "disabled" => Autoreset::Disabled,
-            other => return Err(argument("autoreset_mode", "an AutoresetMode", other)),
+            other => return Err(argument_error("autoreset_mode", "an AutoresetMode", other)),
         };
         if count == 0 || threads == 0 {
-            return Err(argument("num_envs, threads", "at least 1", 0));
+            return Err(argument_error("num_envs, threads", "at least 1", 0));
         }
         Ok(Self {
             setup: Arc::new(Setup::read(setup)?),
@@ -78,8 +78,8 @@ impl Worlds {
         })
     }
 
-    /// Resets the worlds of the mask: to the given episode of the given seed, or without a seed to the episode after
-    /// the last one. Rows of others are not written.
+    /// Resets the worlds of the mask to episode `number` of their seed, or without a seed to the episode after the last
+    /// one. Rows of other worlds are not written.
     fn reset(
         slf: &Bound<'_, Self>,
         py: Python<'_>,
@@ -95,12 +95,12 @@ impl Worlds {
         let mask = mask.as_slice()?;
         if mask.len() != this.count || seeds.len() != this.count {
             let expected = format!("one for each of {} worlds", this.count);
-            return Err(argument("mask, seeds", expected, mask.len()));
+            return Err(argument_error("mask, seeds", expected, mask.len()));
         }
         if let Some(puck) = &puck {
             check_puck(setup.task, puck)?;
         }
-        let worlds = this.state.idle()?;
+        let worlds = this.state.idle_worlds()?;
         if worlds.is_empty() && (mask.contains(&false) || seeds.contains(&None)) {
             return Err(OrderError::new_err(
                 "reset: expected a reset of all worlds first, got one of some",
@@ -114,9 +114,9 @@ impl Worlds {
             }),
             puck,
         };
-        let pool = threads(&mut this.pool)?;
+        let pool = pool_if_parallel(&mut this.pool)?;
         let started: Vec<Option<World>> = py.detach(|| {
-            fenced(|| {
+            catch_panic(|| {
                 let start = |index: usize| {
                     let world = worlds.get(index);
                     mask[index].then(|| World::start(setup, origin(index, world), world))
@@ -130,12 +130,12 @@ impl Worlds {
             })
         })?;
         let mut worlds_after = Vec::with_capacity(started.len());
-        let mut before = std::mem::take(worlds).into_iter();
+        let mut previous = std::mem::take(worlds).into_iter();
         for (row, started) in started.into_iter().enumerate() {
-            let before = before.next();
+            let previous = previous.next();
             let is_new = started.is_some();
-            let Some(world) = started.or(before) else {
-                return Err(broken("a world is missing"));
+            let Some(world) = started.or(previous) else {
+                return Err(simulator_error("a world is missing"));
             };
             if is_new {
                 outputs.write_start(row, &world);
@@ -146,7 +146,7 @@ impl Worlds {
         Ok(())
     }
 
-    /// One control step of every world; `actions` is [worlds][action]. The interpreter is free meanwhile.
+    /// One control step of every world; `actions` is [worlds][action]. The interpreter's lock is released.
     fn step(
         slf: &Bound<'_, Self>,
         py: Python<'_>,
@@ -155,21 +155,21 @@ impl Worlds {
     ) -> PyResult<()> {
         let this = &mut *borrow(slf)?;
         let mut outputs = rows.outputs(this.count, this.setup.observation_len())?;
-        let actions = this.checked(&actions)?;
-        let pool = threads(&mut this.pool)?;
+        let actions = this.check_actions(&actions)?;
+        let pool = pool_if_parallel(&mut this.pool)?;
         let (setup, autoreset) = (&*this.setup, this.autoreset);
-        let worlds = this.state.idle()?;
-        // As much as a step of all worlds: a panic leaves them in the middle of it.
+        let worlds = this.state.idle_worlds()?;
+        // A panic leaves worlds in the middle of a step, so all of them become unusable.
         let stepped = py.detach(|| {
-            fenced(|| {
+            catch_panic(|| {
                 match pool {
                     None => step(setup, autoreset, worlds, actions, &mut outputs),
                     Some(pool) => {
-                        let at_a_time = worlds_at_a_time(worlds.len(), pool.current_num_threads());
+                        let chunk_size = worlds_per_chunk(worlds.len(), pool.current_num_threads());
                         let len = setup.interpolation.len();
                         pool.install(|| {
-                            with_worlds(worlds, outputs, at_a_time)
-                                .zip(actions.par_chunks(at_a_time * len))
+                            chunks_with_worlds(worlds, outputs, chunk_size)
+                                .zip(actions.par_chunks(chunk_size * len))
                                 .for_each(|((worlds, mut outputs), actions)| {
                                     step(setup, autoreset, worlds, actions, &mut outputs);
                                 });
@@ -180,41 +180,41 @@ impl Worlds {
             })
         });
         if stepped.is_err() {
-            this.state = State::Broken;
+            this.state = State::Failed;
         }
         stepped
     }
 
-    /// Begins a step, which goes on while Python does something else; [`Self::recv`] ends it.
+    /// Begins a step in the background; [`Self::recv`] waits for it.
     fn send(
         slf: &Bound<'_, Self>,
         actions: PyReadonlyArray2<'_, f64>,
         states: bool,
     ) -> PyResult<()> {
         let this = &mut *borrow(slf)?;
-        let actions = this.checked(&actions)?.to_vec();
-        let pool = this.pool.here()?;
+        let actions = this.check_actions(&actions)?.to_vec();
+        let pool = this.pool.get_or_start()?;
         let (setup, autoreset) = (Arc::clone(&this.setup), this.autoreset);
-        let mut worlds = std::mem::take(this.state.idle()?);
+        let mut worlds = std::mem::take(this.state.idle_worlds()?);
         let (sender, result) = channel();
-        let at_a_time = worlds_at_a_time(worlds.len(), pool.current_num_threads());
+        let chunk_size = worlds_per_chunk(worlds.len(), pool.current_num_threads());
         pool.spawn(move || {
             let work = || {
-                let mut own = OwnRows::new(&setup, worlds.len(), states);
+                let mut owned = OwnedRows::new(&setup, worlds.len(), states);
                 let len = setup.interpolation.len();
-                with_worlds(&mut worlds, own.rows(), at_a_time)
-                    .zip(actions.par_chunks(at_a_time * len))
+                chunks_with_worlds(&mut worlds, owned.rows(), chunk_size)
+                    .zip(actions.par_chunks(chunk_size * len))
                     .for_each(|((worlds, mut outputs), actions)| {
                         step(&setup, autoreset, worlds, actions, &mut outputs);
                     });
-                (worlds, own)
+                (worlds, owned)
             };
             let stepped = catch_unwind(AssertUnwindSafe(work));
-            // Nobody receives it if the environment was closed meanwhile.
-            let _ = sender.send(stepped.map_err(|panic| words(panic.as_ref())));
+            // The receiver is gone if the environment was closed meanwhile.
+            let _ = sender.send(stepped.map_err(|panic| panic_message(panic.as_ref())));
         });
-        this.state = State::Sent(Sent {
-            by_process: process::id(),
+        this.state = State::Sent(SentStep {
+            process_id: process::id(),
             result: Mutex::new(result),
         });
         Ok(())
@@ -224,8 +224,8 @@ impl Worlds {
     fn recv(slf: &Bound<'_, Self>, py: Python<'_>, mut rows: Rows<'_>) -> PyResult<()> {
         let this = &mut *borrow(slf)?;
         let mut outputs = rows.outputs(this.count, this.setup.observation_len())?;
-        let (worlds, own) = this.state.received(py)?;
-        own.copy_to(&mut outputs);
+        let (worlds, owned) = this.state.receive(py)?;
+        owned.copy_to(&mut outputs);
         this.state = State::Idle(worlds);
         Ok(())
     }
@@ -238,7 +238,7 @@ impl Worlds {
         Ok(Snapshot { setup, world })
     }
 
-    /// Brings a world to a state that was saved of an environment with the same setup, and writes its row.
+    /// Restores a state that was saved in an environment with the same setup, and writes the world's row.
     fn restore(
         slf: &Bound<'_, Self>,
         index: usize,
@@ -249,14 +249,14 @@ impl Worlds {
         let snapshot = snapshot.get();
         let (count, len) = (this.count, this.setup.observation_len());
         if *snapshot.setup != *this.setup {
-            return Err(argument(
+            return Err(argument_error(
                 "state",
                 "one of an environment with the same task, actions, interpolation, perturbations and horizon",
                 "one of another environment",
             ));
         }
         let mut outputs = rows.outputs(count, len)?;
-        let worlds = this.state.idle()?;
+        let worlds = this.state.idle_worlds()?;
         if worlds.is_empty() && count == 1 {
             worlds.push(snapshot.world.clone());
         }
@@ -266,12 +266,12 @@ impl Worlds {
         Ok(())
     }
 
-    /// Which seed and episode each world plays.
+    /// The seed and episode number of each world.
     fn origins(slf: &Bound<'_, Self>) -> PyResult<Vec<(u64, u32)>> {
         let this = &mut *borrow(slf)?;
-        let worlds = this.state.idle()?;
-        let of = |world: &World| (world.origin.seed, world.origin.number);
-        Ok(worlds.iter().map(of).collect())
+        let worlds = this.state.idle_worlds()?;
+        let origin = |world: &World| (world.origin.seed, world.origin.number);
+        Ok(worlds.iter().map(origin).collect())
     }
 
     /// The true state of a world, see [`crate::world::STATE_LEN`].
@@ -280,19 +280,19 @@ impl Worlds {
         Ok(this.world(index)?.state().to_vec())
     }
 
-    /// Is a step under way that was sent?
+    /// Whether a step that was sent is running.
     #[getter]
     fn is_sent(slf: &Bound<'_, Self>) -> PyResult<bool> {
         Ok(matches!(borrow(slf)?.state, State::Sent(_)))
     }
 
-    /// Threads of the pool.
+    /// Number of threads of the pool.
     #[getter]
     fn threads(slf: &Bound<'_, Self>) -> PyResult<usize> {
         Ok(borrow(slf)?.pool.threads())
     }
 
-    /// Gives up worlds and threads. What is used afterwards is refused.
+    /// Releases worlds and threads. Later calls are refused.
     fn close(slf: &Bound<'_, Self>) -> PyResult<()> {
         let this = &mut *borrow(slf)?;
         this.state = State::Closed;
@@ -302,44 +302,44 @@ impl Worlds {
 }
 
 impl Worlds {
-    fn checked<'a>(&self, actions: &'a PyReadonlyArray2<'_, f64>) -> PyResult<&'a [f64]> {
+    fn check_actions<'a>(&self, actions: &'a PyReadonlyArray2<'_, f64>) -> PyResult<&'a [f64]> {
         let reader = self.setup.actions();
         if actions.shape() != [self.count, reader.len()] {
-            return Err(argument(
+            return Err(argument_error(
                 "action",
                 format!("an array of shape ({}, {})", self.count, reader.len()),
                 format!("one of shape {:?}", actions.shape()),
             ));
         }
         let actions = actions.as_slice()?;
-        let alone = self.count == 1;
-        reader.check(actions, |at| {
-            if alone {
+        let is_single = self.count == 1;
+        reader.check(actions, |index| {
+            if is_single {
                 String::new()
             } else {
-                format!(" of world {at}")
+                format!(" of world {index}")
             }
         })?;
         if let State::Idle(worlds) = &self.state {
-            check_order(worlds, self.autoreset)?;
+            check_call_order(worlds, self.autoreset)?;
         }
         Ok(actions)
     }
 
     fn world(&mut self, index: usize) -> PyResult<&mut World> {
         let count = self.count;
-        let worlds = self.state.idle()?;
+        let worlds = self.state.idle_worlds()?;
         if worlds.is_empty() {
-            return Err(never_reset());
+            return Err(missing_reset_error());
         }
         worlds
             .get_mut(index)
-            .ok_or_else(|| argument("index", format!("below {count}"), index))
+            .ok_or_else(|| argument_error("index", format!("below {count}"), index))
     }
 }
 
 impl State {
-    fn idle(&mut self) -> PyResult<&mut Vec<World>> {
+    fn idle_worlds(&mut self) -> PyResult<&mut Vec<World>> {
         match self {
             Self::Idle(worlds) => Ok(worlds),
             Self::Sent(_) => Err(OrderError::new_err(
@@ -348,18 +348,18 @@ impl State {
             Self::Closed => Err(ClosedError::new_err(
                 "expected an open environment, got one that was closed: make a new one",
             )),
-            Self::Broken => Err(broken("an earlier step did")),
+            Self::Failed => Err(simulator_error("an earlier step failed")),
         }
     }
 
-    fn received(&mut self, py: Python<'_>) -> PyResult<Stepped> {
+    fn receive(&mut self, py: Python<'_>) -> PyResult<StepOutput> {
         let Self::Sent(sent) = self else {
-            self.idle()?;
+            self.idle_worlds()?;
             return Err(OrderError::new_err(
                 "recv: expected a step that was sent, got none: call send() first",
             ));
         };
-        if sent.by_process != process::id() {
+        if sent.process_id != process::id() {
             return Err(OrderError::new_err(
                 "recv: expected a step that this process sent, got one of the process that it was forked from, whose \
                  threads are not here: make a new environment",
@@ -370,19 +370,19 @@ impl State {
             let result = result.lock().unwrap_or_else(PoisonError::into_inner);
             result.recv()
         });
-        let words = match received {
+        let message = match received {
             Ok(Ok(both)) => return Ok(both),
-            Ok(Err(words)) => words,
-            Err(_) => "the step was given up".to_owned(),
+            Ok(Err(message)) => message,
+            Err(_) => "the step was aborted".to_owned(),
         };
-        *self = Self::Broken;
-        Err(broken(&words))
+        *self = Self::Failed;
+        Err(simulator_error(&message))
     }
 }
 
-fn check_order(worlds: &[World], autoreset: Autoreset) -> PyResult<()> {
+fn check_call_order(worlds: &[World], autoreset: Autoreset) -> PyResult<()> {
     if worlds.is_empty() {
-        return Err(never_reset());
+        return Err(missing_reset_error());
     }
     if autoreset != Autoreset::Disabled {
         return Ok(());
@@ -399,21 +399,21 @@ fn check_order(worlds: &[World], autoreset: Autoreset) -> PyResult<()> {
     }
 }
 
-fn never_reset() -> PyErr {
+fn missing_reset_error() -> PyErr {
     OrderError::new_err("expected reset() first, got another call")
 }
 
-/// The pool, or none where one thread does all: the caller's own is as good.
-fn threads(pool: &mut Pool) -> PyResult<Option<&rayon::ThreadPool>> {
+/// The pool, or `None` for a single thread, where the calling thread does the work.
+fn pool_if_parallel(pool: &mut Pool) -> PyResult<Option<&rayon::ThreadPool>> {
     match pool.threads() {
         1 => Ok(None),
-        _ => pool.here().map(Some),
+        _ => pool.get_or_start().map(Some),
     }
 }
 
-fn worlds_at_a_time(worlds: usize, threads: usize) -> usize {
+fn worlds_per_chunk(worlds: usize, threads: usize) -> usize {
     worlds
-        .div_ceil(threads * PIECES_PER_THREAD)
+        .div_ceil(threads * CHUNKS_PER_THREAD)
         .next_multiple_of(LANES)
 }
 

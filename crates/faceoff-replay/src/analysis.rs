@@ -1,72 +1,73 @@
-//! What a game's clips say of the play: how the score came about, who had the puck, who shot, who broke limits where.
+//! Analysis of a game's clips: goals, possession, shots and violations.
 
 use crate::{
     clip::Clip,
     error::ReplayError,
     group::Group,
-    header::{Break, BreakKind, Contact, ContactWith},
+    header::{RallyEndEvent, RallyEndKind, Contact, ContactWith},
 };
 use std::collections::VecDeque;
 
-/// What the clips of a game say. Sides are 0 and 1; places are in the table's frame, in m.
+/// The analysis of a game. Sides are 0 and 1; positions are in the table frame, in metres.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct GameAnalysis {
-    /// Control steps that were looked at.
+    /// Number of analysed control steps.
     pub steps: u32,
     /// The ends of rallies, in order.
-    pub breaks: Vec<Break>,
-    /// Control steps after which the puck lay on each side's half.
+    pub breaks: Vec<RallyEndEvent>,
+    /// Number of control steps after which the puck was in each side's half.
     pub halves: [u32; 2],
-    /// Control steps after which each side had touched the puck last in the rally.
+    /// Number of control steps after which each side had touched the puck last in the rally.
     pub touched: [u32; 2],
-    /// Those before either had touched it in the rally.
+    /// Number of control steps before the first touch of a rally.
     pub untouched: u32,
-    /// The puck's ways into the goals, in order.
-    pub goals: Vec<GoalWay>,
-    /// Each time that a mallet sent the puck over the middle line.
+    /// The puck's paths into the goals, in order.
+    pub goals: Vec<GoalPath>,
+    /// The shots: a mallet sent the puck over the middle line.
     pub shots: Vec<Shot>,
-    /// Limits that were broken, in order.
-    pub breaches: Vec<Breach>,
+    /// Violations, in the order of their first sample.
+    pub violations: Vec<LocatedViolation>,
 }
 
-/// How the puck came into a goal: in the last [`GOAL_WAY_STEPS`] control steps at most, and no further back than its rally.
+/// The path of the puck into a goal: over at most the last [`GOAL_PATH_STEPS`] control steps of its rally.
 #[derive(Debug, Clone, PartialEq)]
-pub struct GoalWay {
+pub struct GoalPath {
     pub side: usize,
     /// The rally's last sample.
     pub sample: u32,
-    /// Where the puck was.
-    pub places: Vec<[f64; 2]>,
+    /// Positions of the puck.
+    pub positions: Vec<[f64; 2]>,
 }
 
-/// Control steps of the way into a goal: two seconds.
-pub const GOAL_WAY_STEPS: usize = 100;
+/// Maximum length of a path into a goal in control steps: two seconds.
+pub const GOAL_PATH_STEPS: usize = 100;
 
-/// A mallet touched the puck, which crossed the middle line towards the other side before any mallet touched it again.
+/// A shot: after a touch by the side's mallet, the puck crossed the middle line towards the other side without another
+/// touch.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Shot {
     pub side: usize,
-    /// When it was touched: s since sample 0.
+    /// Time of the touch, s since sample 0.
     pub t: f64,
-    /// Where the puck was then.
+    /// Position of the puck at the touch.
     pub at: [f64; 2],
-    /// How fast the puck was at the first sample beyond the middle line, m/s.
+    /// Speed of the puck at the first sample beyond the middle line, m/s.
     pub speed: f64,
-    /// Did the rally end in a goal of that side before the puck crossed the middle line again?
+    /// Did the rally end with a goal of that side before the puck crossed the middle line again?
     pub goal: bool,
 }
 
-/// A limit was broken over some samples.
+/// A violation of a constraint, with the position of the mallet.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Breach {
+pub struct LocatedViolation {
     pub side: usize,
     pub group: Group,
     /// The first sample.
     pub from: u32,
     pub to: u32,
-    /// By how much at most: rad, rad/s or m.
+    /// Largest excess over the limit: rad, rad/s or m.
     pub worst: f64,
-    /// Where the side's mallet was at the first.
+    /// Position of the side's mallet at the first sample.
     pub at: [f64; 2],
 }
 
@@ -77,44 +78,44 @@ struct Touch {
     has_crossed: bool,
 }
 
-/// What is carried from clip to clip.
+/// State that is carried from clip to clip.
 #[derive(Debug, Default)]
-struct Watch {
-    found: GameAnalysis,
+struct Analyzer {
+    analysis: GameAnalysis,
     touch: Option<Touch>,
-    /// The shot by which the puck came to lie on the half where it is, among those found.
+    /// Index of the shot that brought the puck into its current half.
     open: Option<usize>,
-    /// Where the puck was last in the rally.
-    way: VecDeque<[f64; 2]>,
+    /// The last positions of the puck in the rally.
+    path: VecDeque<[f64; 2]>,
 }
 
 impl GameAnalysis {
-    /// Of all clips of a game's motion, in order.
+    /// Analyses all motion clips of a game, in order.
     ///
     /// # Errors
-    /// That of a clip.
-    pub fn of(
+    /// The first error of a clip.
+    pub fn from_clips(
         clips: impl IntoIterator<Item = Result<Clip, ReplayError>>,
     ) -> Result<Self, ReplayError> {
-        let mut watch = Watch::default();
+        let mut analyzer = Analyzer::default();
         for clip in clips {
-            watch.see(&clip?);
+            analyzer.add_clip(&clip?);
         }
-        let mut found = watch.found;
-        found.breaches.sort_by_key(|breach| breach.from);
-        Ok(found)
+        let mut analysis = analyzer.analysis;
+        analysis.violations.sort_by_key(|violation| violation.from);
+        Ok(analysis)
     }
 
-    /// Of a side: its shots, and how many of them were goals.
+    /// The shots of a side.
     #[must_use]
     pub fn shots_of(&self, side: usize) -> Vec<Shot> {
-        let those = self.shots.iter().filter(|shot| shot.side == side);
-        those.copied().collect()
+        let shots = self.shots.iter().filter(|shot| shot.side == side);
+        shots.copied().collect()
     }
 }
 
-impl Watch {
-    fn see(&mut self, clip: &Clip) {
+impl Analyzer {
+    fn add_clip(&mut self, clip: &Clip) {
         let header = &clip.header;
         let values = |name: &str| -> Vec<f64> {
             clip.column(name)
@@ -122,30 +123,30 @@ impl Watch {
                 .unwrap_or_default()
         };
         let (vx, vy) = (values("puck_vx"), values("puck_vy"));
-        let places = clip.puck_places();
+        let positions = clip.puck_positions();
         let mut contacts = header.contacts.iter().peekable();
         let mut breaks = header.breaks.iter().peekable();
-        // The first sample of a clip is the last of the one before, or the start.
-        for (index, place) in places.iter().enumerate().skip(1) {
+        // The first sample of a clip repeats the last one of the previous clip, or is the start.
+        for (index, position) in positions.iter().enumerate().skip(1) {
             let sample = header.first + u32::try_from(index).unwrap_or(u32::MAX);
             let end_s = f64::from(sample) * header.step_s;
-            let is_last = index + 1 == places.len();
+            let is_last = index + 1 == positions.len();
             while let Some(contact) = contacts.next_if(|contact| contact.t < end_s || is_last) {
-                self.meet(contact);
+                self.add_contact(contact);
             }
             let speed = |of: &[f64]| of.get(index).copied().unwrap_or_default();
             let (vx, vy) = (speed(&vx), speed(&vy));
-            self.lie(*place, (vx * vx + vy * vy).sqrt());
+            self.add_position(*position, (vx * vx + vy * vy).sqrt());
             while let Some(end) = breaks.next_if(|end| end.sample <= sample) {
                 self.end_rally(end);
-                self.found.breaks.push(end.clone());
+                self.analysis.breaks.push(end.clone());
             }
         }
-        self.add_breaches(clip);
+        self.add_violations(clip);
     }
 
-    /// The puck came to touch something.
-    fn meet(&mut self, contact: &Contact) {
+    /// Adds a contact of the puck.
+    fn add_contact(&mut self, contact: &Contact) {
         let side = match contact.what {
             ContactWith::Rim => return,
             ContactWith::Mallet => 0,
@@ -163,30 +164,30 @@ impl Watch {
         });
     }
 
-    /// The puck after a control step.
-    fn lie(&mut self, [x, y]: [f64; 2], speed: f64) {
+    /// Adds the puck's position after a control step.
+    fn add_position(&mut self, [x, y]: [f64; 2], speed: f64) {
         let half = usize::from(x >= 0.0);
-        if self.way.len() > GOAL_WAY_STEPS {
-            self.way.pop_front();
+        if self.path.len() > GOAL_PATH_STEPS {
+            self.path.pop_front();
         }
-        self.way.push_back([x, y]);
-        self.found.steps += 1;
-        self.found.halves[half] += 1;
+        self.path.push_back([x, y]);
+        self.analysis.steps += 1;
+        self.analysis.halves[half] += 1;
         let Self {
-            found, touch, open, ..
+            analysis, touch, open, ..
         } = self;
-        // Back on the half that it was shot from.
-        if open.is_some_and(|shot| found.shots[shot].side == half) {
+        // The puck is back in the half from which it was shot.
+        if open.is_some_and(|shot| analysis.shots[shot].side == half) {
             *open = None;
         }
         match touch {
-            None => found.untouched += 1,
+            None => analysis.untouched += 1,
             Some(touch) => {
-                found.touched[touch.shot.side] += 1;
+                analysis.touched[touch.shot.side] += 1;
                 if !touch.has_crossed && half != touch.shot.side {
                     touch.has_crossed = true;
-                    *open = Some(found.shots.len());
-                    found.shots.push(Shot {
+                    *open = Some(analysis.shots.len());
+                    analysis.shots.push(Shot {
                         speed,
                         ..touch.shot
                     });
@@ -195,47 +196,47 @@ impl Watch {
         }
     }
 
-    fn end_rally(&mut self, end: &Break) {
-        let scored = (end.what == BreakKind::Goal)
+    fn end_rally(&mut self, end: &RallyEndEvent) {
+        let scored = (end.what == RallyEndKind::Goal)
             .then_some(end.by)
             .flatten()
             .map(|by| usize::from(by == 1));
-        if let Some(shot) = self.open.take().map(|shot| &mut self.found.shots[shot]) {
+        if let Some(shot) = self.open.take().map(|shot| &mut self.analysis.shots[shot]) {
             shot.goal = scored == Some(shot.side);
         }
         self.touch = None;
-        let places = std::mem::take(&mut self.way);
+        let positions = std::mem::take(&mut self.path);
         if let Some(side) = scored {
-            self.found.goals.push(GoalWay {
+            self.analysis.goals.push(GoalPath {
                 side,
                 sample: end.sample,
-                places: places.into(),
+                positions: positions.into(),
             });
         }
     }
 
-    fn add_breaches(&mut self, clip: &Clip) {
+    fn add_violations(&mut self, clip: &Clip) {
         let first = clip.header.first;
-        for told in &clip.header.violations {
-            let side = usize::from(told.side == 1);
-            // One that goes on from the clip before is the same.
-            let before = self.found.breaches.iter_mut().rev().find(|breach| {
-                breach.side == side && breach.group == told.group && breach.to == first
+        for span in &clip.header.violations {
+            let side = usize::from(span.side == 1);
+            // A violation may continue from the previous clip.
+            let previous = self.analysis.violations.iter_mut().rev().find(|violation| {
+                violation.side == side && violation.group == span.group && violation.to == first
             });
-            match before {
-                Some(breach) if told.from == first + 1 => {
-                    breach.to = told.to;
-                    breach.worst = breach.worst.max(told.worst);
+            match previous {
+                Some(violation) if span.from == first + 1 => {
+                    violation.to = span.to;
+                    violation.worst = violation.worst.max(span.worst);
                 }
                 _ => {
-                    let index = told.from.saturating_sub(first) as usize;
-                    self.found.breaches.push(Breach {
+                    let index = span.from.saturating_sub(first) as usize;
+                    self.analysis.violations.push(LocatedViolation {
                         side,
-                        group: told.group,
-                        from: told.from,
-                        to: told.to,
-                        worst: told.worst,
-                        at: clip.mallet_place(side, index).unwrap_or_default(),
+                        group: span.group,
+                        from: span.from,
+                        to: span.to,
+                        worst: span.worst,
+                        at: clip.mallet_position(side, index).unwrap_or_default(),
                     });
                 }
             }
@@ -248,11 +249,11 @@ mod tests {
     use super::*;
     use crate::{
         column::Column,
-        header::{CLIP_FORMAT, ClipKind, Header, ViolationTold},
+        header::{CLIP_FORMAT, ClipKind, Header, ViolationSpan},
     };
     use faceoff_sim::model::CONTROL_STEP_S;
 
-    /// A clip in which the puck is at these places, one a sample, going at 2 m/s.
+    /// A clip with these x of the puck, one per sample, and a speed of 2 m/s.
     fn clip(first: u32, xs: &[f64]) -> Clip {
         let column = |name: &str, values: &[f64]| {
             let mut column = Column::new(name, "m", 1e-4, 1);
@@ -292,40 +293,40 @@ mod tests {
         Contact { t, what, x, y: 0.1 }
     }
 
-    fn goal(sample: u32, by: u32) -> Break {
-        Break {
+    fn goal(sample: u32, by: u32) -> RallyEndEvent {
+        RallyEndEvent {
             sample,
-            what: BreakKind::Goal,
+            what: RallyEndKind::Goal,
             by: Some(by),
             score: [1, 0],
         }
     }
 
-    fn of(clips: Vec<Clip>) -> GameAnalysis {
-        GameAnalysis::of(clips.into_iter().map(Ok)).unwrap()
+    fn analyse(clips: Vec<Clip>) -> GameAnalysis {
+        GameAnalysis::from_clips(clips.into_iter().map(Ok)).unwrap()
     }
 
     #[test]
-    fn a_shot_crosses_the_middle_before_another_touch_and_is_a_goal_if_the_rally_ends_in_one() {
+    fn shot_before_the_rallys_goal_is_a_goal() {
         let mut game = clip(0, &[-0.5, -0.5, -0.2, 0.2, 0.6, -0.3, -0.3]);
         game.header.contacts = vec![contact(0.021, ContactWith::Mallet, -0.45)];
         game.header.breaks = vec![goal(4, 0)];
-        let found = of(vec![game]);
-        assert_eq!(found.shots.len(), 1);
-        let shot = found.shots[0];
+        let analysis = analyse(vec![game]);
+        assert_eq!(analysis.shots.len(), 1);
+        let shot = analysis.shots[0];
         assert_eq!((shot.side, shot.goal, shot.at), (0, true, [-0.45, 0.1]));
         assert!((shot.speed - 2.0).abs() < 1e-9 && (shot.t - 0.021).abs() < 1e-9);
-        assert_eq!(found.steps, 6);
-        assert_eq!(found.halves, [4, 2], "samples 1, 2, 5, 6 and 3, 4");
-        assert_eq!(found.touched, [3, 0], "from sample 2 to the goal");
+        assert_eq!(analysis.steps, 6);
+        assert_eq!(analysis.halves, [4, 2], "samples 1, 2, 5, 6 and 3, 4");
+        assert_eq!(analysis.touched, [3, 0], "from sample 2 to the goal");
         assert_eq!(
-            found.untouched, 3,
+            analysis.untouched, 3,
             "before the touch, and in the next rally"
         );
     }
 
     #[test]
-    fn what_is_touched_again_on_the_own_half_is_no_shot_and_what_came_back_is_no_goal() {
+    fn repeated_touch_is_no_shot_and_returned_shot_no_goal() {
         let mut game = clip(0, &[-0.5, -0.5, -0.4, -0.2, 0.2, 0.6, -0.1, 0.3]);
         game.header.contacts = vec![
             contact(0.001, ContactWith::Mallet, -0.5),
@@ -334,63 +335,63 @@ mod tests {
             contact(0.105, ContactWith::OpponentMallet, 0.6),
         ];
         game.header.breaks = vec![goal(7, 0)];
-        let found = of(vec![game]);
-        let told: Vec<_> = found
+        let analysis = analyse(vec![game]);
+        let shots: Vec<_> = analysis
             .shots
             .iter()
             .map(|shot| (shot.side, shot.goal))
             .collect();
-        assert_eq!(told, [(0, false), (1, false)], "the second came back, too");
-        assert!((found.shots[0].t - 0.041).abs() < 1e-9);
+        assert_eq!(shots, [(0, false), (1, false)], "both came back");
+        assert!((analysis.shots[0].t - 0.041).abs() < 1e-9);
     }
 
     #[test]
-    fn the_way_into_a_goal_is_its_last_two_seconds() {
+    fn goal_path_has_the_last_two_seconds() {
         let mut game = clip(0, &[-0.5; 300]);
         game.header.breaks = vec![goal(250, 1)];
-        let found = of(vec![game]);
-        assert_eq!(found.goals[0].places.len(), GOAL_WAY_STEPS + 1);
+        let analysis = analyse(vec![game]);
+        assert_eq!(analysis.goals[0].positions.len(), GOAL_PATH_STEPS + 1);
     }
 
     #[test]
-    fn a_shot_that_the_other_side_deflects_into_its_own_goal_is_a_goal() {
+    fn deflected_shot_into_own_goal_is_a_goal() {
         let mut game = clip(0, &[-0.5, -0.2, 0.2, 0.6, 0.9]);
         game.header.contacts = vec![
             contact(0.001, ContactWith::Mallet, -0.5),
             contact(0.050, ContactWith::OpponentMallet, 0.5),
         ];
         game.header.breaks = vec![goal(4, 0)];
-        let found = of(vec![game]);
-        assert_eq!(found.shots.len(), 1);
-        assert!(found.shots[0].goal);
+        let analysis = analyse(vec![game]);
+        assert_eq!(analysis.shots.len(), 1);
+        assert!(analysis.shots[0].goal);
     }
 
     #[test]
-    fn a_shot_and_a_broken_limit_go_on_in_the_next_clip() {
-        let broken = |from, to, worst| ViolationTold {
+    fn shots_and_violations_continue_across_clips() {
+        let violation_span = |from, to, worst| ViolationSpan {
             side: 1,
             group: Group::Ee,
             from,
             to,
             worst,
         };
-        let mut before = clip(0, &[0.5, 0.4, 0.1]);
-        before.header.contacts = vec![contact(0.001, ContactWith::OpponentMallet, 0.5)];
-        before.header.violations = vec![broken(2, 2, 0.01)];
-        let mut after = clip(2, &[0.1, -0.1, -0.9]);
-        after.header.violations = vec![broken(3, 4, 0.03)];
-        after.header.breaks = vec![goal(4, 1)];
-        let found = of(vec![before, after]);
+        let mut first = clip(0, &[0.5, 0.4, 0.1]);
+        first.header.contacts = vec![contact(0.001, ContactWith::OpponentMallet, 0.5)];
+        first.header.violations = vec![violation_span(2, 2, 0.01)];
+        let mut second = clip(2, &[0.1, -0.1, -0.9]);
+        second.header.violations = vec![violation_span(3, 4, 0.03)];
+        second.header.breaks = vec![goal(4, 1)];
+        let analysis = analyse(vec![first, second]);
         assert_eq!(
-            found.steps, 4,
+            analysis.steps, 4,
             "the sample that both clips have counts once"
         );
-        assert_eq!(found.shots.len(), 1);
-        assert!(found.shots[0].goal && found.shots[0].side == 1);
-        assert_eq!(found.breaches.len(), 1);
-        let breach = found.breaches[0];
-        assert_eq!((breach.from, breach.to), (2, 4));
-        assert!((breach.worst - 0.03).abs() < 1e-12);
-        assert_eq!(found.touched, [0, 4]);
+        assert_eq!(analysis.shots.len(), 1);
+        assert!(analysis.shots[0].goal && analysis.shots[0].side == 1);
+        assert_eq!(analysis.violations.len(), 1);
+        let violation = analysis.violations[0];
+        assert_eq!((violation.from, violation.to), (2, 4));
+        assert!((violation.worst - 0.03).abs() < 1e-12);
+        assert_eq!(analysis.touched, [0, 4]);
     }
 }

@@ -1,4 +1,4 @@
-//! A clip as bytes.
+//! Reading and writing of clips.
 
 use crate::{
     column::Column,
@@ -12,12 +12,12 @@ use std::io::{self, Read};
 /// A header and its columns.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Clip {
-    /// What it says of itself; the columns are filled in when it is written.
+    /// The header; its `columns` are set when the clip is written.
     pub header: Header,
     pub columns: Vec<Column>,
 }
 
-/// The largest clip that is read: what claims to be more is no clip.
+/// Maximum uncompressed size of a clip, in bytes.
 const MAX_BYTES: u64 = 64 << 20;
 
 impl Clip {
@@ -27,12 +27,12 @@ impl Clip {
         self.columns.iter().find(|column| column.name == name)
     }
 
-    /// The clip's bytes, gzip-compressed, as servers send and packs keep them. The same clip gives the same bytes.
+    /// The gzip-compressed bytes of the clip, as stored in packs and sent by servers. The same clip gives the same bytes.
     ///
     /// # Errors
-    /// [`ReplayError::Io`], if memory cannot be written; [`ReplayError::Unreadable`] for what is too long.
+    /// [`ReplayError::Io`] if writing to memory fails; [`ReplayError::Unreadable`] if the clip is too long.
     pub(crate) fn compressed(&self, gzip: &mut Gzip) -> Result<Vec<u8>, ReplayError> {
-        let too_long = || ReplayError::unreadable("what was recorded", "it is too long");
+        let too_long = || ReplayError::unreadable("the recording", "it is too long");
         let values: usize = self.columns.iter().map(|column| column.counts.len()).sum();
         let mut payload = Vec::with_capacity(2 * values);
         let mut header = self.header.clone();
@@ -55,12 +55,12 @@ impl Clip {
         Ok(gzip.member(&[&length.to_le_bytes(), &header, &payload])?)
     }
 
-    /// Reads a clip as packs have it.
+    /// Reads a compressed clip.
     ///
     /// # Errors
     /// [`ReplayError::Unreadable`].
     pub fn read(compressed: &[u8]) -> Result<Self, ReplayError> {
-        let wrong = |why: &dyn ToString| ReplayError::unreadable("this", why.to_string());
+        let wrong = |reason: &dyn ToString| ReplayError::unreadable("this", reason.to_string());
         let mut bytes = Vec::new();
         GzDecoder::new(compressed)
             .take(MAX_BYTES)
@@ -78,14 +78,14 @@ impl Clip {
             )));
         }
         let mut columns = Vec::with_capacity(header.columns.len());
-        for told in &header.columns {
-            let bytes = usize::try_from(told.bytes).map_err(|error| wrong(&error))?;
-            let (of_column, rest) = payload.split_at_checked(bytes).ok_or_else(cut)?;
+        for column_header in &header.columns {
+            let bytes = usize::try_from(column_header.bytes).map_err(|error| wrong(&error))?;
+            let (column_bytes, rest) = payload.split_at_checked(bytes).ok_or_else(cut)?;
             payload = rest;
-            let mut column = Column::new(told.name.as_str(), &told.unit, told.scale, told.order)
-                .beginning_at(told.first);
-            let count = usize::try_from(told.count).map_err(|error| wrong(&error))?;
-            column.read(of_column, count)?;
+            let mut column = Column::new(column_header.name.as_str(), &column_header.unit, column_header.scale, column_header.order)
+                .beginning_at(column_header.first);
+            let count = usize::try_from(column_header.count).map_err(|error| wrong(&error))?;
+            column.read(column_bytes, count)?;
             columns.push(column);
         }
         Ok(Self { header, columns })

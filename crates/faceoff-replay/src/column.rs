@@ -8,19 +8,19 @@ pub struct Column {
     pub name: String,
     /// SI unit of the values.
     pub unit: String,
-    /// What one counts for, in that unit.
+    /// The value of one count, in that unit.
     pub scale: f64,
-    /// How often differences are taken before the numbers are written: 0 to 2.
+    /// Order of the differences that are written: 0 to 2.
     pub order: u8,
-    /// Samples of the clip before the column's first.
+    /// Index of the column's first sample within the clip.
     pub first: u32,
-    /// In units of `scale`.
+    /// The values, in units of `scale`.
     pub counts: Vec<i64>,
     /// 1 / `scale`.
     per_unit: f64,
 }
 
-/// Values are cut here: far beyond what is simulated, and exact as a float.
+/// Largest magnitude of a count: far beyond simulated values, and exact as a float.
 const LIMIT: f64 = 1e15;
 
 impl Column {
@@ -31,22 +31,22 @@ impl Column {
             scale,
             order,
             first: 0,
-            // Of most episodes: a column that grows is copied.
+            // Enough for most episodes, so that columns need not grow.
             counts: Vec::with_capacity(256),
             per_unit: 1.0 / scale,
         }
     }
 
-    /// The same, without a value for the clip's first samples.
+    /// Sets the index of the column's first sample within the clip.
     pub(crate) fn beginning_at(self, first: u32) -> Self {
         Self { first, ..self }
     }
 
-    /// The next value, rounded; what is no number counts as 0.
+    /// Adds a value, rounded; NaN is stored as 0.
     pub(crate) fn push(&mut self, value: f64) {
-        // Every step of every episode comes here: no division, and no call for the rounding.
+        // Hot path: avoids a division and a call of a rounding function.
         let count = (value * self.per_unit).clamp(-LIMIT, LIMIT);
-        #[expect(clippy::cast_possible_truncation, reason = "cut to ±1e15 before")]
+        #[expect(clippy::cast_possible_truncation, reason = "clamped to ±1e15 before")]
         let rounded = (count + 0.5_f64.copysign(count)) as i64;
         self.counts.push(rounded);
     }
@@ -70,10 +70,10 @@ impl Column {
         }
     }
 
-    /// Reads `count` numbers that [`Column::write`] has written, and nothing must be left.
+    /// Reads `count` numbers written by [`Column::write`], which must be all of `bytes`.
     pub(crate) fn read(&mut self, bytes: &[u8], count: usize) -> Result<(), ReplayError> {
-        let wrong = |why: &str| ReplayError::unreadable(format!("the column {:?}", self.name), why);
-        // A number takes at least a byte: what a header claims costs no memory.
+        let wrong = |reason: &str| ReplayError::unreadable(format!("the column {:?}", self.name), reason);
+        // A number takes at least a byte, so a wrong count in a header cannot cause a large allocation.
         if count > bytes.len() {
             return Err(wrong("it is cut off"));
         }
@@ -102,7 +102,7 @@ impl Column {
     }
 }
 
-/// Zig-zag, then seven bits a byte, the low ones first.
+/// Zig-zag encoding, then seven bits per byte, lowest first.
 fn write_varint(out: &mut Vec<u8>, value: i64) {
     let mut rest = ((value << 1) ^ (value >> 63)).cast_unsigned();
     loop {
@@ -145,7 +145,7 @@ mod tests {
     }
 
     #[test]
-    fn every_order_gives_the_numbers_back() {
+    fn column_round_trips_in_all_orders() {
         for order in 0..3 {
             let mut column = Column::new("q_1", "rad", 1e-4, order);
             for value in [0.0, 1.0, -3.2, 1e9, -1e9, f64::NAN, f64::INFINITY, 0.00004] {
@@ -158,14 +158,14 @@ mod tests {
     }
 
     #[test]
-    fn what_is_cut_or_too_long_is_refused() {
+    fn column_of_wrong_length_is_refused() {
         let mut column = Column::new("q_1", "rad", 1e-4, 1);
         (0..50).for_each(|i| column.push(f64::from(i) * 0.3));
         let mut bytes = Vec::new();
         column.write(&mut bytes);
         let read = |bytes: &[u8], count| {
-            let why = column.clone().read(bytes, count).unwrap_err();
-            why.to_string()
+            let error = column.clone().read(bytes, count).unwrap_err();
+            error.to_string()
         };
         assert!(read(&bytes[..bytes.len() - 1], 50).contains("cut off"));
         assert!(read(&bytes, 49).contains("longer"));

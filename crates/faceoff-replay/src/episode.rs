@@ -1,23 +1,23 @@
-//! An episode as two clips and a line.
+//! Records an episode as two clips and a line of the index.
 
 use crate::{
     clip::Clip,
     error::ReplayError,
     group::Group,
     gzip::Gzip,
-    header::{CLIP_FORMAT, ClipKind, EndTold, Header},
+    header::{CLIP_FORMAT, ClipKind, EpisodeEndSummary, Header},
     motion::Motion,
-    observed::Observed,
-    sheet::{Broken, EpisodeLine, TimeBins},
-    violations::Watch,
+    agent_view::AgentView,
+    clip_index::{ViolationSummary, EpisodeLine, TimeBins},
+    violations::ViolationTracker,
 };
-use faceoff_episode::{EpisodeStart, StepRow, why_it_ended};
+use faceoff_episode::{EpisodeStart, StepRow, describe_end};
 use faceoff_sim::{
     EpisodeState, JOINTS,
     model::{CONTROL_STEP_S, LINKS},
     table::frames::table_from_robot,
 };
-use faceoff_types::{EpisodeOutcome, Task, harmless};
+use faceoff_types::{EpisodeOutcome, Task, escape_unprintable};
 
 /// An episode that is being recorded.
 #[derive(Debug)]
@@ -26,15 +26,15 @@ pub(crate) struct Recording {
     start: [f64; 6],
     last: [f64; 6],
     motion: Motion,
-    observed: Observed,
-    watch: Watch,
-    broken: Vec<Broken>,
+    agent_view: AgentView,
+    tracker: ViolationTracker,
+    violations: Vec<ViolationSummary>,
     times: Vec<f64>,
 }
 
-/// What is kept of an episode that has ended.
+/// The recorded data of a finished episode.
 #[derive(Debug)]
-pub(crate) struct Recorded {
+pub(crate) struct EpisodeClips {
     pub motion: Clip,
     pub observed: Clip,
     pub line: EpisodeLine,
@@ -49,61 +49,61 @@ impl Recording {
             start: start.state.puck,
             last: start.state.puck,
             motion,
-            observed: Observed::new(0),
-            watch: Watch::default(),
-            broken: Vec::new(),
+            agent_view: AgentView::new(0),
+            tracker: ViolationTracker::default(),
+            violations: Vec::new(),
             times: Vec::new(),
         }
     }
 
-    /// The first observation; later ones come with the steps.
+    /// Records the first observation; later ones come with the steps.
     pub fn observe(&mut self, observation: &[f64]) {
-        if self.observed.seen() == 0 {
-            self.observed.see(observation);
+        if self.agent_view.observations() == 0 {
+            self.agent_view.observe(observation);
         }
     }
 
     pub fn step(&mut self, row: &StepRow<'_>) {
         let sample = row.step + 1;
         self.motion.push(row.state);
-        self.motion.meet(row.step, row.impacts);
-        self.observed.see(row.next_observation);
-        self.observed
-            .answer(sample, row.action, &row.answered, row.puck_lost);
-        self.watch.see(0, sample, &row.constraints);
+        self.motion.add_contacts(row.step, row.impacts);
+        self.agent_view.observe(row.next_observation);
+        self.agent_view
+            .answer(sample, row.action, &row.timing, row.puck_lost);
+        self.tracker.update(0, sample, &row.constraints);
         for group in Group::ALL {
-            let value = group.of(&row.constraints);
+            let value = group.value(&row.constraints);
             if value > 0.0 {
-                self.note_broken(group, sample, value, row.state);
+                self.add_violation(group, sample, value, row.state);
             }
         }
-        self.times.push(row.answered.computation_time_s);
+        self.times.push(row.timing.computation_time_s);
         self.last = row.state.puck;
     }
 
-    fn note_broken(&mut self, group: Group, sample: u32, value: f64, state: &EpisodeState) {
-        if let Some(broken) = self.broken.iter_mut().find(|broken| broken.group == group) {
-            broken.samples += 1;
-            broken.worst = broken.worst.max(value);
+    fn add_violation(&mut self, group: Group, sample: u32, value: f64, state: &EpisodeState) {
+        if let Some(violation) = self.violations.iter_mut().find(|violation| violation.group == group) {
+            violation.samples += 1;
+            violation.worst = violation.worst.max(value);
             return;
         }
         let [x, y, _] = table_from_robot(0, state.ee);
-        let farthest = |share: [f64; JOINTS]| {
+        let most_exceeded = |share: [f64; JOINTS]| {
             let joints = (1_u32..).zip(share);
             joints
                 .max_by(|(_, a), (_, b)| a.total_cmp(b))
                 .map(|(joint, _)| joint)
         };
         let joint = match group {
-            Group::JointPos => farthest(std::array::from_fn(|i| {
+            Group::JointPos => most_exceeded(std::array::from_fn(|i| {
                 state.q[i].abs() / LINKS[i].range_rad
             })),
-            Group::JointVel => farthest(std::array::from_fn(|i| {
+            Group::JointVel => most_exceeded(std::array::from_fn(|i| {
                 state.dq_filtered[i].abs() / LINKS[i].velocity_limit_rad_s
             })),
             Group::Ee | Group::Link => None,
         };
-        self.broken.push(Broken {
+        self.violations.push(ViolationSummary {
             group,
             from: sample,
             samples: 1,
@@ -113,34 +113,34 @@ impl Recording {
         });
     }
 
-    /// The clips and the line; the steps' times are counted.
-    pub fn end(mut self, outcome: &EpisodeOutcome, times: &mut TimeBins) -> Recorded {
+    /// The clips and the line of the index. Adds the computation times to `times`.
+    pub fn end(mut self, outcome: &EpisodeOutcome, times: &mut TimeBins) -> EpisodeClips {
         let fault = outcome.fault.as_ref().map(|fault| &fault.fault);
-        let why = why_it_ended(outcome.task, outcome.end, &self.last, outcome.steps, fault);
-        let why = harmless(&why).into_owned();
-        // What exactly an agent did wrong is its team's to know.
-        let told = match outcome.fault {
-            Some(_) => why_it_ended(outcome.task, outcome.end, &self.last, outcome.steps, None),
-            None => why.clone(),
+        let reason = describe_end(outcome.task, outcome.end, &self.last, outcome.steps, fault);
+        let reason = escape_unprintable(&reason).into_owned();
+        // Details of a fault are not public.
+        let public_reason = match outcome.fault {
+            Some(_) => describe_end(outcome.task, outcome.end, &self.last, outcome.steps, None),
+            None => reason.clone(),
         };
-        let end = |why| EndTold {
+        let end = |reason| EpisodeEndSummary {
             end: outcome.end,
             success: outcome.success,
-            why,
+            why: reason,
             steps: outcome.steps,
         };
         self.times.iter().for_each(|time| times.add(*time));
-        let (observed_columns, late, lost) = self.observed.take();
+        let (observed_columns, late, lost) = self.agent_view.take();
         let line = EpisodeLine {
             task: outcome.task,
             episode: outcome.episode,
             steps: outcome.steps,
             success: outcome.success,
             end: outcome.end,
-            why: why.clone(),
-            start: place_and_velocity(&self.start),
-            last: place_and_velocity(&self.last),
-            broken: self.broken,
+            why: reason.clone(),
+            start: position_and_velocity(&self.start),
+            last: position_and_velocity(&self.last),
+            broken: self.violations,
             longest_s: Some(self.times.iter().copied().fold(0.0, f64::max)),
             late: u32::try_from(late.len()).unwrap_or(u32::MAX),
         };
@@ -159,14 +159,14 @@ impl Recording {
             step_s: CONTROL_STEP_S,
             columns: Vec::new(),
             contacts,
-            violations: self.watch.take(),
+            violations: self.tracker.take(),
             breaks: Vec::new(),
             score: None,
             late: Vec::new(),
             lost: Vec::new(),
-            end: Some(end(told)),
+            end: Some(end(public_reason)),
         };
-        Recorded {
+        EpisodeClips {
             observed: Clip {
                 header: Header {
                     kind: ClipKind::Observed,
@@ -175,7 +175,7 @@ impl Recording {
                     violations: Vec::new(),
                     late,
                     lost,
-                    end: Some(end(why)),
+                    end: Some(end(reason)),
                     ..header.clone()
                 },
                 columns: observed_columns,
@@ -189,8 +189,8 @@ impl Recording {
     }
 }
 
-impl Recorded {
-    /// Both clips' bytes.
+impl EpisodeClips {
+    /// The compressed bytes of both clips.
     pub fn compressed(&self, gzip: &mut Gzip) -> Result<[Vec<u8>; 2], ReplayError> {
         Ok([
             self.motion.compressed(gzip)?,
@@ -203,7 +203,7 @@ fn contest(task: Task) -> String {
     task.as_str().to_owned()
 }
 
-/// x, y, vx, vy, to a tenth of a millimetre and of a millimetre per second.
-fn place_and_velocity([x, y, _, vx, vy, _]: &[f64; 6]) -> [f64; 4] {
+/// x, y, vx, vy, rounded to 0.1 mm and 0.1 mm/s.
+fn position_and_velocity([x, y, _, vx, vy, _]: &[f64; 6]) -> [f64; 4] {
     [x, y, vx, vy].map(|value| (value * 1e4).round() / 1e4)
 }

@@ -1,15 +1,15 @@
 //! Errors of this crate.
 
-/// Clips that cannot be read or written.
+/// A failure to read or write clips.
 #[derive(Debug, thiserror::Error)]
 pub enum ReplayError {
     /// Reading or writing failed.
     #[error(transparent)]
     Io(#[from] std::io::Error),
-    /// The bytes are not what this version reads.
-    #[error("{what} is no clip that this version reads: {why}")]
+    /// The data is not a clip, or from another version.
+    #[error("{what} is not a clip that this version can read: {why}")]
     Unreadable {
-        /// Which file or clip.
+        /// The file or clip.
         what: String,
         /// What is wrong with it.
         why: String,

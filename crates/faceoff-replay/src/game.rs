@@ -1,26 +1,26 @@
-//! Records the clips of a game as it is played, 500 control steps each.
+//! Records the clips of a game while it is played, 500 control steps each.
 
 use crate::{
     clip::Clip,
     error::ReplayError,
     gzip::Gzip,
-    header::{Break, BreakKind, CLIP_FORMAT, ClipKind, Header},
+    header::{RallyEndEvent, RallyEndKind, CLIP_FORMAT, ClipKind, Header},
     motion::Motion,
-    observed::Observed,
+    agent_view::AgentView,
     pack::{Key, PackWriter},
-    violations::Watch,
+    violations::ViolationTracker,
 };
 use faceoff_episode::{
-    Answered, GameSink, GameStepRow, RallyEnding, RallyRow, RallyStart, RecordError,
+    AnswerTiming, GameSink, GameStepRow, RallyEnding, RallyRow, RallyStart, RecordError,
 };
 use faceoff_sim::{GameState, RallyEnd, model::CONTROL_STEP_S};
 use faceoff_types::{Side, WINDOW_STEPS};
 use std::io::Write;
 
-/// Control steps of a clip: a jump to any place of a game loads one of each kind.
+/// Control steps per clip. A jump within a game loads one clip of each kind.
 pub const CHUNK_STEPS: u32 = WINDOW_STEPS;
 
-/// Writes a pack of a game's clips. Memory is bounded by one clip of each kind.
+/// Writes a pack of a game's clips. It holds one clip of each kind in memory.
 pub struct GameClipRecorder<W> {
     pack: PackWriter<W>,
     chunk: Option<Chunk>,
@@ -31,10 +31,10 @@ pub struct GameClipRecorder<W> {
 struct Chunk {
     number: u32,
     motion: Motion,
-    sides: [Observed; 2],
-    watch: [Watch; 2],
-    breaks: Vec<Break>,
-    /// The count at the first sample, and now.
+    sides: [AgentView; 2],
+    trackers: [ViolationTracker; 2],
+    breaks: Vec<RallyEndEvent>,
+    /// The score at the first sample, and the current score.
     score: [[u32; 2]; 2],
     /// The last sample so far.
     last: u32,
@@ -50,15 +50,15 @@ impl<W> std::fmt::Debug for GameClipRecorder<W> {
 }
 
 impl Chunk {
-    /// Begins with the state after `number` × 500 control steps.
+    /// Starts with the state after `number` × 500 control steps.
     fn begin(number: u32, state: &GameState, score: [u32; 2]) -> Self {
-        let mut motion = Motion::of_game();
+        let mut motion = Motion::for_game();
         motion.push_game(state);
         Self {
             number,
             motion,
-            sides: [Observed::new(0), Observed::new(1)],
-            watch: Default::default(),
+            sides: [AgentView::new(0), AgentView::new(1)],
+            trackers: Default::default(),
             breaks: Vec::new(),
             score: [score; 2],
             last: number * CHUNK_STEPS,
@@ -69,24 +69,24 @@ impl Chunk {
     fn step(&mut self, row: &GameStepRow<'_>) {
         let sample = row.game_step + 1;
         self.motion.push_game(row.state);
-        self.motion.meet(row.game_step, row.impacts);
-        for (side, of_side) in (0_u32..).zip(&row.sides) {
+        self.motion.add_contacts(row.game_step, row.impacts);
+        for (side, side_step) in (0_u32..).zip(&row.sides) {
             let index = usize::from(side == 1);
-            self.watch[index].see(side, sample, &of_side.constraints);
-            let observed = &mut self.sides[index];
-            match (of_side.action, of_side.answered) {
-                (Some(action), Some(answered)) => {
-                    observed.answer(sample, action, &answered, row.puck_lost);
+            self.trackers[index].update(side, sample, &side_step.constraints);
+            let view = &mut self.sides[index];
+            match (side_step.action, side_step.timing) {
+                (Some(action), Some(timing)) => {
+                    view.answer(sample, action, &timing, row.puck_lost);
                 }
-                // An arm that is not commanded holds where it is.
-                (_, answered) => {
+                // Without a command the arm holds its position.
+                (_, timing) => {
                     let held = row.state.q[index];
-                    let answered = answered.unwrap_or(Answered {
+                    let timing = timing.unwrap_or(AnswerTiming {
                         computation_time_s: 0.0,
                         host_time_s: 0.0,
                         cpu_time_s: None,
                     });
-                    observed.answer(sample, &held, &answered, row.puck_lost);
+                    view.answer(sample, &held, &timing, row.puck_lost);
                 }
             }
         }
@@ -98,7 +98,7 @@ impl Chunk {
         self.last == (self.number + 1) * CHUNK_STEPS
     }
 
-    /// The clips: motion, and what each side was told and commanded.
+    /// The clips: the motion, and the view of each side.
     fn end(mut self) -> (u32, [Clip; 3]) {
         let first = self.number * CHUNK_STEPS;
         let header = Header {
@@ -120,8 +120,8 @@ impl Chunk {
             end: None,
         };
         let [home, away] = self.sides;
-        let observed = |side: u32, observed: Observed| {
-            let (columns, late, lost) = observed.take();
+        let view_clip = |side: u32, view: AgentView| {
+            let (columns, late, lost) = view.take();
             Clip {
                 header: Header {
                     kind: ClipKind::Observed,
@@ -133,10 +133,10 @@ impl Chunk {
                 columns,
             }
         };
-        let sides = [observed(0, home), observed(1, away)];
+        let sides = [view_clip(0, home), view_clip(1, away)];
         let (columns, contacts) = self.motion.take();
-        let mut violations: Vec<_> = self.watch.iter_mut().flat_map(Watch::take).collect();
-        violations.sort_by_key(|told| (told.from, told.side, told.group));
+        let mut violations: Vec<_> = self.trackers.iter_mut().flat_map(ViolationTracker::take).collect();
+        violations.sort_by_key(|span| (span.from, span.side, span.group));
         let motion = Clip {
             header: Header {
                 contacts,
@@ -153,7 +153,7 @@ impl Chunk {
 }
 
 impl<W: Write> GameClipRecorder<W> {
-    /// Begins a pack.
+    /// Starts a pack.
     ///
     /// # Errors
     /// [`ReplayError::Io`].
@@ -165,7 +165,7 @@ impl<W: Write> GameClipRecorder<W> {
         })
     }
 
-    /// Adds what is left and the index.
+    /// Writes the last clips and the index.
     ///
     /// # Errors
     /// [`ReplayError::Io`].
@@ -195,7 +195,7 @@ impl<W: Write> GameClipRecorder<W> {
 
 impl<W: Write> GameSink for GameClipRecorder<W> {
     fn begin_rally(&mut self, start: &RallyStart<'_>) -> Result<(), RecordError> {
-        // Of later rallies the first sample is the one after their first step.
+        // The first sample of a later rally is the one after its first step.
         self.chunk.get_or_insert_with(|| {
             Chunk::begin(start.game_step / CHUNK_STEPS, start.state, [0; 2])
         });
@@ -204,8 +204,8 @@ impl<W: Write> GameSink for GameClipRecorder<W> {
 
     fn observe(&mut self, observations: [&[f64]; 2]) {
         if let Some(chunk) = &mut self.chunk {
-            for (observed, observation) in chunk.sides.iter_mut().zip(observations) {
-                observed.see(observation);
+            for (view, observation) in chunk.sides.iter_mut().zip(observations) {
+                view.observe(observation);
             }
         }
     }
@@ -217,7 +217,7 @@ impl<W: Write> GameSink for GameClipRecorder<W> {
         chunk.step(row);
         if chunk.is_full() {
             let (next, state, [_, score]) = (chunk.number + 1, chunk.state, chunk.score);
-            self.end_chunk().map_err(not_recorded)?;
+            self.end_chunk().map_err(record_error)?;
             self.chunk = Some(Chunk::begin(next, &state, score));
         }
         Ok(())
@@ -226,9 +226,9 @@ impl<W: Write> GameSink for GameClipRecorder<W> {
     fn end_rally(&mut self, row: &RallyRow<'_>) -> Result<(), RecordError> {
         if let Some(chunk) = &mut self.chunk {
             chunk.score[1] = row.score;
-            chunk.breaks.push(Break {
+            chunk.breaks.push(RallyEndEvent {
                 sample: chunk.last,
-                what: what(row.ending),
+                what: rally_end_kind(row.ending),
                 by: row.ending.by().map(|side| u32::from(side == Side::Second)),
                 score: row.score,
             });
@@ -237,20 +237,20 @@ impl<W: Write> GameSink for GameClipRecorder<W> {
     }
 }
 
-fn not_recorded(error: ReplayError) -> RecordError {
+fn record_error(error: ReplayError) -> RecordError {
     RecordError {
         what: "recording a game's clips".to_owned(),
         source: error.into(),
     }
 }
 
-const fn what(ending: RallyEnding) -> BreakKind {
+const fn rally_end_kind(ending: RallyEnding) -> RallyEndKind {
     match ending {
-        RallyEnding::Table(RallyEnd::Goal { .. }) => BreakKind::Goal,
-        RallyEnding::Table(RallyEnd::Foul { .. }) => BreakKind::Foul,
-        RallyEnding::Table(RallyEnd::Stuck) => BreakKind::Stuck,
-        RallyEnding::Table(RallyEnd::LeftTable) => BreakKind::LeftTable,
-        RallyEnding::Table(RallyEnd::Diverged { .. }) => BreakKind::Diverged,
-        RallyEnding::GameOver => BreakKind::GameOver,
+        RallyEnding::Table(RallyEnd::Goal { .. }) => RallyEndKind::Goal,
+        RallyEnding::Table(RallyEnd::Foul { .. }) => RallyEndKind::Foul,
+        RallyEnding::Table(RallyEnd::Stuck) => RallyEndKind::Stuck,
+        RallyEnding::Table(RallyEnd::LeftTable) => RallyEndKind::LeftTable,
+        RallyEnding::Table(RallyEnd::Diverged { .. }) => RallyEndKind::Diverged,
+        RallyEnding::GameOver => RallyEndKind::GameOver,
     }
 }

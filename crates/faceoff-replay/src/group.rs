@@ -1,4 +1,4 @@
-//! The constraints, by groups.
+//! Groups of constraints.
 
 use faceoff_sim::ConstraintValues;
 use serde::{Deserialize, Serialize};
@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 #[serde(rename_all = "snake_case")]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub enum Group {
-    /// The end effector's place, m.
+    /// Position of the end effector, m.
     Ee,
     /// Height of elbow and wrist, m.
     Link,
@@ -21,7 +21,7 @@ pub enum Group {
 impl Group {
     pub const ALL: [Self; 4] = [Self::Ee, Self::Link, Self::JointPos, Self::JointVel];
 
-    /// Its name in files.
+    /// Name in files.
     #[must_use]
     pub const fn as_str(self) -> &'static str {
         match self {
@@ -32,9 +32,9 @@ impl Group {
         }
     }
 
-    /// Its value, above 0 if broken.
+    /// The group's constraint value; above 0 it is violated.
     #[must_use]
-    pub const fn of(self, values: &ConstraintValues) -> f64 {
+    pub const fn value(self, values: &ConstraintValues) -> f64 {
         match self {
             Self::Ee => values.ee,
             Self::Link => values.link,

@@ -1,20 +1,20 @@
-//! Gzip members, one after the other, by one compressor: to make one anew costs more than a clip.
+//! Compresses gzip members with a reused compressor, since creating one takes longer than compressing a clip.
 
 use flate2::{Compression, Crc, write::DeflateEncoder};
 use std::io::{self, Write};
 
-/// Makes gzip members. The same bytes give the same member.
+/// Creates gzip members. The same bytes give the same member.
 #[derive(Debug)]
 pub(crate) struct Gzip {
     deflate: DeflateEncoder<Vec<u8>>,
 }
 
-/// Deflate, without name, time and comment; made on an unknown system (RFC 1952).
+/// Header of a member: deflate, without name, time and comment, from an unknown system (RFC 1952).
 const HEADER: [u8; 10] = [0x1f, 0x8b, 8, 0, 0, 0, 0, 0, 0, 0xff];
 
 impl Default for Gzip {
     fn default() -> Self {
-        // The fastest: what is left after the differences gains little from more, and it is made while agents play.
+        // The fastest level: clips are compressed while agents play, and differences gain little from higher levels.
         Self {
             deflate: DeflateEncoder::new(Vec::new(), Compression::fast()),
         }
@@ -22,16 +22,16 @@ impl Default for Gzip {
 }
 
 impl Gzip {
-    /// A member of these parts.
+    /// Compresses the parts into one member.
     ///
     /// # Errors
-    /// If memory cannot be written.
+    /// If writing to memory fails.
     pub fn member(&mut self, parts: &[&[u8]]) -> io::Result<Vec<u8>> {
         let mut crc = Crc::new();
         let length: usize = parts.iter().map(|part| part.len()).sum();
         let mut out = Vec::with_capacity(length / 2 + 64);
         out.extend_from_slice(&HEADER);
-        // What it had before is whole, and taken.
+        // The previous member is complete and was taken out.
         self.deflate.reset(out)?;
         for part in parts {
             crc.update(part);
@@ -51,7 +51,7 @@ mod tests {
     use std::io::Read;
 
     #[test]
-    fn members_are_whole_and_the_same_in_any_order() {
+    fn gzip_members_are_complete_and_reproducible() {
         let mut gzip = Gzip::default();
         let long = [7, 1, 4].repeat(5000);
         let parts: [&[&[u8]]; 3] = [&[b"one", b" and two"], &[], &[&long, b"end"]];

@@ -1,19 +1,19 @@
-//! What a clip says of itself, beside its columns.
+//! The header of a clip.
 
 use crate::group::Group;
 use faceoff_types::EpisodeEnd;
 use serde::{Deserialize, Serialize};
 
-/// Name and version of a clip's layout. A reader skips what it does not know; another meaning is another version.
+/// Name and version of a clip's layout. Readers ignore unknown fields; a change of meaning is a new version.
 pub(crate) const CLIP_FORMAT: &str = "faceoff-clip/1";
 
-/// What a clip shows.
+/// The kinds of clips.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ClipKind {
-    /// What everybody could see who stood at the table.
+    /// The public motion of puck and robots.
     Motion,
-    /// What a side was told and commanded, and how long it took.
+    /// A side's observations, commands and computation times.
     Observed,
 }
 
@@ -25,73 +25,73 @@ pub struct Header {
     pub kind: ClipKind,
     /// `hit`, `defend`, `prepare` or `game`.
     pub contest: String,
-    /// Index within the evaluation; absent of games.
+    /// Index of the episode within the evaluation; absent in games.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub episode: Option<u32>,
-    /// 0 or 1, whose observations and commands they are.
+    /// The side of the observations and commands, 0 or 1.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub side: Option<u32>,
     /// Index of the clip's first sample; sample k is the state after k control steps.
     pub first: u32,
-    /// Samples of the clip.
+    /// Number of samples.
     pub samples: u32,
     /// Length of a control step, s.
     pub step_s: f64,
-    /// The columns, in the payload's order.
+    /// The columns, in the order of the payload.
     pub columns: Vec<ColumnHeader>,
-    /// When the puck came to touch what, in order of time.
+    /// Contacts of the puck, in order of time.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub contacts: Vec<Contact>,
-    /// Broken constraints, in order of their first sample.
+    /// Violations of constraints, in the order of their first sample.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub violations: Vec<ViolationTold>,
-    /// Ends of a game's rallies.
+    pub violations: Vec<ViolationSpan>,
+    /// Ends of rallies of a game.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub breaks: Vec<Break>,
-    /// Of games: the count at the first sample.
+    pub breaks: Vec<RallyEndEvent>,
+    /// In games: the score at the first sample.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub score: Option<[u32; 2]>,
-    /// Samples whose answer took more than a control step.
+    /// Samples whose answer took longer than a control step.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub late: Vec<u32>,
-    /// When tracking had lost the puck.
+    /// Spans in which tracking had lost the puck.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub lost: Vec<Lost>,
+    pub lost: Vec<TrackingGap>,
     /// How an episode ended.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub end: Option<EndTold>,
+    pub end: Option<EpisodeEndSummary>,
 }
 
-/// A column of the payload; [`crate::Column`] tells what its fields mean.
+/// The header of a column, with the fields of [`crate::Column`].
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ColumnHeader {
     pub name: String,
     pub unit: String,
-    /// What one counts for.
+    /// The value of one count.
     pub scale: f64,
     /// Order of the differences.
     pub order: u8,
-    /// Samples of the clip before the column's first.
+    /// Index of the column's first sample within the clip.
     #[serde(default)]
     pub first: u32,
     pub count: u32,
-    /// Length in the payload.
+    /// Length in the payload, in bytes.
     pub bytes: u32,
 }
 
-/// The puck begins to touch something.
+/// The start of a contact of the puck.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Contact {
     /// Time since sample 0 of the episode or game, s.
     pub t: f64,
     pub what: ContactWith,
-    /// The puck's true place then, m, table frame.
+    /// True x of the puck at that time, m, table frame.
     pub x: f64,
-    /// See `x`.
+    /// True y of the puck at that time, m, table frame.
     pub y: f64,
 }
 
-/// What the puck touches.
+/// The body that the puck touches.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ContactWith {
@@ -103,49 +103,49 @@ pub enum ContactWith {
     OpponentMallet,
 }
 
-/// A constraint that was broken.
+/// A violation of a group of constraints over some samples.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct ViolationTold {
-    /// 0 or 1: whose.
+pub struct ViolationSpan {
+    /// The side, 0 or 1.
     pub side: u32,
     pub group: Group,
     /// The first sample.
     pub from: u32,
     pub to: u32,
-    /// By how much at most: rad, rad/s or m.
+    /// Largest excess over the limit: rad, rad/s or m.
     pub worst: f64,
 }
 
-/// A rally of a game is over; the next sample is the next rally's first.
+/// The end of a rally; the next sample is the first of the next rally.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Break {
+pub struct RallyEndEvent {
     /// The rally's last sample.
     pub sample: u32,
-    pub what: BreakKind,
-    /// Who scored or fouled, 0 or 1.
+    pub what: RallyEndKind,
+    /// The side that scored or committed the foul, 0 or 1.
     pub by: Option<u32>,
     pub score: [u32; 2],
 }
 
-/// Why a rally is over.
+/// Why a rally ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum BreakKind {
+pub enum RallyEndKind {
     Goal,
     Foul,
     /// The puck lay out of reach.
     Stuck,
     /// The puck left the table.
     LeftTable,
-    /// A robot was commanded beyond what can be simulated.
+    /// The commands of a side made the simulated world diverge.
     Diverged,
     /// The game is over.
     GameOver,
 }
 
-/// The camera had lost the puck.
+/// A span in which tracking had lost the puck.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Lost {
+pub struct TrackingGap {
     /// The first sample.
     pub from: u32,
     pub to: u32,
@@ -153,7 +153,7 @@ pub struct Lost {
 
 /// How an episode ended.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct EndTold {
+pub struct EpisodeEndSummary {
     pub end: EpisodeEnd,
     pub success: bool,
     pub why: String,

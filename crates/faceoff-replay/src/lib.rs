@@ -1,9 +1,9 @@
-//! What replays are drawn from: clips of episodes and games, a tenth of a dataset in size.
+//! Data for replays: clips of episodes and games, with a tenth of the size of a dataset.
 //!
-//! A [`Clip`] holds the samples of an episode, or of 500 control steps of a game, as columns of small integers, and tells of
-//! contacts between the samples, violations and the end. The public motion, and what was observed, commanded and timed, are
-//! clips apart. A [`Pack`] is a file of clips with an index, made while a shard or a game is played; its
-//! [`Sheet`] has a line for each episode: where it began and ended, why, and what it broke. `docs/replay.md` describes the bytes.
+//! A [`Clip`] holds the samples of an episode, or of 500 control steps of a game, as columns of small integers. It also has
+//! contacts between samples, violations and the end. The public motion is one clip; observations, commands and times are
+//! another. A [`Pack`] is a file of clips with an index, written while a shard or a game is played. Its [`ClipIndex`] has a
+//! line for each episode: how it started and ended, and its violations. `docs/replay.md` describes the format.
 
 mod analysis;
 mod clip;
@@ -15,30 +15,30 @@ mod group;
 mod gzip;
 mod header;
 mod motion;
-mod observed;
+mod agent_view;
 mod pack;
-mod places;
+mod positions;
 mod recorder;
-mod sheet;
+mod clip_index;
 #[cfg(test)]
 mod viewer_model;
 mod violations;
 
-pub use analysis::{Breach, GOAL_WAY_STEPS, GameAnalysis, GoalWay, Shot};
+pub use analysis::{LocatedViolation, GOAL_PATH_STEPS, GameAnalysis, GoalPath, Shot};
 pub use clip::Clip;
 pub use column::Column;
 pub use error::ReplayError;
 pub use game::{CHUNK_STEPS, GameClipRecorder};
 pub use group::Group;
 pub use header::{
-    Break, BreakKind, ClipKind, ColumnHeader, Contact, ContactWith, EndTold, Header, Lost,
-    ViolationTold,
+    RallyEndEvent, RallyEndKind, ClipKind, ColumnHeader, Contact, ContactWith, EpisodeEndSummary, Header, TrackingGap,
+    ViolationSpan,
 };
-pub use pack::{Key, Pack, PackWriter, join, select, sheet_of};
+pub use pack::{Key, Pack, PackWriter, join_packs, select_episodes, merged_index};
 pub use recorder::ClipRecorder;
-pub use sheet::{Broken, EpisodeLine, Sheet, TimeBins};
+pub use clip_index::{ViolationSummary, EpisodeLine, ClipIndex, TimeBins};
 
-/// The numbers of the model that a drawing of a clip needs.
+/// Constants of the model that are needed to draw a clip.
 pub mod model {
     pub use faceoff_sim::{
         episode::task::{PLAYABLE_Y_M, TASK_RULES},

@@ -1,4 +1,4 @@
-//! The columns of what moves.
+//! The columns of the motion of puck and robots.
 
 use crate::{
     column::Column,
@@ -6,9 +6,9 @@ use crate::{
 };
 use faceoff_sim::{EpisodeState, GameState, Impact, JOINTS, Met, model::CONTROL_STEP_S};
 
-/// m: a tenth of a pixel of the largest picture.
-const PLACE: f64 = 1e-4;
-/// rad: with it the end effector is where it was to a few tenths of a millimetre.
+/// m: a tenth of a pixel in the largest picture.
+const POSITION: f64 = 1e-4;
+/// rad: an error of a few tenths of a millimetre at the end effector.
 const ANGLE: f64 = 1e-4;
 const PUCK_YAW: f64 = 1e-3;
 /// m/s.
@@ -17,10 +17,10 @@ const PUCK_SPEED: f64 = 1e-3;
 const JOINT_SPEED: f64 = 4e-3;
 const UNIVERSAL: f64 = 1e-3;
 
-/// A contact that begins sooner after one with the same body is the same bounce.
+/// A contact that begins sooner after one with the same body belongs to the same bounce.
 const BOUNCE_S: f64 = 0.01;
 
-/// The samples of table and arms.
+/// The samples of the motion.
 #[derive(Debug, Default)]
 pub(crate) struct Motion {
     columns: Vec<Column>,
@@ -38,11 +38,11 @@ pub(crate) fn joints(
 }
 
 impl Motion {
-    /// Of a table on which an opponent stands, or none.
+    /// The columns of an episode, with or without an opponent.
     pub fn new(has_opponent: bool) -> Self {
         let mut columns = vec![
-            Column::new("puck_x", "m", PLACE, 2),
-            Column::new("puck_y", "m", PLACE, 2),
+            Column::new("puck_x", "m", POSITION, 2),
+            Column::new("puck_y", "m", POSITION, 2),
             Column::new("puck_yaw", "rad", PUCK_YAW, 2),
             Column::new("puck_vx", "m/s", PUCK_SPEED, 1),
             Column::new("puck_vy", "m/s", PUCK_SPEED, 1),
@@ -61,8 +61,8 @@ impl Motion {
         }
     }
 
-    /// Of a game, in which both robots are recorded alike.
-    pub fn of_game() -> Self {
+    /// The columns of a game, in which both robots have the same columns.
+    pub fn for_game() -> Self {
         let mut motion = Self::new(true);
         motion
             .columns
@@ -75,7 +75,7 @@ impl Motion {
         motion
     }
 
-    /// The next sample of a game.
+    /// Adds a sample of a game.
     pub fn push_game(&mut self, state: &GameState) {
         let [x, y, yaw, vx, vy, _] = state.puck;
         let [q, opponent_q] = state.q;
@@ -106,8 +106,8 @@ impl Motion {
         }
     }
 
-    /// Contacts that began in a control step.
-    pub fn meet(&mut self, step: u32, impacts: &[Impact]) {
+    /// Adds contacts that began in a control step.
+    pub fn add_contacts(&mut self, step: u32, impacts: &[Impact]) {
         for impact in impacts {
             let t = f64::from(step) * CONTROL_STEP_S + impact.after_s();
             let what = match impact.met {
@@ -115,8 +115,8 @@ impl Motion {
                 Met::Mallet(0) => ContactWith::Mallet,
                 Met::Mallet(_) => ContactWith::OpponentMallet,
             };
-            let again = |earlier: &Contact| earlier.what == what && t - earlier.t < BOUNCE_S;
-            if !self.contacts.iter().rev().any(again) {
+            let is_same_bounce = |earlier: &Contact| earlier.what == what && t - earlier.t < BOUNCE_S;
+            if !self.contacts.iter().rev().any(is_same_bounce) {
                 let [x, y] = impact.puck;
                 self.contacts.push(Contact {
                     t: rounded(t, 1e3),
@@ -133,7 +133,7 @@ impl Motion {
     }
 }
 
-/// To a whole number of parts, `per_unit` of them in one.
+/// Rounds to a multiple of 1 / `per_unit`.
 fn rounded(value: f64, per_unit: f64) -> f64 {
     (value * per_unit).round() / per_unit
 }

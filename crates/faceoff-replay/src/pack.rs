@@ -1,4 +1,4 @@
-//! A file of clips that is read by its index.
+//! A file of clips with an index for random access.
 //!
 //! ```text
 //! 16 bytes   "faceoff-clips/1\n"
@@ -8,7 +8,7 @@
 //! 16 bytes   offset of the index u64 · clips u32 · "clip"
 //! ```
 
-use crate::{error::ReplayError, sheet::Sheet};
+use crate::{error::ReplayError, clip_index::ClipIndex};
 use faceoff_types::{Side, Task};
 use fs_err::File;
 use std::{
@@ -22,10 +22,10 @@ const MAGIC: &[u8; 16] = b"faceoff-clips/1\n";
 const END: &[u8; 4] = b"clip";
 const ENTRY_BYTES: usize = 20;
 const FOOTER_BYTES: u64 = 16;
-/// The most clips of a pack: an index of 20 MB.
+/// Maximum number of clips in a pack; their index has 20 MB.
 const MAX_CLIPS: u32 = 1 << 20;
 
-/// What a clip of a pack shows.
+/// Identifies a clip in a pack.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Key {
     kind: u8,
@@ -34,7 +34,7 @@ pub struct Key {
 }
 
 impl Key {
-    const SHEET: Self = Self {
+    const INDEX: Self = Self {
         kind: 0,
         contest: 0,
         number: 0,
@@ -50,7 +50,7 @@ impl Key {
         }
     }
 
-    /// What the agent was told and commanded in an episode.
+    /// The agent's observations and commands in an episode.
     #[must_use]
     pub const fn observed(task: Task, episode: u32) -> Self {
         Self {
@@ -70,7 +70,7 @@ impl Key {
         }
     }
 
-    /// What a side was told and commanded in such a part of a game.
+    /// A side's observations and commands in such a part of a game.
     #[must_use]
     pub const fn game_observed(side: Side, chunk: u32) -> Self {
         Self {
@@ -112,7 +112,7 @@ impl Entry {
         bytes
     }
 
-    fn of(bytes: &[u8; ENTRY_BYTES]) -> Self {
+    fn from_bytes(bytes: &[u8; ENTRY_BYTES]) -> Self {
         let [kind, contest, _, _, rest @ ..] = bytes;
         let (number, rest) = rest.split_first_chunk().unwrap_or((&[0; 4], &[]));
         let (offset, rest) = rest.split_first_chunk().unwrap_or((&[0; 8], &[]));
@@ -129,7 +129,7 @@ impl Entry {
     }
 }
 
-/// A pack being written.
+/// Writes a pack.
 #[derive(Debug)]
 pub struct PackWriter<W> {
     out: W,
@@ -138,7 +138,7 @@ pub struct PackWriter<W> {
 }
 
 impl<W: Write> PackWriter<W> {
-    /// Begins one.
+    /// Starts a pack.
     ///
     /// # Errors
     /// [`ReplayError::Io`].
@@ -168,7 +168,7 @@ impl<W: Write> PackWriter<W> {
         Ok(())
     }
 
-    /// Adds clips of another pack.
+    /// Copies clips of another pack.
     fn copy(&mut self, pack: &Pack, is_wanted: impl Fn(Key) -> bool) -> Result<(), ReplayError> {
         for entry in pack.index.iter().filter(|entry| is_wanted(entry.key)) {
             if let Some(bytes) = pack.clip(entry.key)? {
@@ -178,15 +178,15 @@ impl<W: Write> PackWriter<W> {
         Ok(())
     }
 
-    /// Adds the sheet of the pack's episodes.
+    /// Adds the index of the pack's episodes.
     ///
     /// # Errors
     /// [`ReplayError::Io`].
-    pub fn add_sheet(&mut self, sheet: &Sheet) -> Result<(), ReplayError> {
-        self.add(Key::SHEET, &sheet.compressed()?)
+    pub fn add_index(&mut self, index: &ClipIndex) -> Result<(), ReplayError> {
+        self.add(Key::INDEX, &index.compressed()?)
     }
 
-    /// Writes the index.
+    /// Writes the file's index of clips.
     ///
     /// # Errors
     /// [`ReplayError::Io`].
@@ -206,7 +206,7 @@ impl<W: Write> PackWriter<W> {
     }
 }
 
-/// A pack that is read. Opening one reads its index.
+/// Reads a pack. Its index of clips is read when it is opened.
 #[derive(Debug)]
 pub struct Pack {
     path: PathBuf,
@@ -218,9 +218,9 @@ impl Pack {
     /// Opens a file.
     ///
     /// # Errors
-    /// [`ReplayError::Io`]; [`ReplayError::Unreadable`] if it is no pack of this version, or cut off.
+    /// [`ReplayError::Io`]; [`ReplayError::Unreadable`] if it is not a pack of this version, or truncated.
     pub fn open(path: &Path) -> Result<Self, ReplayError> {
-        let wrong = |why: &str| ReplayError::unreadable(path.display().to_string(), why);
+        let wrong = |reason: &str| ReplayError::unreadable(path.display().to_string(), reason);
         let file = File::open(path)?;
         let bytes = file.metadata()?.len();
         let shortest = MAGIC.len() as u64 + FOOTER_BYTES;
@@ -230,7 +230,7 @@ impl Pack {
         let mut magic = [0; MAGIC.len()];
         file.file().read_exact_at(&mut magic, 0)?;
         if &magic != MAGIC {
-            return Err(wrong("it does not begin as one"));
+            return Err(wrong("it is not a pack of clips"));
         }
         let mut offset = [0; 8];
         let mut count = [0; 4];
@@ -247,7 +247,7 @@ impl Pack {
         let mut index_bytes = vec![0; usize::try_from(index_bytes).unwrap_or_default()];
         file.file().read_exact_at(&mut index_bytes, offset)?;
         let (entries, _) = index_bytes.as_chunks::<ENTRY_BYTES>();
-        let index: Vec<Entry> = entries.iter().map(Entry::of).collect();
+        let index: Vec<Entry> = entries.iter().map(Entry::from_bytes).collect();
         let inside = |entry: &Entry| {
             let end = entry.offset.checked_add(u64::from(entry.length));
             entry.offset >= MAGIC.len() as u64 && end.is_some_and(|end| end <= offset)
@@ -276,16 +276,16 @@ impl Pack {
         Ok(Some(bytes))
     }
 
-    /// The line of each of its episodes.
+    /// The index of its episodes.
     ///
     /// # Errors
     /// [`ReplayError`].
-    pub fn sheet(&self) -> Result<Sheet, ReplayError> {
-        match self.clip(Key::SHEET)? {
-            Some(bytes) => Sheet::read(&bytes),
+    pub fn clip_index(&self) -> Result<ClipIndex, ReplayError> {
+        match self.clip(Key::INDEX)? {
+            Some(bytes) => ClipIndex::read(&bytes),
             None => Err(ReplayError::unreadable(
                 self.path.display().to_string(),
-                "it has no sheet of episodes",
+                "it has no index of episodes",
             )),
         }
     }
@@ -295,51 +295,52 @@ impl Pack {
 ///
 /// # Errors
 /// [`ReplayError`].
-pub fn join<W: Write>(packs: &[PathBuf], out: W) -> Result<W, ReplayError> {
-    let (mut writer, mut sheet) = (PackWriter::new(out)?, Sheet::default());
+pub fn join_packs<W: Write>(packs: &[PathBuf], out: W) -> Result<W, ReplayError> {
+    let (mut writer, mut index) = (PackWriter::new(out)?, ClipIndex::default());
     for path in packs {
         let pack = Pack::open(path)?;
-        writer.copy(&pack, |key| key != Key::SHEET)?;
-        sheet.merge(pack.sheet()?);
+        writer.copy(&pack, |key| key != Key::INDEX)?;
+        index.merge(pack.clip_index()?);
     }
-    writer.add_sheet(&sheet)?;
+    writer.add_index(&index)?;
     writer.finish()
 }
 
-/// Joins the packs of an evaluation's shards, and keeps some of its episodes alone; computation times are not counted then.
+/// Joins the packs of an evaluation's shards with only the selected episodes, and without the histogram of computation
+/// times.
 ///
 /// # Errors
 /// [`ReplayError`].
-pub fn select<W: Write>(
+pub fn select_episodes<W: Write>(
     packs: &[PathBuf],
-    kept: &BTreeSet<(Task, u32)>,
+    selected: &BTreeSet<(Task, u32)>,
     out: W,
 ) -> Result<W, ReplayError> {
-    let of_episode = |(task, episode): &(Task, u32)| {
+    let episode_keys = |(task, episode): &(Task, u32)| {
         [Key::motion(*task, *episode), Key::observed(*task, *episode)]
     };
-    let keys: BTreeSet<Key> = kept.iter().flat_map(of_episode).collect();
+    let keys: BTreeSet<Key> = selected.iter().flat_map(episode_keys).collect();
     let mut writer = PackWriter::new(out)?;
     for path in packs {
         writer.copy(&Pack::open(path)?, |key| keys.contains(&key))?;
     }
-    let mut sheet = sheet_of(packs)?;
-    sheet
+    let mut index = merged_index(packs)?;
+    index
         .episodes
-        .retain(|line| kept.contains(&(line.task, line.episode)));
-    sheet.times.clear();
-    writer.add_sheet(&sheet)?;
+        .retain(|line| selected.contains(&(line.task, line.episode)));
+    index.times.clear();
+    writer.add_index(&index)?;
     writer.finish()
 }
 
-/// The lines of all shards of an evaluation.
+/// The merged index of an evaluation's shards.
 ///
 /// # Errors
 /// [`ReplayError`].
-pub fn sheet_of(packs: &[PathBuf]) -> Result<Sheet, ReplayError> {
-    let mut sheet = Sheet::default();
+pub fn merged_index(packs: &[PathBuf]) -> Result<ClipIndex, ReplayError> {
+    let mut index = ClipIndex::default();
     for path in packs {
-        sheet.merge(Pack::open(path)?.sheet()?);
+        index.merge(Pack::open(path)?.clip_index()?);
     }
-    Ok(sheet)
+    Ok(index)
 }

@@ -1,22 +1,22 @@
-//! Records the clips of a shard as it is played.
+//! Records the clips of a shard while it is played.
 
 use crate::{
     episode::Recording,
     error::ReplayError,
     gzip::Gzip,
     pack::{Key, PackWriter},
-    sheet::Sheet,
+    clip_index::ClipIndex,
 };
 use faceoff_episode::{EpisodeStart, RecordError, StepRow, StepSink};
 use faceoff_types::{EpisodeOutcome, Task};
 use std::io::Write;
 
-/// Writes a pack of the episodes of one task. Memory is bounded by one episode's samples and a line for each.
+/// Writes a pack of the episodes of one task. It holds the samples of one episode and a line for each episode in memory.
 pub struct ClipRecorder<W> {
     task: Task,
     pack: PackWriter<W>,
-    sheet: Sheet,
-    under_way: Option<Recording>,
+    index: ClipIndex,
+    current: Option<Recording>,
     gzip: Gzip,
 }
 
@@ -24,13 +24,13 @@ impl<W> std::fmt::Debug for ClipRecorder<W> {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.debug_struct("ClipRecorder")
             .field("task", &self.task)
-            .field("episodes", &self.sheet.episodes.len())
+            .field("episodes", &self.index.episodes.len())
             .finish_non_exhaustive()
     }
 }
 
 impl<W: Write> ClipRecorder<W> {
-    /// Begins a pack.
+    /// Starts a pack.
     ///
     /// # Errors
     /// [`ReplayError::Io`].
@@ -38,50 +38,50 @@ impl<W: Write> ClipRecorder<W> {
         Ok(Self {
             task,
             pack: PackWriter::new(out)?,
-            sheet: Sheet::default(),
-            under_way: None,
+            index: ClipIndex::default(),
+            current: None,
             gzip: Gzip::default(),
         })
     }
 
-    /// Adds the sheet and the index.
+    /// Writes the index of episodes and the index of clips.
     ///
     /// # Errors
     /// [`ReplayError::Io`].
     pub fn finish(mut self) -> Result<W, ReplayError> {
-        self.pack.add_sheet(&self.sheet)?;
+        self.pack.add_index(&self.index)?;
         self.pack.finish()
     }
 
     fn end_episode(&mut self, outcome: &EpisodeOutcome) -> Result<(), ReplayError> {
-        let Some(recording) = self.under_way.take() else {
+        let Some(recording) = self.current.take() else {
             return Ok(());
         };
-        let times = self.sheet.times.entry(self.task).or_default();
-        let recorded = recording.end(outcome, times);
-        let [motion, observed] = recorded.compressed(&mut self.gzip)?;
+        let times = self.index.times.entry(self.task).or_default();
+        let clips = recording.end(outcome, times);
+        let [motion, observed] = clips.compressed(&mut self.gzip)?;
         let episode = outcome.episode;
         self.pack.add(Key::motion(self.task, episode), &motion)?;
         self.pack
             .add(Key::observed(self.task, episode), &observed)?;
-        self.sheet.episodes.push(recorded.line);
+        self.index.episodes.push(clips.line);
         Ok(())
     }
 }
 
 impl<W: Write> StepSink for ClipRecorder<W> {
     fn begin(&mut self, start: EpisodeStart<'_>) {
-        self.under_way = Some(Recording::begin(&start));
+        self.current = Some(Recording::begin(&start));
     }
 
     fn observe(&mut self, observation: &[f64]) {
-        if let Some(recording) = &mut self.under_way {
+        if let Some(recording) = &mut self.current {
             recording.observe(observation);
         }
     }
 
     fn step(&mut self, row: &StepRow<'_>) {
-        if let Some(recording) = &mut self.under_way {
+        if let Some(recording) = &mut self.current {
             recording.step(row);
         }
     }

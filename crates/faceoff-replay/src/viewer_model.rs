@@ -1,4 +1,4 @@
-//! The viewer in the browser draws the same robot on the same table: its numbers are the simulator's.
+//! Checks that the constants of the viewer in the browser are those of the simulator.
 
 use faceoff_sim::{
     episode::{
@@ -16,7 +16,7 @@ use std::f64::consts::FRAC_1_SQRT_2;
 const MODEL: &str = include_str!("../../../web/client/src/model/model.json");
 
 #[track_caller]
-fn same(found: &Value, expected: f64) {
+fn assert_same(found: &Value, expected: f64) {
     let number = found.as_f64().unwrap_or(f64::NAN);
     assert!(
         (number - expected).abs() < 1e-12,
@@ -25,21 +25,21 @@ fn same(found: &Value, expected: f64) {
 }
 
 #[test]
-fn the_viewer_has_the_simulators_numbers() {
+fn viewer_model_matches_the_simulator() {
     let model: Value = serde_json::from_str(MODEL).unwrap();
-    same(&model["step_s"], CONTROL_STEP_S);
+    assert_same(&model["step_s"], CONTROL_STEP_S);
     for (base, side) in [(0, -1.0), (1, 1.0)] {
         let base = &model["bases"][base];
-        same(&base["x_m"], side * TABLE.base_x_m);
-        same(&base["y_m"], 0.0);
-        same(&base["z_m"], TABLE.base_z_m);
+        assert_same(&base["x_m"], side * TABLE.base_x_m);
+        assert_same(&base["y_m"], 0.0);
+        assert_same(&base["z_m"], TABLE.base_z_m);
     }
     let links = model["links"].as_array().unwrap();
     assert_eq!(links.len(), LINKS.len());
-    for (told, link) in links.iter().zip(&LINKS) {
-        same(&told["range_rad"], link.range_rad);
-        let limit = told["velocity_limit_deg_s"].as_f64().unwrap().to_radians();
-        same(&limit.into(), link.velocity_limit_rad_s);
+    for (link_model, link) in links.iter().zip(&LINKS) {
+        assert_same(&link_model["range_rad"], link.range_rad);
+        let limit = link_model["velocity_limit_deg_s"].as_f64().unwrap().to_radians();
+        assert_same(&limit.into(), link.velocity_limit_rad_s);
         let position = match link.offset {
             Offset::Y(y) => [0.0, y, 0.0],
             Offset::Z(z) => [0.0, 0.0, z],
@@ -51,43 +51,43 @@ fn the_viewer_has_the_simulators_numbers() {
             Mount::QuarterTurnX => [half, half, 0.0, 0.0],
         };
         for (axis, expected) in position.into_iter().enumerate() {
-            same(&told["position_m"][axis], expected);
+            assert_same(&link_model["position_m"][axis], expected);
         }
         for (part, expected) in orientation.into_iter().enumerate() {
-            same(&told["orientation_wxyz"][part], expected);
+            assert_same(&link_model["orientation_wxyz"][part], expected);
         }
     }
-    for (told, q) in model["initial_q_rad"]
+    for (angle, q) in model["initial_q_rad"]
         .as_array()
         .unwrap()
         .iter()
         .zip(INITIAL_Q)
     {
-        same(told, q);
+        assert_same(angle, q);
     }
-    same(&model["end_effector_z_m"], TOOL.end_effector_z_m);
+    assert_same(&model["end_effector_z_m"], TOOL.end_effector_z_m);
     let mallet = &model["mallet"];
-    same(&mallet["radius_m"], TOOL.cylinder_radius_m);
-    same(&mallet["half_height_m"], TOOL.cylinder_half_height_m);
-    same(&mallet["centre_z_m"], TOOL.cylinder_centre_z_m);
-    same(&model["puck"]["radius_m"], PUCK.radius_m);
+    assert_same(&mallet["radius_m"], TOOL.cylinder_radius_m);
+    assert_same(&mallet["half_height_m"], TOOL.cylinder_half_height_m);
+    assert_same(&mallet["centre_z_m"], TOOL.cylinder_centre_z_m);
+    assert_same(&model["puck"]["radius_m"], PUCK.radius_m);
     let table = &model["table"];
-    same(&table["half_length_m"], TABLE.half_length_m());
-    same(&table["half_width_m"], TABLE.half_width_m());
-    same(&table["goal_half_width_m"], TABLE.goal_width_m / 2.0);
-    same(&table["post_radius_m"], TABLE.post_radius_m);
-    same(&table["rim_width_m"], TABLE.rim_thickness_m);
+    assert_same(&table["half_length_m"], TABLE.half_length_m());
+    assert_same(&table["half_width_m"], TABLE.half_width_m());
+    assert_same(&table["goal_half_width_m"], TABLE.goal_width_m / 2.0);
+    assert_same(&table["post_radius_m"], TABLE.post_radius_m);
+    assert_same(&table["rim_width_m"], TABLE.rim_thickness_m);
     let limits = &model["constraints"];
-    same(&limits["limit_fraction"], LIMIT_FRACTION);
-    same(&limits["ee_height_m"], EE_DESIRED_HEIGHT_M);
-    same(&limits["ee_height_tolerance_m"], HEIGHT_TOLERANCE_M);
-    same(&limits["link_height_m"], LINK_HEIGHT_M);
-    same(&limits["computation_time_s"], CONTROL_STEP_S);
+    assert_same(&limits["limit_fraction"], LIMIT_FRACTION);
+    assert_same(&limits["ee_height_m"], EE_DESIRED_HEIGHT_M);
+    assert_same(&limits["ee_height_tolerance_m"], HEIGHT_TOLERANCE_M);
+    assert_same(&limits["link_height_m"], LINK_HEIGHT_M);
+    assert_same(&limits["computation_time_s"], CONTROL_STEP_S);
     for (task, half_width) in [("defend", TABLE.half_width_m()), ("prepare", PLAYABLE_Y_M)] {
         let region = &model["success_regions"][task];
         let [from, to] = TASK_RULES.success_x_m;
-        same(&region["x_from_m"], from);
-        same(&region["x_to_m"], to);
-        same(&region["half_width_m"], half_width);
+        assert_same(&region["x_from_m"], from);
+        assert_same(&region["x_to_m"], to);
+        assert_same(&region["half_width_m"], half_width);
     }
 }

@@ -1,41 +1,41 @@
-//! When constraints were broken.
+//! Tracks violations of constraints.
 
-use crate::{group::Group, header::ViolationTold};
+use crate::{group::Group, header::ViolationSpan};
 use faceoff_sim::ConstraintValues;
 
-/// The violations of a side, as they come.
+/// Collects the violations of a side.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Watch {
-    under_way: [Option<ViolationTold>; 4],
-    over: Vec<ViolationTold>,
+pub(crate) struct ViolationTracker {
+    current: [Option<ViolationSpan>; 4],
+    finished: Vec<ViolationSpan>,
 }
 
-impl Watch {
-    /// Takes note of the values at a sample.
-    pub fn see(&mut self, side: u32, sample: u32, values: &ConstraintValues) {
-        for (group, under_way) in Group::ALL.into_iter().zip(&mut self.under_way) {
-            let value = group.of(values);
+impl ViolationTracker {
+    /// Adds the values of a sample.
+    pub fn update(&mut self, side: u32, sample: u32, values: &ConstraintValues) {
+        for (group, current) in Group::ALL.into_iter().zip(&mut self.current) {
+            let value = group.value(values);
             if value > 0.0 {
-                let told = under_way.get_or_insert(ViolationTold {
+                let span = current.get_or_insert(ViolationSpan {
                     side,
                     group,
                     from: sample,
                     to: sample,
                     worst: value,
                 });
-                told.to = sample;
-                told.worst = told.worst.max(value);
+                span.to = sample;
+                span.worst = span.worst.max(value);
             } else {
-                self.over.extend(under_way.take());
+                self.finished.extend(current.take());
             }
         }
     }
 
-    /// All so far, in order of their first sample; they are forgotten.
-    pub fn take(&mut self) -> Vec<ViolationTold> {
-        let mut all = std::mem::take(&mut self.over);
-        all.extend(self.under_way.iter_mut().filter_map(Option::take));
-        all.sort_by_key(|told| (told.from, told.group));
+    /// Removes and returns all violations so far, in the order of their first sample.
+    pub fn take(&mut self) -> Vec<ViolationSpan> {
+        let mut all = std::mem::take(&mut self.finished);
+        all.extend(self.current.iter_mut().filter_map(Option::take));
+        all.sort_by_key(|span| (span.from, span.group));
         all
     }
 }

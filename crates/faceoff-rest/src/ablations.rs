@@ -1,10 +1,9 @@
-//! Ablations: a submission under each perturbation alone. The organiser orders them; they take no turn
-//! and reach no board.
+//! Ablations: a submission evaluated under each perturbation alone. Organisers start them; they never count.
 
 use super::{
-    clip_answer::send,
+    clip_response::send,
     document::{Binary, TagHeader},
-    episodes::checked_episodes,
+    episode_count::checked_episodes,
 };
 use axum::{
     Json,
@@ -12,7 +11,7 @@ use axum::{
     http::{HeaderMap, StatusCode},
     response::{IntoResponse, Response},
 };
-use faceoff_api::{requests::OrderAblation, views::ablation::AblationView};
+use faceoff_api::{requests::NewAblation, views::ablation::AblationView};
 use faceoff_replay::Key;
 use faceoff_service::{
     app::App,
@@ -27,10 +26,10 @@ use faceoff_service::{
 use faceoff_store::RunPlan;
 use faceoff_types::{Profile, SubmissionId, Task};
 
-/// Episodes of each task and profile, unless the order says otherwise.
+/// Default number of episodes per task and profile.
 const DEFAULT_EPISODES: u32 = 100;
 
-/// The newest ablation of a submission; for its team and the organiser.
+/// Returns the newest ablation of a submission. For its team and organisers.
 #[utoipa::path(
     get, path = "/submissions/{id}/ablation", tag = "team",
     security(("team" = []), ("organiser" = [])),
@@ -50,8 +49,10 @@ pub(crate) async fn ablation(
         .ok_or_else(|| Problem::not_found("ablation"))
 }
 
-/// The motion of table and robots in an episode of a submission's newest ablation, as a clip that replays are drawn from: of
-/// the episodes that do not end as in the ideal simulator, in both. For everybody.
+/// Returns the motion of table and robots in an episode of a submission's newest ablation, as a binary clip. Public.
+///
+/// Clips exist for episodes whose outcome differs from the ideal simulator's, in both. `docs/replay.md` describes the
+/// format.
 #[utoipa::path(
     get, path = "/submissions/{id}/ablation/{profile}/{task}/{episode}/motion", tag = "public",
     security((), ("team" = []), ("organiser" = [])),
@@ -60,7 +61,7 @@ pub(crate) async fn ablation(
     ),
     responses(
         (status = 200, body = inline(Binary), content_type = "application/octet-stream"),
-        (status = 404, description = "there is none, or it ended as in the ideal simulator"),
+        (status = 404, description = "no such episode, or its outcome equals the ideal simulator's"),
     )
 )]
 pub(crate) async fn ablation_motion(
@@ -70,13 +71,13 @@ pub(crate) async fn ablation_motion(
     State(app): State<App>,
     path: AblationPath,
 ) -> Result<Response, Problem> {
-    let clips = AblationClips::of(&app, viewer, path.submission).await?;
+    let clips = AblationClips::load(&app, viewer, path.submission).await?;
     let key = Key::motion(path.task, path.episode);
     send_episode(&app, &clips, key, "motion", path, &conditions, &headers).await
 }
 
-/// What the agent was told and commanded in such an episode, and how long its answers took, as a clip; for its team and
-/// organisers.
+/// Returns the agent's observations, actions and computation times in an episode of a submission's newest ablation, as
+/// a binary clip. For its team and organisers.
 #[utoipa::path(
     get, path = "/submissions/{id}/ablation/{profile}/{task}/{episode}/observed", tag = "team",
     security(("team" = []), ("organiser" = [])),
@@ -85,8 +86,8 @@ pub(crate) async fn ablation_motion(
     ),
     responses(
         (status = 200, body = inline(Binary), content_type = "application/octet-stream"),
-        (status = 403, description = "another team's"),
-        (status = 404, description = "there is none, or it ended as in the ideal simulator"),
+        (status = 403, description = "the submission belongs to another team"),
+        (status = 404, description = "no such episode, or its outcome equals the ideal simulator's"),
     )
 )]
 pub(crate) async fn ablation_observed(
@@ -96,11 +97,11 @@ pub(crate) async fn ablation_observed(
     State(app): State<App>,
     path: AblationPath,
 ) -> Result<Response, Problem> {
-    let clips = AblationClips::of(&app, viewer, path.submission).await?;
-    if !clips.sees_observed {
+    let clips = AblationClips::load(&app, viewer, path.submission).await?;
+    if !clips.can_see_observations {
         return Err(Problem::new(
-            viewer.refusal(),
-            "what an agent was told and commanded is its team's; the motion is there for everybody",
+            viewer.denial_kind(),
+            "observations and actions are visible only to the agent's team; the motion is public",
         ));
     }
     let key = Key::observed(path.task, path.episode);
@@ -116,24 +117,25 @@ async fn send_episode(
     conditions: &Conditions,
     headers: &HeaderMap,
 ) -> Result<Response, Problem> {
-    let file = clips.of_profile(app, path.profile).await?;
-    let tag = ETag::of(
+    let file = clips.profile(app, path.profile).await?;
+    let tag = ETag::new(
         what,
         &[&file.key, path.task.as_str(), &path.episode.to_string()],
     );
     send(&tag, conditions, headers, file.clip(key)).await
 }
 
-/// Orders an ablation: all tasks in all profiles, on episodes of their own. It is played when nothing
-/// that counts waits.
+/// Starts an ablation: all tasks in all profiles, on episodes of their own.
+///
+/// Its jobs run when no job that counts is pending.
 #[utoipa::path(
     post, path = "/submissions/{id}/ablation", tag = "organiser", security(("organiser" = [])),
     params(("id" = SubmissionId, Path)),
-    request_body(content = Option<OrderAblation>, content_type = "application/json"),
+    request_body(content = Option<NewAblation>, content_type = "application/json"),
     responses(
         (status = 201, body = AblationView),
         (status = 404),
-        (status = 409, description = "one is under way, the submission is not valid, or the season is closed"),
+        (status = 409, description = "an ablation is running, the submission is not valid, or the season is closed"),
         (status = 422),
     )
 )]
@@ -141,7 +143,7 @@ pub(crate) async fn order_ablation(
     organiser: Organiser,
     State(app): State<App>,
     PathParam(id): PathParam<SubmissionId>,
-    OptionalJson(wanted): OptionalJson<OrderAblation>,
+    OptionalJson(wanted): OptionalJson<NewAblation>,
 ) -> Result<impl IntoResponse, Problem> {
     let episodes = wanted.episodes_per_task.unwrap_or(DEFAULT_EPISODES);
     let plan = RunPlan {
@@ -150,9 +152,9 @@ pub(crate) async fn order_ablation(
     };
     let ablation = app
         .store
-        .create_ablation(organiser.actor(), id, &plan, app.config.clock.now())
+        .request_ablation(organiser.actor(), id, &plan, app.config.clock.now())
         .await?;
-    tracing::info!(submission = %id, ablation = %ablation.id, "ablation ordered");
-    let view = ablation::of(&app, ablation).await?;
+    tracing::info!(submission = %id, ablation = %ablation.id, "ablation queued");
+    let view = ablation::build(&app, ablation).await?;
     Ok((StatusCode::CREATED, Json(view)))
 }

@@ -1,4 +1,4 @@
-//! What is told to everybody, and what teams ask.
+//! Announcements, and questions of teams.
 
 use crate::paging::{Page, PageQuery, Paged};
 use axum::{Json, extract::State, http::StatusCode};
@@ -7,16 +7,16 @@ use faceoff_api::{
     views::announcement::{AnnouncementView, QuestionView},
 };
 use faceoff_service::{
-    acts::telling,
+    services::announcements,
     app::App,
-    auth::{Anybody, Organiser, TeamCaller},
+    auth::{OptionalCaller, Organiser, TeamCaller},
     extract::{Json as Body, PathParam},
     problem::Problem,
     views::announcement,
 };
 use faceoff_types::{AnnouncementId, QuestionId};
 
-/// What the organisers have told everybody, the newest first.
+/// Lists the organisers' announcements, newest first.
 #[utoipa::path(
     get, path = "/announcements", tag = "public",
     params(PageQuery), responses((status = 200, body = Vec<AnnouncementView>))
@@ -26,11 +26,11 @@ pub(crate) async fn list_announcements(
     State(app): State<App>,
 ) -> Result<Paged<AnnouncementView>, Problem> {
     let announcements = app.store.announcements(u32::MAX).await?;
-    let page = page.cut(announcements, |announcement| announcement.id)?;
-    Ok(page.map(announcement::of))
+    let page = page.select(announcements, |announcement| announcement.id)?;
+    Ok(page.map(announcement::view))
 }
 
-/// Tells everybody; what was told stays.
+/// Publishes an announcement. It cannot be changed or removed.
 #[utoipa::path(
     post, path = "/announcements", tag = "organiser", security(("organiser" = [])), request_body = NewAnnouncement,
     params(PageQuery),
@@ -41,31 +41,31 @@ pub(crate) async fn announce(
     State(app): State<App>,
     Body(new): Body<NewAnnouncement>,
 ) -> Result<(StatusCode, Json<AnnouncementView>), Problem> {
-    let view = telling::announce(&app, organiser.actor(), &new).await?;
+    let view = announcements::announce(&app, organiser.actor(), &new).await?;
     Ok((StatusCode::CREATED, Json(view)))
 }
 
-/// Questions, the newest first: for everybody those with a public answer, for a team also its own, for organisers all.
+/// Lists questions, newest first. Visitors see those with a public answer, teams also their own, organisers all.
 #[utoipa::path(
     get, path = "/questions", tag = "public", security((), ("team" = []), ("organiser" = [])),
     params(PageQuery),
     responses((status = 200, body = Vec<QuestionView>))
 )]
 pub(crate) async fn list_questions(
-    caller: Anybody,
+    caller: OptionalCaller,
     page: Page<QuestionId>,
     State(app): State<App>,
 ) -> Result<Paged<QuestionView>, Problem> {
-    let shown = telling::questions(&app, caller.0.as_ref()).await?;
-    page.cut(shown, |question| question.id)
+    let shown = announcements::questions(&app, caller.0.as_ref()).await?;
+    page.select(shown, |question| question.id)
 }
 
-/// Asks the organisers. Other teams read it only with a public answer, and never who asked.
+/// Asks the organisers a question. Other teams see it only with a public answer, and never the asking team.
 #[utoipa::path(
     post, path = "/questions", tag = "team", security(("team" = [])), request_body = NewQuestion,
     responses(
         (status = 201, body = QuestionView),
-        (status = 409, description = "too many of the team's wait for an answer"),
+        (status = 409, description = "the team has too many unanswered questions"),
         (status = 422),
     )
 )]
@@ -74,11 +74,11 @@ pub(crate) async fn ask(
     State(app): State<App>,
     Body(new): Body<NewQuestion>,
 ) -> Result<(StatusCode, Json<QuestionView>), Problem> {
-    let view = telling::ask(&app, &caller, &new).await?;
+    let view = announcements::ask(&app, &caller, &new).await?;
     Ok((StatusCode::CREATED, Json(view)))
 }
 
-/// Answers a question, or answers it anew.
+/// Answers a question, or replaces its answer.
 #[utoipa::path(
     put, path = "/questions/{id}/answer", tag = "organiser", security(("organiser" = [])),
     params(("id" = QuestionId, Path)), request_body = NewAnswer,
@@ -90,6 +90,6 @@ pub(crate) async fn answer(
     PathParam(id): PathParam<QuestionId>,
     Body(new): Body<NewAnswer>,
 ) -> Result<Json<QuestionView>, Problem> {
-    let answered = telling::answer(&app, organiser.actor(), id, &new);
+    let answered = announcements::answer(&app, organiser.actor(), id, &new);
     answered.await.map(Json)
 }

@@ -1,4 +1,4 @@
-//! The boards: overall and by task, of each stage, and what they were made of day by day; as JSON and as tables.
+//! Boards, overall and by task, and their history day by day; as JSON or CSV.
 
 use super::{board_csv, document::TagHeader};
 use axum::{
@@ -18,20 +18,20 @@ use faceoff_service::{
     extract::{PathParam, QueryParams},
     problem::Problem,
     viewer::Viewer,
-    views::{board, history, sight::Sight},
+    views::{board, history, visibility::Visibility},
 };
 use faceoff_types::Task;
 use serde::Serialize;
 
-/// The overall board.
+/// Returns the overall board of a stage.
 #[utoipa::path(
     get, path = "/board", tag = "public", security((), ("team" = []), ("organiser" = [])),
     params(BoardQuery, TagHeader),
     responses(
         (status = 200, content((BoardView = "application/json"), (String = "text/csv"))),
-        (status = 401, description = "the live board of a frozen stage is the organiser's, and no token came, or one that is worth nothing"),
-        (status = 403, description = "the live board of a frozen stage is the organiser's"),
-        (status = 404, description = "no such stage, revision or division, or no result of that day"),
+        (status = 401, description = "`live` needs an organiser's token, and the request has none, or the token is invalid"),
+        (status = 403, description = "`live` needs an organiser's token"),
+        (status = 404, description = "no such stage, revision or division, or the day has no results"),
     )
 )]
 pub(crate) async fn board(
@@ -41,18 +41,18 @@ pub(crate) async fn board(
     State(app): State<App>,
     QueryParams(query): QueryParams<BoardQuery>,
 ) -> Result<Response, Problem> {
-    answer(&app, viewer, &conditions, &headers, query, None).await
+    respond(&app, viewer, &conditions, &headers, query, None).await
 }
 
-/// The board of one task, ranked by its success rate and its penalty points.
+/// Returns the board of one task, ranked by its success rate and its penalty points.
 #[utoipa::path(
     get, path = "/board/{task}", tag = "public", security((), ("team" = []), ("organiser" = [])),
     params(("task" = Task, Path), BoardQuery, TagHeader),
     responses(
         (status = 200, content((BoardView = "application/json"), (String = "text/csv"))),
-        (status = 401, description = "the live board of a frozen stage is the organiser's, and no token came, or one that is worth nothing"),
-        (status = 403, description = "the live board of a frozen stage is the organiser's"),
-        (status = 404, description = "no such stage, revision or division, or no result of that day"),
+        (status = 401, description = "`live` needs an organiser's token, and the request has none, or the token is invalid"),
+        (status = 403, description = "`live` needs an organiser's token"),
+        (status = 404, description = "no such stage, revision or division, or the day has no results"),
     )
 )]
 pub(crate) async fn task_board(
@@ -63,17 +63,17 @@ pub(crate) async fn task_board(
     PathParam(task): PathParam<Task>,
     QueryParams(query): QueryParams<BoardQuery>,
 ) -> Result<Response, Problem> {
-    answer(&app, viewer, &conditions, &headers, query, Some(task)).await
+    respond(&app, viewer, &conditions, &headers, query, Some(task)).await
 }
 
-/// What each team came to on each day, and where it stood by then.
+/// Returns the results and ranks of all teams, day by day.
 #[utoipa::path(
     get, path = "/board/history", tag = "public", security((), ("team" = []), ("organiser" = [])),
     params(HistoryQuery, TagHeader),
     responses(
         (status = 200, content((HistoryView = "application/json"), (String = "text/csv"))),
-        (status = 401, description = "what was finished since the freeze is the organiser's, and no token came, or one that is worth nothing"),
-        (status = 403, description = "what was finished since the freeze is the organiser's"),
+        (status = 401, description = "`live` needs an organiser's token, and the request has none, or the token is invalid"),
+        (status = 403, description = "`live` needs an organiser's token"),
         (status = 404, description = "no such stage, revision or division"),
     )
 )]
@@ -85,20 +85,20 @@ pub(crate) async fn board_history(
     QueryParams(mut query): QueryParams<HistoryQuery>,
 ) -> Result<Response, Problem> {
     let change = app.store.newest_change().await?;
-    let sight = Sight::of(&app, viewer).await?;
-    let stage = board::stage_asked(&app, &sight, (query.stage, query.live)).await?;
+    let visibility = Visibility::load(&app, viewer).await?;
+    let stage = board::requested_stage(&app, &visibility, (query.stage, query.live)).await?;
     query.stage = Some(stage.id);
-    let format = format_of(query.format, &headers);
+    let format = choose_format(query.format, &headers);
     let tag = tag(&app, change, viewer, format, &("history", &query))?;
-    let Some(mut answer) = conditions.not_modified(&tag) else {
-        let history = history::asked(&app, &sight, query).await?;
-        return Ok(sent(&tag, format, &history, board_csv::of_history));
+    let Some(mut response) = conditions.not_modified(&tag) else {
+        let history = history::query(&app, &visibility, query).await?;
+        return Ok(build_response(&tag, format, &history, board_csv::history_table));
     };
-    to_be_asked_again(answer.headers_mut());
-    Ok(answer)
+    require_revalidation(response.headers_mut());
+    Ok(response)
 }
 
-async fn answer(
+async fn respond(
     app: &App,
     viewer: Viewer,
     conditions: &Conditions,
@@ -107,76 +107,76 @@ async fn answer(
     task: Option<Task>,
 ) -> Result<Response, Problem> {
     let change = app.store.newest_change().await?;
-    let sight = Sight::of(app, viewer).await?;
-    let stage = board::stage_asked(app, &sight, (query.stage, query.live)).await?;
-    // Which stage is open changes without a change of the season.
+    let visibility = Visibility::load(app, viewer).await?;
+    let stage = board::requested_stage(app, &visibility, (query.stage, query.live)).await?;
+    // The open stage changes by the clock, without a change of the season, so the tag contains the stage.
     query.stage = Some(stage.id);
-    let format = format_of(query.format, headers);
+    let format = choose_format(query.format, headers);
     let tag = tag(app, change, viewer, format, &(task, &query))?;
-    let Some(mut answer) = conditions.not_modified(&tag) else {
-        let board = board::asked(app, &sight, query, task).await?;
-        return Ok(sent(&tag, format, &board, board_csv::of_board));
+    let Some(mut response) = conditions.not_modified(&tag) else {
+        let board = board::query(app, &visibility, query, task).await?;
+        return Ok(build_response(&tag, format, &board, board_csv::board_table));
     };
-    to_be_asked_again(answer.headers_mut());
-    Ok(answer)
+    require_revalidation(response.headers_mut());
+    Ok(response)
 }
 
-/// Of what was asked, by whom, as of the newest change of the season: the newest before anything is read, so that what is
-/// changed meanwhile has another tag next time, though it may have been sent already.
+/// Tag of a request, the viewer and the newest change of the season. The change is read before everything else, so a
+/// change in between gives another tag next time, even if the response already includes it.
 fn tag(
     app: &App,
     change: i64,
     viewer: Viewer,
     format: BoardFormat,
-    asked: &impl Serialize,
+    request: &impl Serialize,
 ) -> Result<ETag, Problem> {
-    // To all others boards are the same.
+    // Boards are the same for all other viewers.
     let is_organiser = viewer == Viewer::Organiser;
-    let asked =
-        serde_json::to_string(&(change, is_organiser, format, asked)).map_err(Problem::internal)?;
-    Ok(ETag::of("board", &[&app.run.to_string(), &asked]))
+    let key = (change, is_organiser, format, request);
+    let key = serde_json::to_string(&key).map_err(Problem::internal)?;
+    Ok(ETag::new("board", &[&app.process_id.to_string(), &key]))
 }
 
-/// The query decides, then what the client takes: a table only where it takes no JSON.
-fn format_of(asked: Option<BoardFormat>, headers: &HeaderMap) -> BoardFormat {
+/// The format in the query, else the one that `Accept` prefers: CSV only if the client does not accept JSON.
+fn choose_format(requested: Option<BoardFormat>, headers: &HeaderMap) -> BoardFormat {
     let accepts = |media_type: &str| {
         let values = headers.get_all(header::ACCEPT).into_iter();
         values
             .filter_map(|value| value.to_str().ok())
             .flat_map(|value| value.split(','))
-            .filter_map(|one| one.split(';').next())
-            .any(|one| one.trim().eq_ignore_ascii_case(media_type))
+            .filter_map(|accepted| accepted.split(';').next())
+            .any(|accepted| accepted.trim().eq_ignore_ascii_case(media_type))
     };
-    match asked {
+    match requested {
         Some(format) => format,
         None if accepts("text/csv") && !accepts("application/json") => BoardFormat::Csv,
         None => BoardFormat::Json,
     }
 }
 
-fn sent<T: Serialize>(
+fn build_response<T: Serialize>(
     tag: &ETag,
     format: BoardFormat,
-    of: &T,
+    view: &T,
     csv: impl FnOnce(&T) -> Vec<u8>,
 ) -> Response {
-    let mut answer = match format {
-        BoardFormat::Json => Json(of).into_response(),
+    let mut response = match format {
+        BoardFormat::Json => Json(view).into_response(),
         BoardFormat::Csv => {
             let media_type = [(header::CONTENT_TYPE, MEDIA_TYPE)];
-            (media_type, csv(of)).into_response()
+            (media_type, csv(view)).into_response()
         }
     };
-    let headers = answer.headers_mut();
+    let headers = response.headers_mut();
     headers.insert(header::ETAG, tag.header());
-    to_be_asked_again(headers);
-    answer
+    require_revalidation(headers);
+    response
 }
 
-/// Whoever keeps it asks each time, as who they are, whether it still stands.
-fn to_be_asked_again(headers: &mut HeaderMap) {
+/// Caches must revalidate the response for each caller.
+fn require_revalidation(headers: &mut HeaderMap) {
     let cache = HeaderValue::from_static("private, no-cache");
     headers.insert(header::CACHE_CONTROL, cache);
-    let by = HeaderValue::from_static("authorization, cookie, accept");
-    headers.insert(header::VARY, by);
+    let request_headers = HeaderValue::from_static("authorization, cookie, accept");
+    headers.insert(header::VARY, request_headers);
 }

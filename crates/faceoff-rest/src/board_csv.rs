@@ -1,12 +1,12 @@
-//! Boards, and what teams have played, for spreadsheets: a line for each row, with everything that a row has by task.
+//! Boards and their history as CSV: one line per row, with the results of all tasks.
 
 use faceoff_api::views::{board::BoardView, history::HistoryView, task::TaskView};
-use faceoff_service::csv::{Table, or_empty, words};
+use faceoff_service::csv::{Table, escape_formula, or_empty};
 use faceoff_types::Task;
 use std::collections::BTreeMap;
 
-/// Columns of each task, whose name stands before them.
-const OF_TASK: [&str; 16] = [
+/// Columns of each task, prefixed with its name.
+const TASK_COLUMNS: [&str; 16] = [
     "episodes",
     "successes",
     "success_rate",
@@ -25,19 +25,19 @@ const OF_TASK: [&str; 16] = [
     "computation_time_max_s",
 ];
 
-/// The columns of all tasks behind others, whether a row has them or not.
-fn with_tasks(columns: &[&str]) -> Table {
+/// A table with these columns and those of all tasks.
+fn table_with_tasks(columns: &[&str]) -> Table {
     let mut all: Vec<String> = columns.iter().map(|column| (*column).to_owned()).collect();
     for task in Task::ALL {
-        all.extend(OF_TASK.map(|column| format!("{task}_{column}")));
+        all.extend(TASK_COLUMNS.map(|column| format!("{task}_{column}")));
     }
     let names: Vec<&str> = all.iter().map(String::as_str).collect();
     Table::new(&names)
 }
 
-fn of_tasks(tasks: &BTreeMap<Task, TaskView>) -> impl Iterator<Item = String> + '_ {
-    let of_task = |task| match tasks.get(&task) {
-        None => vec![String::new(); OF_TASK.len()],
+fn task_fields(tasks: &BTreeMap<Task, TaskView>) -> impl Iterator<Item = String> + '_ {
+    let fields = |task| match tasks.get(&task) {
+        None => vec![String::new(); TASK_COLUMNS.len()],
         Some(result) => {
             let violations = result.violations;
             let time = result.computation_time_s;
@@ -50,51 +50,51 @@ fn of_tasks(tasks: &BTreeMap<Task, TaskView>) -> impl Iterator<Item = String> + 
                 result.penalty_points.to_string(),
                 result.tier.to_string(),
                 or_empty(result.steps),
-                or_empty(violations.map(|of| of.ee)),
-                or_empty(violations.map(|of| of.link)),
-                or_empty(violations.map(|of| of.joint_pos)),
-                or_empty(violations.map(|of| of.joint_vel)),
-                or_empty(violations.map(|of| of.computation_time)),
-                or_empty(time.map(|of| of.mean)),
-                or_empty(time.map(|of| of.p99)),
-                or_empty(time.map(|of| of.max)),
+                or_empty(violations.map(|counts| counts.ee)),
+                or_empty(violations.map(|counts| counts.link)),
+                or_empty(violations.map(|counts| counts.joint_pos)),
+                or_empty(violations.map(|counts| counts.joint_vel)),
+                or_empty(violations.map(|counts| counts.computation_time)),
+                or_empty(time.map(|summary| summary.mean)),
+                or_empty(time.map(|summary| summary.p99)),
+                or_empty(time.map(|summary| summary.max)),
             ]
         }
     };
-    Task::ALL.into_iter().flat_map(of_task)
+    Task::ALL.into_iter().flat_map(fields)
 }
 
-/// What ranked rows and baselines have in common, whose fields have the same names.
-macro_rules! in_common {
+/// The common fields of ranked rows and baselines, which have the same names in both types.
+macro_rules! common_fields {
     ($row:expr, $division:expr) => {{
         let row = $row;
         [
             row.tier.to_string(),
             or_empty(row.tier_change_probability),
-            words(row.team.as_str()),
+            escape_formula(row.team.as_str()),
             row.team_id.to_string(),
-            words(row.agent.as_deref().unwrap_or_default()),
+            escape_formula(row.agent.as_deref().unwrap_or_default()),
             row.score.to_string(),
             row.penalty_points.to_string(),
             row.day.to_string(),
             row.evaluation.to_string(),
             row.finished_at.to_string(),
-            words($division),
+            escape_formula($division),
             row.evaluations.len().to_string(),
-            words(row.extra_turn.as_deref().unwrap_or_default()),
+            escape_formula(row.extra_turn.as_deref().unwrap_or_default()),
             or_empty(row.released_at),
             row.ruleset.clone(),
             row.profile.to_string(),
             or_empty(row.seed),
         ]
         .into_iter()
-        .chain(of_tasks(&row.tasks))
+        .chain(task_fields(&row.tasks))
     }};
 }
 
 /// The ranked rows, then the baselines.
-pub(crate) fn of_board(board: &BoardView) -> Vec<u8> {
-    let mut table = with_tasks(&[
+pub(crate) fn board_table(board: &BoardView) -> Vec<u8> {
+    let mut table = table_with_tasks(&[
         "rank",
         "rank_group",
         "baseline",
@@ -119,28 +119,28 @@ pub(crate) fn of_board(board: &BoardView) -> Vec<u8> {
     ]);
     for row in &board.rows {
         let division = row.division.as_ref().map_or("", |name| name.as_str());
-        let place = [
+        let rank = [
             row.rank.to_string(),
             row.rank_group.to_string(),
             "false".to_owned(),
             String::new(),
         ];
-        table.row(place.into_iter().chain(in_common!(row, division)));
+        table.row(rank.into_iter().chain(common_fields!(row, division)));
     }
     for row in &board.baselines {
-        let place = [
+        let rank = [
             String::new(),
             String::new(),
             "true".to_owned(),
             row.would_rank.to_string(),
         ];
-        table.row(place.into_iter().chain(in_common!(row, "")));
+        table.row(rank.into_iter().chain(common_fields!(row, "")));
     }
     table.into_bytes()
 }
 
-pub(crate) fn of_history(history: &HistoryView) -> Vec<u8> {
-    let mut table = with_tasks(&[
+pub(crate) fn history_table(history: &HistoryView) -> Vec<u8> {
+    let mut table = table_with_tasks(&[
         "day",
         "team",
         "team_id",
@@ -158,9 +158,9 @@ pub(crate) fn of_history(history: &HistoryView) -> Vec<u8> {
     for row in &history.rows {
         let fields = [
             row.day.to_string(),
-            words(row.team.as_str()),
+            escape_formula(row.team.as_str()),
             row.team_id.to_string(),
-            words(row.division.as_ref().map_or("", |name| name.as_str())),
+            escape_formula(row.division.as_ref().map_or("", |name| name.as_str())),
             row.baseline.to_string(),
             or_empty(row.rank),
             or_empty(row.would_rank),
@@ -171,7 +171,7 @@ pub(crate) fn of_history(history: &HistoryView) -> Vec<u8> {
             row.finished_at.to_string(),
             or_empty(row.released_at),
         ];
-        table.row(fields.into_iter().chain(of_tasks(&row.tasks)));
+        table.row(fields.into_iter().chain(task_fields(&row.tasks)));
     }
     table.into_bytes()
 }

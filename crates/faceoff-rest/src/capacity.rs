@@ -1,4 +1,4 @@
-//! Whether the days of a stage fit into their time.
+//! Capacity forecasts of stages.
 
 use axum::{Json, extract::State};
 use faceoff_api::views::capacity::CapacityView;
@@ -7,8 +7,8 @@ use faceoff_service::{
 };
 use faceoff_types::StageId;
 
-/// How the days that are under way, and the next one, fit into the time until their deadlines: expected and longest
-/// hours on the slots that there are, with a sentence.
+/// Returns the capacity forecast of a stage's running days and the next one: expected and maximum hours on all slots,
+/// compared with the time until their deadlines.
 #[utoipa::path(
     get, path = "/stages/{id}/capacity", tag = "organiser", security(("organiser" = [])),
     params(("id" = StageId, Path)),
@@ -19,5 +19,5 @@ pub(crate) async fn capacity(
     State(app): State<App>,
     PathParam(id): PathParam<StageId>,
 ) -> Result<Json<CapacityView>, Problem> {
-    capacity::of(&app, id).await.map(Json)
+    capacity::build(&app, id).await.map(Json)
 }

@@ -1,9 +1,9 @@
-//! How an evaluation's episodes went, and the clips that their replays are drawn from.
+//! Episodes of evaluations, and their clips for replays.
 
 use super::{
-    clip_answer::send,
+    clip_response::send,
     document::{Binary, TagHeader},
-    downloads::stays_its_callers,
+    downloads::set_private_caching,
 };
 use axum::{
     Json,
@@ -20,13 +20,13 @@ use faceoff_service::{
     extract::PathParam,
     problem::Problem,
     viewer::Viewer,
-    views::{clips::Clips, sight::Sight},
+    views::{clips::Clips, visibility::Visibility},
 };
 use faceoff_types::EvaluationId;
 
-/// How the episodes of an evaluation went, once its day is released: where each began and ended and why, and what it broke.
+/// Returns the episodes of an evaluation, once its day is released: start, end, outcome and violations.
 ///
-/// Everybody sees it, as the result. Computation times, and what exactly a faulty agent did, are for whoever gets the dataset.
+/// Public. Computation times and details of agent faults need access to the dataset.
 #[utoipa::path(
     get, path = "/evaluations/{id}/episodes", tag = "public",
     security((), ("team" = []), ("organiser" = [])),
@@ -34,8 +34,8 @@ use faceoff_types::EvaluationId;
     responses(
         (status = 200, body = EpisodesView),
         (status = 404),
-        (status = 409, description = "no result, its day is not released, its stage is blind or its boards frozen; or an older version of the server played it"),
-        (status = 410, description = "the recording was removed; the detail says when and by which retention"),
+        (status = 409, description = "no result, its day is not released, its stage is blind or its boards are frozen, or an older server version ran it"),
+        (status = 410, description = "the recording was removed; the detail says when and by which retention rule"),
     )
 )]
 pub(crate) async fn episodes(
@@ -44,27 +44,27 @@ pub(crate) async fn episodes(
     State(app): State<App>,
     PathParam(id): PathParam<EvaluationId>,
 ) -> Result<Response, Problem> {
-    let sight = Sight::of(&app, viewer).await?;
-    let clips = Clips::of(&app, &sight, id).await?;
-    let seen = if clips.sees_observed { "all" } else { "some" };
-    let tag = ETag::of(
+    let visibility = Visibility::load(&app, viewer).await?;
+    let clips = Clips::find(&app, &visibility, id).await?;
+    let detail = if clips.can_see_observations { "all" } else { "public" };
+    let tag = ETag::new(
         "episodes",
-        &[&clips.file.key, seen, env!("CARGO_PKG_VERSION")],
+        &[&clips.file.key, detail, env!("CARGO_PKG_VERSION")],
     );
-    let mut answer = match conditions.not_modified(&tag) {
-        Some(answer) => answer,
+    let mut response = match conditions.not_modified(&tag) {
+        Some(response) => response,
         None => {
             let view = clips.episodes().await?;
             ([(header::ETAG, tag.header())], Json(view)).into_response()
         }
     };
-    stays_its_callers(answer.headers_mut());
-    Ok(answer)
+    set_private_caching(response.headers_mut());
+    Ok(response)
 }
 
-/// The motion of table and robots in an episode, as a clip that replays are drawn from; for everybody, once the day is released.
+/// Returns the motion of table and robots in an episode, as a binary clip. Public once the day is released.
 ///
-/// Its bytes are described in `docs/replay.md`. They come gzip-compressed, for whoever accepts that.
+/// `docs/replay.md` describes the format. The response is gzip-compressed if the client accepts that.
 #[utoipa::path(
     get, path = "/evaluations/{id}/episodes/{task}/{episode}/motion", tag = "public",
     security((), ("team" = []), ("organiser" = [])),
@@ -72,7 +72,7 @@ pub(crate) async fn episodes(
     responses(
         (status = 200, body = inline(Binary), content_type = "application/octet-stream"),
         (status = 404),
-        (status = 409, description = "as for the episodes"),
+        (status = 409, description = "no result, its day is not released, its stage is blind or its boards are frozen, or an older server version ran it"),
         (status = 410, description = "the recording was removed"),
     )
 )]
@@ -83,13 +83,13 @@ pub(crate) async fn motion(
     State(app): State<App>,
     path: EpisodePath,
 ) -> Result<Response, Problem> {
-    let sight = Sight::of(&app, viewer).await?;
-    let clips = Clips::of(&app, &sight, path.id).await?;
+    let visibility = Visibility::load(&app, viewer).await?;
+    let clips = Clips::find(&app, &visibility, path.id).await?;
     let key = Key::motion(path.task, path.episode);
     send_episode(&clips, key, "motion", path, &conditions, &headers).await
 }
 
-/// What the agent was told and commanded in an episode, and how long its answers took, as a clip; for whoever gets the
+/// Returns the agent's observations, actions and computation times in an episode, as a binary clip. Needs access to the
 /// dataset.
 #[utoipa::path(
     get, path = "/evaluations/{id}/episodes/{task}/{episode}/observed", tag = "team",
@@ -97,9 +97,9 @@ pub(crate) async fn motion(
     params(("id" = EvaluationId, Path), ("task" = faceoff_types::Task, Path), ("episode" = u32, Path), TagHeader),
     responses(
         (status = 200, body = inline(Binary), content_type = "application/octet-stream"),
-        (status = 403, description = "another team's, and not public"),
+        (status = 403, description = "the evaluation belongs to another team and is not public"),
         (status = 404),
-        (status = 409, description = "as for the episodes"),
+        (status = 409, description = "no result, its day is not released, its stage is blind or its boards are frozen, or an older server version ran it"),
         (status = 410, description = "the recording was removed"),
     )
 )]
@@ -110,13 +110,13 @@ pub(crate) async fn observed(
     State(app): State<App>,
     path: EpisodePath,
 ) -> Result<Response, Problem> {
-    let sight = Sight::of(&app, viewer).await?;
-    let clips = Clips::of(&app, &sight, path.id).await?;
-    if !clips.sees_observed {
+    let visibility = Visibility::load(&app, viewer).await?;
+    let clips = Clips::find(&app, &visibility, path.id).await?;
+    if !clips.can_see_observations {
         return Err(Problem::new(
-            viewer.refusal(),
-            "what an agent was told and commanded is its team's, until the dataset is public; the motion is there for \
-             everybody",
+            viewer.denial_kind(),
+            "observations and actions are visible only to the agent's team until the dataset is public; the motion is \
+             public",
         ));
     }
     let key = Key::observed(path.task, path.episode);
@@ -132,7 +132,7 @@ async fn send_episode(
     headers: &HeaderMap,
 ) -> Result<Response, Problem> {
     let EpisodePath { task, episode, .. } = path;
-    let tag = ETag::of(
+    let tag = ETag::new(
         what,
         &[&clips.file.key, task.as_str(), &episode.to_string()],
     );

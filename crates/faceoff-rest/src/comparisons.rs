@@ -1,4 +1,4 @@
-//! Two evaluations on the same episodes, compared.
+//! Paired comparisons of evaluations.
 
 use axum::{Json, extract::State};
 use faceoff_api::{requests::ComparisonQuery, views::comparison::ComparisonView};
@@ -7,19 +7,19 @@ use faceoff_service::{
     extract::{PathParams, QueryParams},
     problem::Problem,
     viewer::Viewer,
-    views::{comparison, sight::Sight},
+    views::{comparison, visibility::Visibility},
 };
 use faceoff_types::EvaluationId;
 
-/// Compares two finished evaluations of the same day: counts of paired episodes, McNemar's exact test
-/// and the difference with its interval, by task and overall.
+/// Compares two finished evaluations of the same day, by task and overall: counts of paired episodes, McNemar's exact
+/// test, and the difference with its confidence interval.
 #[utoipa::path(
     get, path = "/evaluations/{id}/compare/{other}", tag = "public", security((), ("team" = []), ("organiser" = [])),
     params(("id" = EvaluationId, Path), ("other" = EvaluationId, Path), ComparisonQuery),
     responses(
         (status = 200, body = ComparisonView),
         (status = 404),
-        (status = 409, description = "not the same episodes (“field” says what differs), not finished, of a blind stage, or of a day that is not released"),
+        (status = 409, description = "the episodes differ (“field” says why), an evaluation is not finished, its stage is blind, or its day is not released"),
     )
 )]
 pub(crate) async fn compare(
@@ -28,6 +28,6 @@ pub(crate) async fn compare(
     PathParams(ids): PathParams<EvaluationId, 2>,
     QueryParams(query): QueryParams<ComparisonQuery>,
 ) -> Result<Json<ComparisonView>, Problem> {
-    let sight = Sight::of(&app, viewer).await?;
-    comparison::of(&app, &sight, ids, query).await.map(Json)
+    let visibility = Visibility::load(&app, viewer).await?;
+    comparison::compare(&app, &visibility, ids, query).await.map(Json)
 }

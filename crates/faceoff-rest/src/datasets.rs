@@ -1,10 +1,10 @@
-//! Recorded datasets: the archive, and what of it is read without a download.
+//! Stored datasets: download, links, and violations without a download.
 
 use super::{
     document::{Binary, FileHeaders, TagHeader},
-    downloads::{Download, download, plain, stays_its_callers},
+    downloads::{Download, download, file_stem, set_private_caching},
     proposals,
-    recorded::Recorded,
+    stored_dataset::StoredDataset,
 };
 use crate::links::{self, LinkOr, LinkQuery};
 use axum::{
@@ -20,32 +20,32 @@ use faceoff_api::{
 };
 use faceoff_service::{
     app::App,
-    archived,
+    archive_contents,
     auth::{Caller, TeamCaller},
     conditions::{Conditions, ETag},
     extract::{OptionalJson, PathParam},
     problem::{Problem, ProblemKind},
     release::check_released,
     viewer::Viewer,
-    views::{evaluation, sight::Sight, violations},
+    views::{evaluation, visibility::Visibility, violations},
 };
 use faceoff_store::{EvaluationState, StoreError};
 use faceoff_types::EvaluationId;
 
-/// The recorded dataset, a zip archive; for its team and the organiser, and once it is public for everybody.
+/// Downloads the recorded dataset, a zip file. For its team and organisers, and for everyone once it is public.
 ///
-/// It carries the day's seed. So it comes out when the day is released, with all others of the day. What a proposal or
-/// a trial has played is the organiser's alone, before the proposal is settled.
+/// It contains the day's seed, so it is available once the day is released. Datasets of trials and proposals that are
+/// not applied are for organisers only.
 #[utoipa::path(
     get, path = "/evaluations/{id}/dataset", tag = "team",
     security((), ("team" = []), ("organiser" = [])),
     params(("id" = EvaluationId, Path), FileHeaders, LinkQuery),
     responses(
         (status = 200, body = inline(Binary), content_type = "application/zip"),
-        (status = 403, description = "the link is not good"),
+        (status = 403, description = "the link is invalid"),
         (status = 404),
-        (status = 409, description = "not finished yet, or failed, its day is not released, or its stage is blind"),
-        (status = 410, description = "it was removed, by a retention or with its proposal, and the detail says when and why; or the link has expired"),
+        (status = 409, description = "the evaluation has not finished or has failed, its day is not released, or its stage is blind"),
+        (status = 410, description = "the dataset was removed, by a retention rule or with its proposal; the detail says when and why; or the link has expired"),
     )
 )]
 pub(crate) async fn dataset(
@@ -54,30 +54,30 @@ pub(crate) async fn dataset(
     State(app): State<App>,
     PathParam(id): PathParam<EvaluationId>,
 ) -> Result<Response, Problem> {
-    let recorded = recorded(viewer, &app, id).await?;
-    let team = app.store.team(recorded.team).await?;
+    let stored = find_dataset(viewer, &app, id).await?;
+    let team = app.store.team(stored.team).await?;
     let file = Download {
-        key: &recorded.dataset,
-        blake3: recorded.blake3.as_deref(),
+        key: &stored.dataset,
+        blake3: stored.blake3.as_deref(),
         media_type: "application/zip",
-        name: &format!("faceoff-{}-{}.zip", plain(team.name.as_str()), recorded.day),
+        name: &format!("faceoff-{}-{}.zip", file_stem(team.name.as_str()), stored.day),
     };
     match download(&app, &conditions, file).await {
         Err(StoreError::NotFound(_)) => {
-            // It may have gone meanwhile. A dataset that is promised must be there: without it, we lost it.
+            // It may have been removed meanwhile. Otherwise the file is lost.
             if proposals::dataset(viewer, &app, id).await?.is_none() {
-                released(viewer, &app, id).await?;
+                find_released(viewer, &app, id).await?;
             }
             Err(Problem::internal(format_args!("{} is lost", file.key)))
         }
-        answer => Ok(answer?),
+        result => Ok(result?),
     }
 }
 
-/// A link that downloads the dataset without a token, for a time; made by whoever may download it now.
+/// Creates a link that downloads the dataset without a token for a limited time. For callers who may download it now.
 ///
-/// What it opens is decided when it is followed, as if whoever made it asked then: it ends with the token that made it,
-/// and shows nothing that was hidden or removed meanwhile.
+/// Permissions are checked when the link is used, as for its creator: it becomes invalid with the creator's token, and
+/// gives no access to anything that was hidden or removed meanwhile.
 #[utoipa::path(
     post, path = "/evaluations/{id}/dataset/link", tag = "team", security(("team" = []), ("organiser" = [])),
     params(("id" = EvaluationId, Path)),
@@ -85,8 +85,8 @@ pub(crate) async fn dataset(
     responses(
         (status = 201, body = LinkView),
         (status = 404),
-        (status = 409, description = "there is no dataset to download, as for a download"),
-        (status = 410, description = "it was removed"),
+        (status = 409, description = "the evaluation has not finished or has failed, its day is not released, or its stage is blind"),
+        (status = 410, description = "the dataset was removed"),
         (status = 422),
     )
 )]
@@ -96,14 +96,15 @@ pub(crate) async fn link_dataset(
     PathParam(id): PathParam<EvaluationId>,
     OptionalJson(wanted): OptionalJson<NewLink>,
 ) -> Result<(StatusCode, Json<LinkView>), Problem> {
-    recorded(Viewer::of(&caller), &app, id).await?;
+    find_dataset(Viewer::new(&caller), &app, id).await?;
     let path = format!("{}/dataset", paths::evaluation(id));
     links::link(&app, &caller, &path, wanted).await
 }
 
-/// Where each constraint was broken and which answers were slow, by episode: `violations.json` of the dataset,
-/// for those who get the dataset. A slow answer tells what it took, what of it the
-/// host took, and the agent's CPU time meanwhile.
+/// Returns the violated constraints and the slow answers by episode: the dataset's `violations.json`. Needs access to
+/// the dataset.
+///
+/// A slow answer states its computation time, the part of it that the host caused, and the agent's CPU time.
 #[utoipa::path(
     get, path = "/evaluations/{id}/violations", tag = "team",
     security((), ("team" = []), ("organiser" = [])),
@@ -111,8 +112,8 @@ pub(crate) async fn link_dataset(
     responses(
         (status = 200, body = ViolationsView),
         (status = 404),
-        (status = 409, description = "not finished yet, or failed, its day is not released, or its stage is blind"),
-        (status = 410, description = "the dataset was removed; the detail says when and by which retention"),
+        (status = 409, description = "the evaluation has not finished or has failed, its day is not released, or its stage is blind"),
+        (status = 410, description = "the dataset was removed; the detail says when and by which retention rule"),
     )
 )]
 pub(crate) async fn violations(
@@ -121,30 +122,30 @@ pub(crate) async fn violations(
     State(app): State<App>,
     PathParam(id): PathParam<EvaluationId>,
 ) -> Result<Response, Problem> {
-    let recorded = released(viewer, &app, id).await?;
-    // They are read out of the dataset by this program.
-    let made_of = recorded.blake3.as_deref().unwrap_or(&recorded.dataset);
-    let tag = ETag::of("violations", &[made_of, env!("CARGO_PKG_VERSION")]);
-    let mut answer = match conditions.not_modified(&tag) {
-        Some(answer) => answer,
+    let stored = find_released(viewer, &app, id).await?;
+    // The response depends on the dataset and on the server's version.
+    let source = stored.blake3.as_deref().unwrap_or(&stored.dataset);
+    let tag = ETag::new("violations", &[source, env!("CARGO_PKG_VERSION")]);
+    let mut response = match conditions.not_modified(&tag) {
+        Some(response) => response,
         None => {
-            let view = violations::read(&app, &recorded.dataset).await?;
+            let view = violations::read(&app, &stored.dataset).await?;
             ([(header::ETAG, tag.header())], Json(view)).into_response()
         }
     };
-    stays_its_callers(answer.headers_mut());
-    Ok(answer)
+    set_private_caching(response.headers_mut());
+    Ok(response)
 }
 
-/// Makes a finished evaluation of the team's public, with its dataset, before its stage does: everybody sees it from
-/// then on, without a token, and that stays so.
+/// Publishes a finished evaluation of the calling team and its dataset, before its stage does. Everyone can then read
+/// them without a token. This cannot be undone.
 #[utoipa::path(
     post, path = "/evaluations/{id}/publish", tag = "team", security(("team" = [])),
     params(("id" = EvaluationId, Path)),
     responses(
         (status = 200, body = EvaluationView),
         (status = 404),
-        (status = 409, description = "not finished, its day is not released, its stage is blind, or its boards are frozen and leave it out"),
+        (status = 409, description = "the evaluation has not finished, its day is not released, its stage is blind, or its boards are frozen before its result"),
     )
 )]
 pub(crate) async fn publish_evaluation(
@@ -153,18 +154,18 @@ pub(crate) async fn publish_evaluation(
     PathParam(id): PathParam<EvaluationId>,
 ) -> Result<Json<EvaluationView>, Problem> {
     let team = &caller.team;
-    let sight = Sight::of(&app, Viewer::Team(team.id)).await?;
-    let evaluation = sight.readable(app.store.evaluation(id).await)?;
+    let visibility = Visibility::load(&app, Viewer::Team(team.id)).await?;
+    let evaluation = visibility.readable(app.store.evaluation(id).await)?;
     if evaluation.team != team.id {
         return Err(Problem::new(
             ProblemKind::Forbidden,
-            "the evaluation is another team's, and public already",
+            "the evaluation belongs to another team, and is public already",
         ));
     }
-    sight.check_shown(evaluation.of.stage)?;
+    visibility.check_not_blind(evaluation.stage_day.stage)?;
     if let EvaluationState::Finished { .. } = &evaluation.state {
         check_released(&app, &evaluation).await?;
-        sight.check_not_frozen(&evaluation, "published")?;
+        visibility.check_not_frozen(&evaluation, "published")?;
     }
     let now = app.config.clock.now();
     let published = app
@@ -172,25 +173,25 @@ pub(crate) async fn publish_evaluation(
         .publish_evaluation(caller.actor(), id, now)
         .await?;
     tracing::info!(evaluation = %id, team = %team.name, "evaluation published by its team");
-    evaluation::of(&app, &sight, published).await.map(Json)
+    evaluation::build(&app, &visibility, published).await.map(Json)
 }
 
-/// The dataset of an evaluation, for whoever may have it now.
-async fn recorded(viewer: Viewer, app: &App, id: EvaluationId) -> Result<Recorded, Problem> {
+/// The dataset of an evaluation, if the viewer may download it now.
+async fn find_dataset(viewer: Viewer, app: &App, id: EvaluationId) -> Result<StoredDataset, Problem> {
     match proposals::dataset(viewer, app, id).await? {
         Some(proposed) => {
-            archived::check_kept(app, &proposed.dataset, "dataset").await?;
+            archive_contents::check_included(app, &proposed.dataset, "dataset").await?;
             Ok(proposed)
         }
-        None => released(viewer, app, id).await,
+        None => find_released(viewer, app, id).await,
     }
 }
 
 /// The dataset of a finished evaluation whose day is released.
-async fn released(viewer: Viewer, app: &App, id: EvaluationId) -> Result<Recorded, Problem> {
-    let sight = Sight::of(app, viewer).await?;
-    let evaluation = sight.readable(app.store.evaluation(id).await)?;
-    sight.check_shown(evaluation.of.stage)?;
+async fn find_released(viewer: Viewer, app: &App, id: EvaluationId) -> Result<StoredDataset, Problem> {
+    let visibility = Visibility::load(app, viewer).await?;
+    let evaluation = visibility.readable(app.store.evaluation(id).await)?;
+    visibility.check_not_blind(evaluation.stage_day.stage)?;
     let why_not = match &evaluation.state {
         EvaluationState::Finished {
             dataset,
@@ -198,35 +199,34 @@ async fn released(viewer: Viewer, app: &App, id: EvaluationId) -> Result<Recorde
             ..
         } => {
             check_released(app, &evaluation).await?;
-            let is_there = app.store.artifacts().bytes_of(dataset).await?.is_some();
-            // An organiser gets at evidence as long as the file is there.
+            let exists = app.store.artifacts().size_bytes(dataset).await?.is_some();
+            // Organisers can download evidence as long as the file exists.
             if let Some(removed) = &evaluation.dataset_removed
-                && !(viewer == Viewer::Organiser && is_there)
+                && !(viewer == Viewer::Organiser && exists)
             {
-                let what = "the dataset, with all that is read out of it,";
+                let what = "the dataset";
                 return Err(Problem::removed(what, removed));
             }
-            archived::check_kept(app, dataset, "dataset").await?;
-            return Ok(Recorded {
+            archive_contents::check_included(app, dataset, "dataset").await?;
+            return Ok(StoredDataset {
                 team: evaluation.team,
-                day: evaluation.of.date,
+                day: evaluation.stage_day.date,
                 dataset: dataset.clone(),
                 blake3: dataset_blake3.clone(),
             });
         }
         EvaluationState::Queued | EvaluationState::Running { .. } | EvaluationState::Finalising => {
-            "the evaluation is not finished; follow it until its state is “finished”"
+            "the evaluation has not finished; poll it until its state is “finished”"
         }
         EvaluationState::AgentFailed { .. } => {
-            "the agent failed too often, so there is no dataset; once the day is released its faults and \
-             log are in GET /api/v1/evaluations/ID"
+            "the agent had too many faults, so there is no dataset; once the day is released, GET /api/v1/evaluations/ID \
+             returns its faults and log"
         }
         EvaluationState::PlatformFailed { .. } => {
-            "the evaluation failed by our fault and has no dataset; GET /api/v1/evaluations lists the one \
-             that plays it again"
+            "the evaluation failed by a platform fault and has no dataset; GET /api/v1/evaluations lists its rerun"
         }
         EvaluationState::NotPlayed { .. } => {
-            "the evaluation was not played in time and has no dataset"
+            "the evaluation did not finish before the deadline and has no dataset"
         }
         EvaluationState::Cancelled { .. } => "the evaluation was cancelled and has no dataset",
     };

@@ -1,9 +1,9 @@
-//! What the OpenAPI document says besides routes and types.
+//! The OpenAPI document: everything besides routes and types.
 
-mod answers;
 mod files;
 mod integers;
 mod lists;
+mod responses;
 mod unions;
 
 use faceoff_service::problem::ProblemBody;
@@ -22,33 +22,33 @@ use utoipa::{
     info(
         title = "Faceoff",
         description = "Competition server for robot learning: teams upload agents, the server evaluates them daily. \
-                       Whatever can be asked with GET can be asked with HEAD: the same headers, and no body.",
+                       Every GET resource also supports HEAD: the same headers without a body.",
         license(name = "MIT OR Apache-2.0")
     ),
     components(schemas(ProblemBody)),
-    modifiers(&Tokens),
+    modifiers(&SecuritySchemes),
     tags(
-        (name = "public", description = "For everybody, without a token"),
-        (name = "people", description = "With anybody's token"),
-        (name = "team", description = "With a team's token, or a member's"),
-        (name = "organiser", description = "With the organiser's token"),
+        (name = "public", description = "No token required"),
+        (name = "people", description = "Requires any valid token"),
+        (name = "team", description = "Requires a team's token, or a member's"),
+        (name = "organiser", description = "Requires an organiser's token"),
     )
 )]
 pub(super) struct Document;
 
-struct Tokens;
+struct SecuritySchemes;
 
-impl Modify for Tokens {
+impl Modify for SecuritySchemes {
     fn modify(&self, document: &mut openapi::OpenApi) {
         let components = document.components.get_or_insert_default();
         for (name, description) in [
             (
                 "team",
-                "A member's token, fo_person_…, or the team's own, fo_team_…",
+                "A member's token (fo_person_…), or the team's (fo_team_…)",
             ),
             (
                 "organiser",
-                "An organiser's token, fo_person_…, or the host's, fo_admin_…, made at the server's first start",
+                "An organiser's token (fo_person_…), or the host's (fo_admin_…), which the server creates at its first start",
             ),
         ] {
             components.add_security_scheme(
@@ -64,21 +64,21 @@ impl Modify for Tokens {
     }
 }
 
-/// The document, with what follows from what routes and types say of themselves.
-pub(super) fn told(mut document: openapi::OpenApi) -> Value {
-    answers::complete(&mut document);
+/// Completes the document with everything that follows from the routes and types.
+pub(super) fn complete(mut document: openapi::OpenApi) -> Value {
+    responses::complete(&mut document);
     let components = document.components.get_or_insert_default();
-    unions::multiply_out(&mut components.schemas);
-    let mut told = serde_json::to_value(document).expect("its keys are texts");
-    integers::tell_unsigned(&mut told);
-    told
+    unions::flatten(&mut components.schemas);
+    let mut document = serde_json::to_value(document).expect("its keys are strings");
+    integers::mark_unsigned(&mut document);
+    document
 }
 
-/// The bytes of an archive, as a body or an answer.
+/// Schema of a binary body: a bundle, a dataset or a clip.
 pub(super) struct Binary;
 
 impl PartialSchema for Binary {
-    /// Some generators know `format` (of OpenAPI 3.0), others `contentMediaType` (of 3.1).
+    /// Some client generators need `format` (OpenAPI 3.0), others `contentMediaType` (3.1).
     fn schema() -> RefOr<Schema> {
         ObjectBuilder::new()
             .schema_type(Type::String)

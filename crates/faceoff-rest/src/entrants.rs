@@ -1,4 +1,4 @@
-//! Who is in a tournament, and who leaves it.
+//! Entrants of a tournament: entering and leaving.
 
 use axum::{Json, extract::State};
 use faceoff_api::{
@@ -6,15 +6,15 @@ use faceoff_api::{
     views::tournament::TournamentView,
 };
 use faceoff_service::{
-    acts::{deciding::checked_reason, entering},
+    services::{decisions::checked_reason, entrants},
     app::App,
     auth::{Caller, Organiser},
     extract::{Json as Body, PathParam},
     problem::{Problem, ProblemKind},
-    views::{tournament, tournament_sheet::TournamentSheet},
+    views::{tournament, tournament_state::TournamentState},
 };
-use faceoff_store::{Actor, GameState, Leaving};
-use faceoff_types::{LeftAs, TournamentId};
+use faceoff_store::{Actor, GameState, DepartureRequest};
+use faceoff_types::{DepartureKind, TournamentId};
 use std::slice;
 
 /// Enters teams into a tournament.
@@ -24,7 +24,7 @@ use std::slice;
     responses(
         (status = 200, body = TournamentView),
         (status = 404),
-        (status = 409, description = "a team is in it or has left it, or no team can enter any more"),
+        (status = 409, description = "a team has already entered or left, or the tournament accepts no more teams"),
         (status = 422),
     )
 )]
@@ -40,26 +40,28 @@ pub(crate) async fn enter_teams(
             "expected at least one name, got none",
         ));
     }
-    let sheet = TournamentSheet::unscored(&app, id).await?;
-    let new = entering::named(&app, "teams", &teams).await?;
-    entering::check_count(sheet.entrants.len() + new.len())?;
+    let state = TournamentState::unscored(&app, id).await?;
+    let new = entrants::find_by_names(&app, "teams", &teams).await?;
+    entrants::check_count(state.entrants.len() + new.len())?;
     let now = app.config.clock.now();
     app.store
-        .enter_tournament(organiser.actor(), id, &new, now)
+        .add_entrants(organiser.actor(), id, &new, now)
         .await?;
     tracing::info!(tournament = %id, teams = new.len(), "teams entered");
     tournament::find(&app, id).await.map(Json)
 }
 
-/// Takes a team out of a tournament for good: withdrawn, or disqualified. Its open games are called off; games with it
-/// in the round that is under way, or between rounds in the next, count for nobody, those of finished rounds stay.
+/// Withdraws or disqualifies a team from a tournament, for good.
+///
+/// Its open games are cancelled. Its games of the running round, or of the next one between rounds, do not count; those
+/// of finished rounds do.
 #[utoipa::path(
     post, path = "/tournaments/{id}/departures", tag = "organiser", security(("organiser" = [])),
     params(("id" = TournamentId, Path)), request_body = NewDeparture,
     responses(
         (status = 200, body = TournamentView),
         (status = 404),
-        (status = 409, description = "not confirmed with the team's name (nothing is done), the team is not in it or has left, or it is closed"),
+        (status = 409, description = "not confirmed with the team's name (nothing is done), the team has not entered or has left, or the tournament is closed"),
         (status = 422),
     )
 )]
@@ -70,33 +72,32 @@ pub(crate) async fn depart(
     Body(departure): Body<NewDeparture>,
 ) -> Result<Json<TournamentView>, Problem> {
     let reason = checked_reason(&departure.reason)?;
-    if departure.from_round.is_some() && departure.r#as == LeftAs::Withdrawn {
+    if departure.from_round.is_some() && departure.r#as == DepartureKind::Withdrawn {
         return Err(Problem::invalid(
             "from_round",
-            "a team that withdraws keeps what it played in finished rounds; only of a disqualified one earlier rounds \
-             are taken out",
+            "expected none for a withdrawal, got one; leave it out: finished rounds of a team that withdraws count",
         ));
     }
-    let sheet = TournamentSheet::find(&app, id).await?;
-    let team = entering::named(&app, "team", slice::from_ref(&departure.team)).await?[0];
-    let leaving = Leaving {
+    let state = TournamentState::find(&app, id).await?;
+    let team = entrants::find_by_names(&app, "team", slice::from_ref(&departure.team)).await?[0];
+    let request = DepartureRequest {
         team,
-        left_as: departure.r#as,
+        kind: departure.r#as,
         from_round: departure.from_round,
         reason: reason.to_owned(),
     };
-    check_confirmed(&sheet, &leaving, departure.confirm.as_deref())?;
-    leave(&app, organiser.actor(), id, &leaving).await
+    check_confirmed(&state, &request, departure.confirm.as_deref())?;
+    leave(&app, organiser.actor(), id, &request).await
 }
 
-/// Withdraws the caller's team from a tournament for good, as an organiser can do. By a member, not by a program.
+/// Withdraws the caller's team from a tournament, for good. Needs a member's token, not the team's.
 #[utoipa::path(
     post, path = "/tournaments/{id}/withdrawal", tag = "team", security(("team" = [])),
     params(("id" = TournamentId, Path)), request_body = Decision,
     responses(
         (status = 200, body = TournamentView),
         (status = 403), (status = 404),
-        (status = 409, description = "not confirmed with the team's name (nothing is done), the team is not in it or has left, or it is closed"),
+        (status = 409, description = "not confirmed with the team's name (nothing is done), the team has not entered or has left, or the tournament is closed"),
         (status = 422),
     )
 )]
@@ -106,39 +107,38 @@ pub(crate) async fn withdraw_team(
     PathParam(id): PathParam<TournamentId>,
     Body(Decision { reason, confirm }): Body<Decision>,
 ) -> Result<Json<TournamentView>, Problem> {
-    let Some(team) = caller.team().filter(|_| caller.person().is_some()) else {
+    let Some(team) = caller.team().filter(|_| caller.user().is_some()) else {
         return Err(Problem::new(
             ProblemKind::Forbidden,
-            "a member of the team withdraws it, neither its programs nor organisers, who have POST \
-             /api/v1/tournaments/ID/departures",
+            "only a member of the team can withdraw it; organisers use POST /api/v1/tournaments/ID/departures",
         ));
     };
     let reason = checked_reason(&reason)?;
-    let sheet = TournamentSheet::find(&app, id).await?;
-    let leaving = Leaving {
+    let state = TournamentState::find(&app, id).await?;
+    let request = DepartureRequest {
         team: team.id,
-        left_as: LeftAs::Withdrawn,
+        kind: DepartureKind::Withdrawn,
         from_round: None,
         reason: reason.to_owned(),
     };
-    check_confirmed(&sheet, &leaving, confirm.as_deref())?;
-    leave(&app, caller.actor(), id, &leaving).await
+    check_confirmed(&state, &request, confirm.as_deref())?;
+    leave(&app, caller.actor(), id, &request).await
 }
 
-/// Refuses what is not confirmed, and says what it would do.
+/// Refuses a departure that is not confirmed, with its effects.
 fn check_confirmed(
-    sheet: &TournamentSheet,
-    leaving: &Leaving,
+    state: &TournamentState,
+    leaving: &DepartureRequest,
     confirm: Option<&str>,
 ) -> Result<(), Problem> {
-    let entrants = &mut sheet.entrants.iter();
-    let Some(entrant) = entrants.find(|one| one.team == leaving.team) else {
+    let entrants = &mut state.entrants.iter();
+    let Some(entrant) = entrants.find(|entrant| entrant.team == leaving.team) else {
         return Err(Problem::new(
             ProblemKind::Conflict,
-            format!("{} is not in the tournament", sheet.name(leaving.team)?),
+            format!("{} is not in the tournament", state.name(leaving.team)?),
         ));
     };
-    let own = sheet
+    let own = state
         .games
         .iter()
         .filter(|game| game.teams.contains(&leaving.team));
@@ -148,42 +148,42 @@ fn check_confirmed(
             GameState::Played(_) | GameState::Cancelled { .. }
         )
     });
-    if sheet.rounds.is_empty() {
-        let what = format!(
-            "{} would be out of the tournament, of which no round was started, and its test and friendly games that are \
-             not over would be called off; it may enter again",
+    if state.rounds.is_empty() {
+        let effect = format!(
+            "{} would leave the tournament, whose first round has not started, and its unfinished test and friendly games \
+             would be cancelled; it may enter again",
             entrant.name
         );
-        return Problem::check_confirmed(confirm, entrant.name.as_str(), &what);
+        return Problem::check_confirmed(confirm, entrant.name.as_str(), &effect);
     }
-    let how = match leaving.left_as {
-        LeftAs::Withdrawn => "be withdrawn",
-        LeftAs::Disqualified => "be disqualified, and stand below all others",
+    let outcome = match leaving.kind {
+        DepartureKind::Withdrawn => "be withdrawn",
+        DepartureKind::Disqualified => "be disqualified, and rank below all others",
     };
     let earlier = match leaving.from_round {
-        Some(round) => format!(", and of all rounds from {round} on,"),
+        Some(round) => format!(", and of all rounds from {round} on"),
         None => String::new(),
     };
-    let what = format!(
-        "{} would {how} for good; {} of its games, and its test and friendly games that are not over, would not be played, and games with it of the round that is under way or \
-         next{earlier} count for nobody, with the reason {:?} for everybody to read",
+    let effect = format!(
+        "{} would {outcome} for good; {} of its games, and its unfinished test and friendly games, would be cancelled; its games of \
+         the running or next round{earlier} would not count; the reason {:?} would be public",
         entrant.name,
         open.count(),
         leaving.reason
     );
-    Problem::check_confirmed(confirm, entrant.name.as_str(), &what)
+    Problem::check_confirmed(confirm, entrant.name.as_str(), &effect)
 }
 
 async fn leave(
     app: &App,
     actor: Actor,
     id: TournamentId,
-    leaving: &Leaving,
+    leaving: &DepartureRequest,
 ) -> Result<Json<TournamentView>, Problem> {
     let now = app.config.clock.now();
     app.store.leave_tournament(actor, id, leaving, now).await?;
     tracing::info!(
-        tournament = %id, team = %leaving.team, left_as = ?leaving.left_as, reason = leaving.reason, "team left"
+        tournament = %id, team = %leaving.team, left_as = ?leaving.kind, reason = leaving.reason, "team left"
     );
     tournament::find(app, id).await.map(Json)
 }

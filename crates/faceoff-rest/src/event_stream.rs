@@ -1,14 +1,14 @@
-//! What changes, as it happens, by server-sent events.
+//! The event stream (server-sent events).
 
-use super::told::{LAST_EVENT_ID, told};
-use crate::event_reader::{EventReader, Follower};
+use super::sse::{LAST_EVENT_ID, sse_response};
+use crate::event_reader::{EventReader, Subscription};
 use axum::{Extension, extract::State, http::HeaderMap, response::IntoResponse};
 use faceoff_api::requests::FollowQuery;
-use faceoff_notify::About;
+use faceoff_notify::NoticeFilter;
 use faceoff_service::{
     app::App,
-    auth::Anybody,
-    ending::Ending,
+    auth::OptionalCaller,
+    shutdown::Shutdown,
     extract::QueryParams,
     problem::{Problem, ProblemKind},
     viewer::Viewer,
@@ -16,75 +16,77 @@ use faceoff_service::{
 use futures::stream;
 use std::sync::Arc;
 
-/// Tells what changes: `change` with what to ask for again, in the order in which it happened, as far as the caller may
-/// know of it. First of all `now`, with the id of what happened last.
+/// Streams events as they happen (server-sent events), as far as the caller may see them.
 ///
-/// Who comes again with the header `Last-Event-ID` gets all that happened since, each change once, and no `now`; with an
-/// id that this server has not given, or long ago, `reset`: ask for everything again. Streams end after an hour at most,
-/// when the server ends, and when the token is worth nothing any more.
+/// The first event is `now`, with the id of the newest event. Each `change` event names what has changed and what to
+/// reload, in chronological order.
+///
+/// A client that reconnects with the header `Last-Event-ID` gets all events since then exactly once, and no `now`. If
+/// the id is unknown or too old, it gets `reset` and has to reload everything. A stream ends after at most an hour,
+/// when the server shuts down, and when the token becomes invalid.
 #[utoipa::path(
     get, path = "/events/stream", tag = "public", security((), ("team" = []), ("organiser" = [])),
     params(
         FollowQuery,
-        ("Last-Event-ID" = Option<String>, Header, description = "the id of the last event that came", example = "4711"),
+        ("Last-Event-ID" = Option<String>, Header, description = "id of the last received event", example = "4711"),
     ),
     responses(
         (status = 200, body = String, content_type = "text/event-stream"),
-        (status = 400, description = "the header is none of this stream's ids"),
-        (status = 422, description = "`about` names nothing that there is to follow"),
-        (status = 503, description = "as many readers as may be are following"),
+        (status = 400, description = "`Last-Event-ID` is not an event id"),
+        (status = 422, description = "`about` contains an unknown filter"),
+        (status = 503, description = "the server has as many readers as it may"),
     )
 )]
 pub(crate) async fn follow_events(
-    Anybody(caller): Anybody,
+    OptionalCaller(caller): OptionalCaller,
     State(app): State<App>,
     QueryParams(query): QueryParams<FollowQuery>,
-    ending: Option<Extension<Ending>>,
+    shutdown: Option<Extension<Shutdown>>,
     headers: HeaderMap,
 ) -> Result<impl IntoResponse, Problem> {
     let about = match &query.about {
         Some(about) => about
             .parse()
             .map_err(|error| Problem::invalid("about", error))?,
-        None => About::default(),
+        None => NoticeFilter::default(),
     };
     let from = headers
         .get(LAST_EVENT_ID)
         .map(|value| parse_id(value.to_str().unwrap_or_default()))
         .transpose()?;
-    let Ok(seat) = Arc::clone(&app.following).try_acquire_owned() else {
+    let Ok(permit) = Arc::clone(&app.event_reader_permits).try_acquire_owned() else {
         return Err(Problem::new(
             ProblemKind::Busy,
             format!(
-                "{} readers follow what happens, and more may not at a time; try again, or ask for what you show now and then",
+                "the server has {} readers of the event stream, which is the maximum; try again later, or poll the resources",
                 app.config.limits.event_readers
             ),
         ));
     };
-    let viewer = caller.as_ref().map_or(Viewer::Anybody, Viewer::of);
-    let follower = Follower {
+    let viewer = caller.as_ref().map_or(Viewer::Visitor, Viewer::new);
+    let subscription = Subscription {
         reader: viewer.into(),
         token: caller.map(|caller| caller.token.id),
         about,
     };
-    let ending = ending.map(|Extension(ending)| ending);
-    let reader = EventReader::open(app, follower, from, ending, seat).await?;
+    let shutdown = shutdown.map(|Extension(shutdown)| shutdown);
+    let reader = EventReader::open(app, subscription, from, shutdown, permit).await?;
     let batches = stream::unfold(reader, |mut reader| async {
         let batch = reader.next().await?;
         Some((batch, reader))
     });
-    Ok(told(batches))
+    Ok(sse_response(batches))
 }
 
-/// An id as the stream gives it.
+/// Parses an event id of the stream.
 fn parse_id(text: &str) -> Result<i64, Problem> {
     let parsed = text.parse().ok().filter(|id| *id >= 0);
     parsed.ok_or_else(|| {
         Problem::new(
             ProblemKind::InvalidRequest,
             format!(
-                "the header Last-Event-ID is the id of the last event that came, as in 4711, got {text:?}; without it the \
-                 stream begins now"
+                "expected the header Last-Event-ID to be the id of an event, as in 4711, got {text:?}; leave it out to start \
+                 now"
             ),
         )
     })

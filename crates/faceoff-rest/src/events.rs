@@ -1,4 +1,4 @@
-//! The log of all changes, for the organiser.
+//! The event log, for organisers.
 
 use axum::{Json, extract::State};
 use faceoff_api::{requests::EventsQuery, views::event::EventsView};
@@ -6,7 +6,7 @@ use faceoff_service::{
     app::App, auth::Organiser, extract::QueryParams, problem::Problem, views::event,
 };
 
-/// What was changed, when and by whom, the newest first.
+/// Lists the events of the log, newest first: all changes, with time and actor.
 #[utoipa::path(
     get, path = "/events", tag = "organiser", security(("organiser" = [])),
     params(EventsQuery), responses((status = 200, body = EventsView), (status = 422))

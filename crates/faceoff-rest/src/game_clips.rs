@@ -1,9 +1,9 @@
-//! The clips that a game's replay is drawn from, 500 control steps each.
+//! Clips of games for replays, 500 control steps each.
 
 use super::{
-    clip_answer::send,
+    clip_response::send,
     document::{Binary, TagHeader},
-    game_files::{game_of, side_of},
+    game_files::{parse_game, parse_side},
 };
 use axum::{extract::State, http::HeaderMap, response::Response};
 use faceoff_replay::Key;
@@ -17,8 +17,8 @@ use faceoff_service::{
 };
 use faceoff_types::GameId;
 
-/// The motion of table and robots in a part of a game, as a clip: 500 control steps from 500 × `chunk` on; for everybody
-/// who sees the game.
+/// Returns the motion of table and robots in a part of a game, as a binary clip: 500 control steps from 500 × `chunk`
+/// on. For everyone who may see the game.
 #[utoipa::path(
     get, path = "/games/{id}/motion/{chunk}", tag = "public",
     security((), ("team" = []), ("organiser" = [])),
@@ -26,7 +26,7 @@ use faceoff_types::GameId;
     responses(
         (status = 200, body = inline(Binary), content_type = "application/octet-stream"),
         (status = 404),
-        (status = 409, description = "the game has no result, or no recording; or an older version of the server played it"),
+        (status = 409, description = "the game has no result or no recording, or an older server version ran it"),
     )
 )]
 pub(crate) async fn game_motion(
@@ -37,9 +37,9 @@ pub(crate) async fn game_motion(
     PathParams(path): PathParams<String, 2>,
 ) -> Result<Response, Problem> {
     let [id, chunk] = path;
-    let (id, chunk) = (game_of(&id)?, number(&chunk)?);
-    let clips = GameClips::of(&app, viewer, id).await?;
-    let tag = ETag::of("motion", &[&clips.file.key, &chunk.to_string()]);
+    let (id, chunk) = (parse_game(&id)?, parse_chunk(&chunk)?);
+    let clips = GameClips::find(&app, viewer, id).await?;
+    let tag = ETag::new("motion", &[&clips.file.key, &chunk.to_string()]);
     send(
         &tag,
         &conditions,
@@ -49,7 +49,8 @@ pub(crate) async fn game_motion(
     .await
 }
 
-/// What a side was told and commanded in a part of a game, and its times, as a clip; for whoever gets the side's file.
+/// Returns a side's observations, actions and computation times in a part of a game, as a binary clip. Needs access to
+/// the side's recording.
 #[utoipa::path(
     get, path = "/games/{id}/sides/{side}/observed/{chunk}", tag = "team",
     security((), ("team" = []), ("organiser" = [])),
@@ -59,9 +60,9 @@ pub(crate) async fn game_motion(
     ),
     responses(
         (status = 200, body = inline(Binary), content_type = "application/octet-stream"),
-        (status = 403, description = "another team's, and not public"),
+        (status = 403, description = "the side belongs to another team, and the recording is not public"),
         (status = 404),
-        (status = 409, description = "as for the motion"),
+        (status = 409, description = "the game has no result or no recording, or an older server version ran it"),
     )
 )]
 pub(crate) async fn game_observed(
@@ -72,22 +73,22 @@ pub(crate) async fn game_observed(
     PathParams(path): PathParams<String, 3>,
 ) -> Result<Response, Problem> {
     let [id, side, chunk] = path;
-    let (id, side) = side_of(&[id, side])?;
-    let chunk = number(&chunk)?;
-    let clips = GameClips::of(&app, viewer, id).await?;
-    if !clips.sees[side.index()] {
+    let (id, side) = parse_side(&[id, side])?;
+    let chunk = parse_chunk(&chunk)?;
+    let clips = GameClips::find(&app, viewer, id).await?;
+    if !clips.can_see_observations[side.index()] {
         return Err(Problem::new(
-            viewer.refusal(),
-            "what a side was told and commanded is its team's, until the recording is public; the motion is there for \
-             everybody",
+            viewer.denial_kind(),
+            "observations and actions are visible only to the side's team until the recording is public; the motion is \
+             public",
         ));
     }
-    let of = [
+    let parts = [
         clips.file.key.as_str(),
         &side.number().to_string(),
         &chunk.to_string(),
     ];
-    let tag = ETag::of("observed", &of);
+    let tag = ETag::new("observed", &parts);
     send(
         &tag,
         &conditions,
@@ -97,9 +98,9 @@ pub(crate) async fn game_observed(
     .await
 }
 
-fn number(chunk: &str) -> Result<u32, Problem> {
+fn parse_chunk(chunk: &str) -> Result<u32, Problem> {
     chunk.parse().map_err(|_| {
-        let detail = format!("parts of games have numbers from 0 on, none is {chunk:?}");
+        let detail = format!("expected the number of a part, from 0, got {chunk:?}");
         Problem::new(ProblemKind::NotFound, detail)
     })
 }

@@ -1,8 +1,8 @@
-//! The files of games: each side's own at once, both sides' when they are published, and what agents wrote.
+//! Files of games: recordings of one side and of both sides, links to them, and logs.
 
 use super::{
     document::{Binary, FileHeaders},
-    downloads::{Download, download, plain},
+    downloads::{Download, download, file_stem},
 };
 use crate::links::{self, LinkOr, LinkQuery};
 use axum::{
@@ -14,19 +14,21 @@ use axum::{
 use faceoff_api::{paths, requests::NewLink, views::link::LinkView};
 use faceoff_service::{
     app::App,
-    archived,
+    archive_contents,
     auth::Caller,
     conditions::Conditions,
     extract::{OptionalJson, PathParam, PathParams},
     problem::{Problem, ProblemKind},
     viewer::Viewer,
-    views::{game, tournament_sheet::TournamentSheet},
+    views::{game, tournament_state::TournamentState},
 };
 use faceoff_store::{Game, GameRecording, GameState, StoreError};
 use faceoff_types::{GameId, Side};
 
-/// A side's own file of a game, a zip archive: what it saw, what it commanded, which command took effect, and the true
-/// motion; for its team at once, for everybody once the recording is published. It names no seed.
+/// Downloads a side's recording of a game, a zip file: observations, actions, which actions took effect, and the true
+/// motion.
+///
+/// For its team at once, for everyone once the recording is public. It does not contain the seed.
 #[utoipa::path(
     get, path = "/games/{id}/sides/{side}", tag = "team", security((), ("team" = []), ("organiser" = [])),
     params(
@@ -36,8 +38,8 @@ use faceoff_types::{GameId, Side};
     responses(
         (status = 200, body = inline(Binary), content_type = "application/zip"),
         (status = 401), (status = 403), (status = 404),
-        (status = 409, description = "the game has no result, or no recording: of the schedule played again none is kept"),
-        (status = 410, description = "the link has expired, or the archive that the server shows was made without the file"),
+        (status = 409, description = "the game has no result or no recording; replays of the schedule are not recorded"),
+        (status = 410, description = "the link has expired, or the season archive does not contain the file"),
     )
 )]
 pub(crate) async fn side(
@@ -46,21 +48,22 @@ pub(crate) async fn side(
     State(app): State<App>,
     PathParams(path): PathParams<String, 2>,
 ) -> Result<Response, Problem> {
-    let (id, side) = side_of(&path)?;
-    let recorded = Recorded::find(&app, viewer, id, Which::Side(side)).await?;
-    recorded.send(&app, &conditions).await
+    let (id, side) = parse_side(&path)?;
+    let recording = StoredRecording::find(&app, viewer, id, GameFile::Side(side)).await?;
+    recording.send(&app, &conditions).await
 }
 
-/// The recording of both sides with the game's seed, a zip archive that `faceoff verify` plays again; for organisers at
-/// once, for everybody once it is published.
+/// Downloads the recording of both sides with the game's seed, a zip file that `faceoff verify` replays.
+///
+/// For organisers at once, for everyone once it is public.
 #[utoipa::path(
     get, path = "/games/{id}/recording", tag = "public", security((), ("organiser" = [])),
     params(("id" = GameId, Path), FileHeaders, LinkQuery),
     responses(
         (status = 200, body = inline(Binary), content_type = "application/zip"),
         (status = 401), (status = 403), (status = 404),
-        (status = 409, description = "the game has no result, or no recording: of the schedule played again none is kept"),
-        (status = 410, description = "the link has expired, or the archive that the server shows was made without the file"),
+        (status = 409, description = "the game has no result or no recording; replays of the schedule are not recorded"),
+        (status = 410, description = "the link has expired, or the season archive does not contain the file"),
     )
 )]
 pub(crate) async fn recording(
@@ -69,13 +72,14 @@ pub(crate) async fn recording(
     State(app): State<App>,
     PathParam(id): PathParam<GameId>,
 ) -> Result<Response, Problem> {
-    let recorded = Recorded::find(&app, viewer, id, Which::BothSides).await?;
-    recorded.send(&app, &conditions).await
+    let recording = StoredRecording::find(&app, viewer, id, GameFile::BothSides).await?;
+    recording.send(&app, &conditions).await
 }
 
-/// A link that downloads a side's file without a token, for a time; made by whoever may download it now.
+/// Creates a link that downloads a side's recording without a token for a limited time. For callers who may download it
+/// now.
 ///
-/// What it opens is decided when it is followed, as if whoever made it asked then.
+/// Permissions are checked when the link is used, as for its creator.
 #[utoipa::path(
     post, path = "/games/{id}/sides/{side}/link", tag = "team", security(("team" = []), ("organiser" = [])),
     params(("id" = GameId, Path), ("side" = u32, Path, minimum = 1, maximum = 2, description = "1: home, 2: away")),
@@ -83,7 +87,7 @@ pub(crate) async fn recording(
     responses(
         (status = 201, body = LinkView),
         (status = 404),
-        (status = 409, description = "the game has no result, or no recording"),
+        (status = 409, description = "the game has no result or no recording"),
         (status = 422),
     )
 )]
@@ -93,15 +97,16 @@ pub(crate) async fn link_side(
     PathParams(path): PathParams<String, 2>,
     OptionalJson(wanted): OptionalJson<NewLink>,
 ) -> Result<(StatusCode, Json<LinkView>), Problem> {
-    let (id, side) = side_of(&path)?;
-    Recorded::find(&app, Viewer::of(&caller), id, Which::Side(side)).await?;
+    let (id, side) = parse_side(&path)?;
+    StoredRecording::find(&app, Viewer::new(&caller), id, GameFile::Side(side)).await?;
     let path = format!("{}/sides/{}", paths::game(id), side.number());
     links::link(&app, &caller, &path, wanted).await
 }
 
-/// A link that downloads the recording of both sides without a token, for a time; made by whoever may download it now.
+/// Creates a link that downloads the recording of both sides without a token for a limited time. For callers who may
+/// download it now.
 ///
-/// What it opens is decided when it is followed, as if whoever made it asked then.
+/// Permissions are checked when the link is used, as for its creator.
 #[utoipa::path(
     post, path = "/games/{id}/recording/link", tag = "team", security(("team" = []), ("organiser" = [])),
     params(("id" = GameId, Path)),
@@ -109,7 +114,7 @@ pub(crate) async fn link_side(
     responses(
         (status = 201, body = LinkView),
         (status = 404),
-        (status = 409, description = "the game has no result, or no recording"),
+        (status = 409, description = "the game has no result or no recording"),
         (status = 422),
     )
 )]
@@ -119,13 +124,13 @@ pub(crate) async fn link_recording(
     PathParam(id): PathParam<GameId>,
     OptionalJson(wanted): OptionalJson<NewLink>,
 ) -> Result<(StatusCode, Json<LinkView>), Problem> {
-    Recorded::find(&app, Viewer::of(&caller), id, Which::BothSides).await?;
+    StoredRecording::find(&app, Viewer::new(&caller), id, GameFile::BothSides).await?;
     let path = format!("{}/recording", paths::game(id));
     links::link(&app, &caller, &path, wanted).await
 }
 
-/// The end of what a side's agent wrote to its standard error in the attempt that counts, with its faults; for its team
-/// and organisers alone.
+/// Returns the faults and the last part of the standard error of a side's agent, from the attempt that counts. For its
+/// team and organisers.
 #[utoipa::path(
     get, path = "/games/{id}/sides/{side}/log", tag = "team", security(("team" = []), ("organiser" = [])),
     params(("id" = GameId, Path), ("side" = u32, Path, minimum = 1, maximum = 2, description = "1: home, 2: away")),
@@ -140,14 +145,14 @@ pub(crate) async fn side_log(
     State(app): State<App>,
     PathParams(path): PathParams<String, 2>,
 ) -> Result<Response, Problem> {
-    let (id, side) = side_of(&path)?;
-    let viewer = Viewer::of(&caller);
-    let (sheet, game) = game::known(&app, viewer, id).await?;
-    if !sheet.sight(viewer).is_own(&game, side) {
+    let (id, side) = parse_side(&path)?;
+    let viewer = Viewer::new(&caller);
+    let (state, game) = game::find_visible(&app, viewer, id).await?;
+    if !state.visibility(viewer).is_own(&game, side) {
         return Err(Problem::new(
             ProblemKind::Forbidden,
             format!(
-                "the log of side {} is for its team and organisers, and stays so",
+                "the log of side {} is visible only to its team and organisers",
                 side.number()
             ),
         ));
@@ -156,17 +161,17 @@ pub(crate) async fn side_log(
         return Err(no_result(&game));
     };
     let media_type = [(header::CONTENT_TYPE, "text/plain; charset=utf-8")];
-    Ok((media_type, faceoff_types::harmless(&log).into_owned()).into_response())
+    Ok((media_type, faceoff_types::escape_unprintable(&log).into_owned()).into_response())
 }
 
-pub(super) fn game_of(id: &str) -> Result<GameId, Problem> {
+pub(super) fn parse_game(id: &str) -> Result<GameId, Problem> {
     id.parse().map_err(|error: faceoff_types::ParseIdError| {
         Problem::new(ProblemKind::NotFound, error.to_string())
     })
 }
 
-pub(super) fn side_of([id, side]: &[String; 2]) -> Result<(GameId, Side), Problem> {
-    let id = game_of(id)?;
+pub(super) fn parse_side([id, side]: &[String; 2]) -> Result<(GameId, Side), Problem> {
+    let id = parse_game(id)?;
     let side = side
         .parse::<u32>()
         .ok()
@@ -174,18 +179,18 @@ pub(super) fn side_of([id, side]: &[String; 2]) -> Result<(GameId, Side), Proble
     let side = side.ok_or_else(|| {
         Problem::new(
             ProblemKind::NotFound,
-            "a game has the sides 1 (home) and 2 (away)",
+            "expected side 1 (home) or 2 (away)",
         )
     })?;
     Ok((id, side))
 }
 
-fn recording_of(game: &Game) -> Result<&GameRecording, Problem> {
+fn stored_recording(game: &Game) -> Result<&GameRecording, Problem> {
     match &game.state {
         GameState::Played(row) => row.recording.as_ref().ok_or_else(|| {
             Problem::new(
                 ProblemKind::Conflict,
-                "no recording is kept of the schedule played again; the game that counts has one",
+                "replays of the schedule are not recorded; the game that counts has a recording",
             )
         }),
         _ => Err(no_result(game)),
@@ -195,14 +200,14 @@ fn recording_of(game: &Game) -> Result<&GameRecording, Problem> {
 fn no_result(game: &Game) -> Problem {
     let why = match &game.state {
         GameState::Queued | GameState::Running { .. } => {
-            "it is not over; follow it until its state is “played”"
+            "it has not ended; poll it until its state is “played”"
         }
-        GameState::Broken { .. } => {
-            "it was broken by our fault, and the organiser has it played again"
+        GameState::PlatformFailed { .. } => {
+            "it failed by a platform fault, and an organiser has to rerun it"
         }
-        GameState::Void { .. } => "its result was voided, and the organiser has it played again",
-        GameState::Cancelled { .. } => "it was called off",
-        GameState::Played(_) => "it has nothing of this kind",
+        GameState::Void { .. } => "its result was voided, and an organiser has to rerun it",
+        GameState::Cancelled { .. } => "it was cancelled",
+        GameState::Played(_) => "it has no such file",
     };
     Problem::new(
         ProblemKind::Conflict,
@@ -210,51 +215,51 @@ fn no_result(game: &Game) -> Problem {
     )
 }
 
-/// Which file of a game.
+/// A file of a game.
 #[derive(Debug, Clone, Copy)]
-enum Which {
+enum GameFile {
     BothSides,
     Side(Side),
 }
 
-/// A file of a game that the viewer may have now.
+/// A recording that the viewer may download now.
 #[derive(Debug)]
-struct Recorded {
+struct StoredRecording {
     game: GameId,
     key: String,
     blake3: String,
-    /// To be stored as.
+    /// File name for the client.
     name: String,
 }
 
-impl Recorded {
-    async fn find(app: &App, viewer: Viewer, id: GameId, which: Which) -> Result<Self, Problem> {
-        let (sheet, game) = game::known(app, viewer, id).await?;
-        let sight = sheet.sight(viewer);
-        let is_theirs = match which {
-            Which::BothSides => false,
-            Which::Side(side) => sight.is_own(&game, side),
+impl StoredRecording {
+    async fn find(app: &App, viewer: Viewer, id: GameId, file: GameFile) -> Result<Self, Problem> {
+        let (state, game) = game::find_visible(app, viewer, id).await?;
+        let visibility = state.visibility(viewer);
+        let is_own = match file {
+            GameFile::BothSides => false,
+            GameFile::Side(side) => visibility.is_own(&game, side),
         };
-        if !is_theirs && !sight.sees_both_sides(&game) {
-            let what = match which {
-                Which::BothSides => "the recording of both sides".to_owned(),
-                Which::Side(side) => format!("the file of side {}", side.number()),
+        if !is_own && !visibility.can_see_both_sides(&game) {
+            let what = match file {
+                GameFile::BothSides => "the recording of both sides".to_owned(),
+                GameFile::Side(side) => format!("the file of side {}", side.number()),
             };
-            return Err(sight.refused(&game, &what));
+            return Err(visibility.denial(&game, &what));
         }
-        let files = recording_of(&game)?;
-        let (file, blake3) = match which {
-            Which::BothSides => ("game.zip".to_owned(), &files.game_blake3),
-            Which::Side(side) => {
-                let file = format!("side-{}.zip", side.number());
-                (file, &files.side_blake3[side.index()])
+        let files = stored_recording(&game)?;
+        let (name, blake3) = match file {
+            GameFile::BothSides => ("game.zip".to_owned(), &files.game_blake3),
+            GameFile::Side(side) => {
+                let name = format!("side-{}.zip", side.number());
+                (name, &files.side_blake3[side.index()])
             }
         };
-        let key = format!("{}/{file}", files.key);
-        archived::check_kept(app, &key, "recording").await?;
+        let key = format!("{}/{name}", files.key);
+        archive_contents::check_included(app, &key, "recording").await?;
         Ok(Self {
             game: id,
-            name: stored_as(&sheet, &game, &file)?,
+            name: download_name(&state, &game, &name)?,
             key,
             blake3: blake3.clone(),
         })
@@ -269,17 +274,17 @@ impl Recorded {
         };
         match download(app, conditions, file).await {
             Err(StoreError::NotFound(_)) => {
-                // It may have been voided meanwhile, and what it had be gone. One that is promised must be there.
-                recording_of(&app.store.game(self.game).await?)?;
+                // The game may have been voided meanwhile, and its files removed. Otherwise the file is lost.
+                stored_recording(&app.store.game(self.game).await?)?;
                 Err(Problem::internal(format_args!("{} is lost", self.key)))
             }
-            answer => Ok(answer?),
+            result => Ok(result?),
         }
     }
 }
 
-fn stored_as(sheet: &TournamentSheet, game: &Game, file: &str) -> Result<String, Problem> {
+fn download_name(state: &TournamentState, game: &Game, file: &str) -> Result<String, Problem> {
     let [home, away] = game.teams;
-    let teams = format!("faceoff-{}-{}", sheet.name(home)?, sheet.name(away)?);
-    Ok(format!("{}-{file}", plain(&teams)))
+    let teams = format!("faceoff-{}-{}", state.name(home)?, state.name(away)?);
+    Ok(format!("{}-{file}", file_stem(&teams)))
 }

@@ -1,24 +1,25 @@
-//! Is the server up, and is it fit for work?
+//! Liveness and readiness of the server.
 
 use axum::{Json, extract::State};
 use faceoff_api::views::health::{HealthView, LiveView};
 use faceoff_service::{app::App, problem::Problem, views::health};
 
-/// Readiness: the database can be written (it is tried, once a second at most), the queue moves, and the
-/// disks have room. Otherwise a problem, whose `database`, `queue` and `room` say what is missing.
+/// Readiness: checks that the database is writable (by a test write, at most once a second), the queue makes progress,
+/// and the disks have free space.
+///
+/// Otherwise the response is a problem whose `database`, `queue` and `room` say what is wrong.
 #[utoipa::path(
     get, path = "/health", tag = "public",
     responses(
         (status = 200, body = HealthView),
-        (status = 503, description = "not ready; the server goes on by itself once what is missing is back"),
+        (status = 503, description = "not ready; the server recovers automatically once the problem is fixed"),
     )
 )]
 pub(crate) async fn health(State(app): State<App>) -> Result<Json<HealthView>, Problem> {
-    health::now(&app).await.map(Json)
+    health::check(&app).await.map(Json)
 }
 
-/// Liveness: the process answers, whatever it lacks. A server that is not ready is not to be restarted
-/// for that.
+/// Liveness: the server process responds. Do not restart a server only because it is not ready.
 #[utoipa::path(get, path = "/health/live", tag = "public", responses((status = 200, body = LiveView)))]
 pub(crate) async fn live() -> Json<LiveView> {
     Json(LiveView::ALIVE)

@@ -1,33 +1,33 @@
-//! Links by which people join, and joining.
+//! Invitations, and accepting them.
 
 use crate::paging::{Page, PageQuery, Paged};
 use axum::{Json, extract::State, http::StatusCode};
 use faceoff_api::{
-    requests::{self, Join},
+    requests::{self, JoinRequest},
     views::{
         invitation::{InvitationView, NewInvitationView},
-        person::JoinedView,
+        user::NewAccountView,
     },
 };
 use faceoff_service::{
-    acts::{inviting, joining::join},
+    services::{invitations, accounts::join},
     app::App,
     auth::Caller,
     extract::{Json as Body, PathParam},
     problem::Problem,
-    views::{invitation, person, token},
+    views::{invitation, user, token},
 };
-use faceoff_store::{TokenKind, Who};
+use faceoff_store::{TokenKind, Principal};
 use faceoff_types::InvitationId;
 
-/// Makes an invitation and returns its link, once. Organisers invite whomever they want, members into their team.
+/// Creates an invitation; its link is returned only once. Organisers invite to any role, members to their team.
 #[utoipa::path(
     post, path = "/invitations", tag = "people", security(("team" = []), ("organiser" = [])),
     request_body = requests::NewInvitation,
     responses(
         (status = 201, body = NewInvitationView),
-        (status = 403), (status = 404, description = "no such team or person"),
-        (status = 409, description = "too many of the team are open, or who is to return has left"),
+        (status = 403), (status = 404, description = "no such team or user"),
+        (status = 409, description = "the team has too many open invitations, or the returning user's account is closed"),
         (status = 422),
     )
 )]
@@ -36,11 +36,11 @@ pub(crate) async fn create_invitation(
     State(app): State<App>,
     Body(new): Body<requests::NewInvitation>,
 ) -> Result<(StatusCode, Json<NewInvitationView>), Problem> {
-    let view = inviting::create_invitation(&app, &caller, new).await?;
+    let view = invitations::create_invitation(&app, &caller, new).await?;
     Ok((StatusCode::CREATED, Json(view)))
 }
 
-/// The invitations that the caller may manage, the newest first: an organiser's are all of them.
+/// Lists the invitations that the caller may manage, newest first; organisers see all.
 #[utoipa::path(
     get, path = "/invitations", tag = "people", security(("team" = []), ("organiser" = [])),
     params(PageQuery),
@@ -52,19 +52,19 @@ pub(crate) async fn list_invitations(
     State(app): State<App>,
 ) -> Result<Paged<InvitationView>, Problem> {
     let now = app.config.clock.now();
-    let invitations = inviting::invitations(&app, &caller).await?;
-    let page = page.cut(invitations, |invitation| invitation.id)?;
-    Ok(page.map(|invitation| invitation::of(invitation, now)))
+    let invitations = invitations::invitations(&app, &caller).await?;
+    let page = page.select(invitations, |invitation| invitation.id)?;
+    Ok(page.map(|invitation| invitation::view(invitation, now)))
 }
 
-/// Takes an invitation back: its link is worth nothing from then on.
+/// Revokes an invitation: its link is invalid from now on.
 #[utoipa::path(
     delete, path = "/invitations/{id}", tag = "people", security(("team" = []), ("organiser" = [])),
     params(("id" = InvitationId, Path)),
     responses(
         (status = 200, body = InvitationView),
         (status = 404),
-        (status = 409, description = "somebody has followed it"),
+        (status = 409, description = "the invitation has been accepted"),
     )
 )]
 pub(crate) async fn revoke_invitation(
@@ -72,30 +72,30 @@ pub(crate) async fn revoke_invitation(
     State(app): State<App>,
     PathParam(id): PathParam<InvitationId>,
 ) -> Result<Json<InvitationView>, Problem> {
-    let revoked = inviting::revoke_invitation(&app, &caller, id);
+    let revoked = invitations::revoke_invitation(&app, &caller, id);
     revoked.await.map(Json)
 }
 
-/// Follows an invitation, once: the caller becomes a person with a role and gets a token, which is shown this once.
+/// Accepts an invitation: creates a user with its role and returns a token, which is shown only once.
 #[utoipa::path(
-    post, path = "/invitations/accept", tag = "people", request_body = Join,
+    post, path = "/invitations/accept", tag = "people", request_body = JoinRequest,
     responses(
-        (status = 201, body = JoinedView),
-        (status = 409, description = "the invitation is worth nothing (any more), a name is taken, or something is missing"),
+        (status = 201, body = NewAccountView),
+        (status = 409, description = "the invitation is not or no longer valid, a name is taken, or a required field is missing"),
         (status = 422),
     )
 )]
 pub(crate) async fn accept_invitation(
     State(app): State<App>,
-    Body(body): Body<Join>,
-) -> Result<(StatusCode, Json<JoinedView>), Problem> {
-    let (joined, secret) = join(&app, body, TokenKind::Key, None).await?;
-    let who = match joined.team {
-        Some(team) => Who::Member(joined.person, team),
-        None => Who::Organiser(joined.person),
+    Body(body): Body<JoinRequest>,
+) -> Result<(StatusCode, Json<NewAccountView>), Problem> {
+    let (joined, secret) = join(&app, body, TokenKind::ApiToken, None).await?;
+    let principal = match joined.team {
+        Some(team) => Principal::Member(joined.user, team),
+        None => Principal::Organiser(joined.user),
     };
-    let view = JoinedView {
-        who: person::who(who, token::of(joined.token)),
+    let view = NewAccountView {
+        caller: user::caller(principal, token::view(joined.token)),
         secret: secret.as_str().to_owned(),
     };
     Ok((StatusCode::CREATED, Json(view)))

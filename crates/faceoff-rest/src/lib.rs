@@ -1,5 +1,5 @@
-//! The REST API: routes, parsing and their description. One file per resource; what it shows of one is in
-//! [`faceoff_api::views`], how that is made in [`faceoff_service::views`].
+//! The REST API: routes, parsing of requests, and the OpenAPI document. One file per resource. The types of responses are
+//! in [`faceoff_api::views`]; [`faceoff_service::views`] builds them.
 
 mod ablations;
 mod announcements;
@@ -7,21 +7,21 @@ mod archive;
 mod board;
 mod board_csv;
 mod capacity;
-mod clip_answer;
+mod clip_response;
 mod clips;
 mod comparisons;
 mod datasets;
-mod days;
+mod evaluation_days;
 mod document;
 mod downloads;
 mod entrants;
-mod episodes;
+mod episode_count;
 mod evaluations;
 mod event_reader;
 mod event_stream;
 mod events;
-mod free_games;
-mod freezes;
+mod friendly_games;
+mod board_freezes;
 mod game_clips;
 mod game_files;
 mod games;
@@ -32,10 +32,10 @@ mod live_game;
 mod live_reader;
 mod me;
 mod paging;
-mod people;
+mod users;
 mod proposals;
 mod ratings;
-mod recorded;
+mod stored_dataset;
 mod registrations;
 mod replays;
 mod rounds;
@@ -47,14 +47,14 @@ mod sessions;
 mod sign_off;
 mod stages;
 mod storage;
-mod submission_archives;
+mod bundles;
 mod submissions;
 mod teams;
 mod terms;
 mod tokens;
-mod told;
+mod sse;
 mod tournaments;
-mod turns;
+mod extra_evaluations;
 mod upload;
 mod webhooks;
 mod workers;
@@ -68,43 +68,42 @@ use std::{sync::Arc, time::Duration};
 use utoipa::OpenApi;
 use utoipa_axum::{router::OpenApiRouter, routes};
 
-/// All routes. `patience` bounds the time of every answer but an upload's.
-pub fn router(patience: Duration) -> (Router<App>, Arc<Value>) {
+/// All routes, and the OpenAPI document. `timeout` limits the time of every response except uploads and archives.
+pub fn router(timeout: Duration) -> (Router<App>, Arc<Value>) {
     let resources = OpenApiRouter::with_openapi(Document::openapi())
-        .merge(of_season())
-        .merge(of_stages())
-        .merge(of_submissions())
-        .merge(of_evaluations())
-        .merge(of_tournaments())
-        .merge(of_games())
-        // Of two schemas of one name the first stands: `AttemptView` is a game's attempt, not a delivery's.
-        .merge(of_people())
-        .layer(middleware::from_fn_with_state(patience, timeouts::time_out))
+        .merge(season_routes())
+        .merge(stage_routes())
+        .merge(submission_routes())
+        .merge(evaluation_routes())
+        .merge(tournament_routes())
+        .merge(game_routes())
+        .merge(user_routes())
+        .layer(middleware::from_fn_with_state(timeout, timeouts::time_out))
         .layer(DefaultBodyLimit::max(MAX_JSON_BYTES));
-    // An upload may take long as long as it moves; `upload` itself watches size and pauses.
+    // An upload may take long as long as it progresses; `upload` itself limits size and pauses.
     let uploads = OpenApiRouter::new()
         .routes(routes!(upload::create_submission))
         .layer(DefaultBodyLimit::disable());
-    // Neither can an archive's making be told in advance.
+    // The time to make an archive is not known in advance, either.
     let archives = OpenApiRouter::new().routes(routes!(season_archive::season_archive));
     let (router, mut document) = OpenApiRouter::new()
         .nest(API_BASE, resources.merge(uploads).merge(archives))
         .split_for_parts();
     document.info = Document::openapi().info;
-    let document = Arc::new(document::told(document));
-    let answered = Arc::clone(&document);
+    let document = Arc::new(document::complete(document));
+    let served = Arc::clone(&document);
     let router = router.route(
         &format!("{API_BASE}/openapi.json"),
         get(move || {
-            let document = Arc::clone(&answered);
+            let document = Arc::clone(&served);
             async move { Json((*document).clone()) }
         }),
     );
     (router, document)
 }
 
-/// The season as a whole: its boards, its log, and whoever calls.
-fn of_season() -> OpenApiRouter<App> {
+/// Routes of the season: boards, event log, status of the calling team, health.
+fn season_routes() -> OpenApiRouter<App> {
     OpenApiRouter::new()
         .routes(routes!(health::health))
         .routes(routes!(health::live))
@@ -120,8 +119,8 @@ fn of_season() -> OpenApiRouter<App> {
         .routes(routes!(event_stream::follow_events))
 }
 
-/// Teams, people, and what they are told.
-fn of_people() -> OpenApiRouter<App> {
+/// Routes of teams, users, tokens, webhooks, invitations, terms and announcements.
+fn user_routes() -> OpenApiRouter<App> {
     OpenApiRouter::new()
         .routes(routes!(teams::create_team, teams::list_teams))
         .routes(routes!(teams::replace_token))
@@ -143,9 +142,9 @@ fn of_people() -> OpenApiRouter<App> {
         .routes(routes!(webhooks::list_deliveries))
         .routes(routes!(sessions::create_session))
         .routes(routes!(sessions::end_session))
-        .routes(routes!(people::list_people))
-        .routes(routes!(people::remove_person))
-        .routes(routes!(people::set_password))
+        .routes(routes!(users::list_people))
+        .routes(routes!(users::remove_person))
+        .routes(routes!(users::set_password))
         .routes(routes!(
             invitations::list_invitations,
             invitations::create_invitation
@@ -168,18 +167,18 @@ fn of_people() -> OpenApiRouter<App> {
         .routes(routes!(announcements::answer))
 }
 
-/// Stages, their days, and what organisers decide.
-fn of_stages() -> OpenApiRouter<App> {
+/// Routes of stages, their days, and organisers' decisions.
+fn stage_routes() -> OpenApiRouter<App> {
     OpenApiRouter::new()
         .routes(routes!(stages::list_stages, stages::create_stage))
         .routes(routes!(stages::stage, stages::change_stage))
         .routes(routes!(sign_off::start_final_day))
         .routes(routes!(sign_off::finalise_stage))
-        .routes(routes!(days::start_day))
-        .routes(routes!(turns::start_missed_day))
-        .routes(routes!(turns::extra_turn))
-        .routes(routes!(freezes::freeze_boards))
-        .routes(routes!(freezes::unfreeze_boards))
+        .routes(routes!(evaluation_days::start_day))
+        .routes(routes!(extra_evaluations::start_missed_day))
+        .routes(routes!(extra_evaluations::extra_turn))
+        .routes(routes!(board_freezes::freeze_boards))
+        .routes(routes!(board_freezes::unfreeze_boards))
         .routes(routes!(proposals::list_proposals))
         .routes(routes!(proposals::proposal))
         .routes(routes!(proposals::start_trial))
@@ -194,17 +193,17 @@ fn of_stages() -> OpenApiRouter<App> {
         .routes(routes!(rulings::reinstate_team))
 }
 
-/// What teams have uploaded, and who checks it.
-fn of_submissions() -> OpenApiRouter<App> {
+/// Routes of submissions, ablations, storage and workers.
+fn submission_routes() -> OpenApiRouter<App> {
     OpenApiRouter::new()
         .routes(routes!(submissions::list_submissions))
         .routes(routes!(
             submissions::submission,
             submissions::describe_submission,
-            submission_archives::delete_submission
+            bundles::delete_submission
         ))
-        .routes(routes!(submission_archives::submission_archive))
-        .routes(routes!(submission_archives::link_archive))
+        .routes(routes!(bundles::submission_archive))
+        .routes(routes!(bundles::link_archive))
         .routes(routes!(storage::storage))
         .routes(routes!(workers::workers))
         .routes(routes!(workers::ban_worker))
@@ -218,8 +217,8 @@ fn of_submissions() -> OpenApiRouter<App> {
         .routes(routes!(ablations::ablation_observed))
 }
 
-/// What was played, and what is kept of it.
-fn of_evaluations() -> OpenApiRouter<App> {
+/// Routes of evaluations, their datasets and episodes.
+fn evaluation_routes() -> OpenApiRouter<App> {
     OpenApiRouter::new()
         .routes(routes!(evaluations::list_evaluations))
         .routes(routes!(evaluations::evaluation))
@@ -235,8 +234,8 @@ fn of_evaluations() -> OpenApiRouter<App> {
         .routes(routes!(comparisons::compare))
 }
 
-/// Tournaments, and what is reckoned from their games.
-fn of_tournaments() -> OpenApiRouter<App> {
+/// Routes of tournaments, their rounds and ratings.
+fn tournament_routes() -> OpenApiRouter<App> {
     OpenApiRouter::new()
         .routes(routes!(
             tournaments::list_tournaments,
@@ -253,17 +252,17 @@ fn of_tournaments() -> OpenApiRouter<App> {
         .routes(routes!(tournaments::pause_tournament))
         .routes(routes!(tournaments::resume_tournament))
         .routes(routes!(tournaments::close_tournament))
-        .routes(routes!(free_games::order_test_games))
-        .routes(routes!(free_games::order_friendly_game))
-        .routes(routes!(free_games::list_free_games))
+        .routes(routes!(friendly_games::order_test_games))
+        .routes(routes!(friendly_games::order_friendly_game))
+        .routes(routes!(friendly_games::list_free_games))
         .routes(routes!(replays::order_replays, replays::cancel_replays))
         .routes(routes!(replays::certainty))
         .routes(routes!(ratings::ratings))
         .routes(routes!(ratings::head_to_head))
 }
 
-/// Games, and what is kept of them.
-fn of_games() -> OpenApiRouter<App> {
+/// Routes of games and their files.
+fn game_routes() -> OpenApiRouter<App> {
     OpenApiRouter::new()
         .routes(routes!(game_clips::game_motion))
         .routes(routes!(game_clips::game_observed))

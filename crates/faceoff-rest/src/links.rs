@@ -1,9 +1,9 @@
-//! Links that stand in for a token for a time, and for one file: made by whoever may download it, for whom has none.
+//! Signed links, which download one file without a token for a limited time.
 //!
-//! What a link opens is decided when it is followed, for whoever made it: it is good as long as the token that made it
-//! is, and shows what that one would see then. Its signature is keyed with the hash of that token, so that another
-//! secret of the token ends its links, too, and with a key of the server's own, which is in no backup: whoever reads the
-//! database can forge none.
+//! Permissions are checked when a link is used, as for its creator: it is valid as long as the creator's token is, and
+//! gives the access that the creator has then. The signature includes the hash of that token, so rotating the token
+//! invalidates its links. It is keyed with a secret of the server that is in no backup, so a copy of the database alone
+//! cannot forge links.
 
 use axum::{
     Json,
@@ -16,33 +16,33 @@ use faceoff_service::{
     auth::Caller,
     extract::QueryParams,
     problem::{Problem, ProblemKind},
-    watched,
+    request_log,
 };
-use faceoff_store::{Holder, Refusal, StoreError};
+use faceoff_store::{VerifiedToken, TokenRejection, StoreError};
 use faceoff_types::TokenId;
 use jiff::{SignedDuration, Timestamp};
 use serde::Deserialize;
 use utoipa::IntoParams;
 
-/// For how long a link is good, unless its maker says another time.
-const GOOD_FOR_S: u32 = 60 * 60;
-const MOST_S: u32 = 7 * 24 * 60 * 60;
-/// Nothing else is signed with a key of this context.
+/// Default validity of a link.
+const DEFAULT_VALIDITY_S: u32 = 60 * 60;
+const MAX_VALIDITY_S: u32 = 7 * 24 * 60 * 60;
+/// Derivation context of the key; used for nothing else.
 const CONTEXT: &str = "faceoff 2026-11-23 links that download a file";
 
-/// What a link says in its query.
+/// Query parameters of a signed link.
 #[derive(Debug, Deserialize, IntoParams)]
 #[into_params(parameter_in = Query)]
 pub(crate) struct LinkQuery {
-    /// Of a link: until when it is good, in seconds since 1970.
+    /// Of a signed link: when it expires, in seconds since 1970.
     expires: Option<i64>,
-    /// Of a link: the token that made it.
+    /// Of a signed link: id of its creator's token.
     by: Option<TokenId>,
-    /// Of a link: 64 hexadecimal digits.
+    /// Of a signed link: the signature, 64 hexadecimal digits.
     signature: Option<String>,
 }
 
-/// Whoever follows a link, as who made it; else who calls, as `E` has it.
+/// The creator of the signed link in the request, or, without a link, the caller as `E` extracts it.
 #[derive(Debug)]
 pub(crate) struct LinkOr<E>(pub(crate) E);
 
@@ -68,7 +68,7 @@ where
             _ => {
                 return Err(Problem::new(
                     ProblemKind::InvalidRequest,
-                    "a link has “expires”, “by” and “signature”, and some of these are missing; follow it as it was given",
+                    "expected “expires”, “by” and “signature”, got only some of them; use the complete link unchanged",
                 ));
             }
         };
@@ -77,33 +77,33 @@ where
             Ok(uri) => uri.path(),
             Err(never) => match *never {},
         };
-        let maker = maker(app, path, expires, by, &signature).await?;
-        Ok(Self(maker.into()))
+        let creator = verify(app, path, expires, by, &signature).await?;
+        Ok(Self(creator.into()))
     }
 }
 
-/// Signs `path` for a caller, who may download what is there now.
+/// Creates a link to `path` for a caller who may download it now.
 ///
 /// # Errors
-/// `InvalidContent` if it should be good for too long, or not at all.
+/// `InvalidContent` if the requested validity is 0 or too long.
 pub(crate) async fn link(
     app: &AppState,
     caller: &Caller,
     path: &str,
     wanted: NewLink,
 ) -> Result<(StatusCode, Json<LinkView>), Problem> {
-    let for_s = wanted.expires_in_s.unwrap_or(GOOD_FOR_S);
-    if !(1..=MOST_S).contains(&for_s) {
-        let detail = format!("expected 1 to {MOST_S} seconds (7 days), got {for_s}");
+    let validity_s = wanted.expires_in_s.unwrap_or(DEFAULT_VALIDITY_S);
+    if !(1..=MAX_VALIDITY_S).contains(&validity_s) {
+        let detail = format!("expected 1 to {MAX_VALIDITY_S} seconds (7 days), got {validity_s}");
         return Err(Problem::invalid("expires_in_s", detail));
     }
-    let until = app.config.clock.now().as_second() + i64::from(for_s);
+    let until = app.config.clock.now().as_second() + i64::from(validity_s);
     let expires_at = Timestamp::from_second(until).map_err(Problem::internal)?;
     let by = caller.token.id;
     let signature = sign(app, &app.store.token_hash(by).await?, path, until, by);
     let base = app.config.public_url.as_deref().unwrap_or_default();
     let url = format!("{base}{path}?expires={until}&by={by}&signature={signature}");
-    tracing::info!(path, %expires_at, actor = %caller.actor(), "a link was made");
+    tracing::info!(path, %expires_at, actor = %caller.actor(), "download link created");
     Ok((StatusCode::CREATED, Json(LinkView { url, expires_at })))
 }
 
@@ -123,52 +123,52 @@ fn sign(
         .finalize()
 }
 
-/// Who made a link that is followed now.
-async fn maker(
+/// Verifies a link and returns its creator.
+async fn verify(
     app: &AppState,
     path: &str,
     until: i64,
     by: TokenId,
     signature: &str,
 ) -> Result<Caller, Problem> {
-    let not_ours = || {
+    let invalid = || {
         Problem::new(
             ProblemKind::LinkInvalid,
-            "the link is none that was made for this file, or the token that made it has another secret by now; follow it \
-             as it was given, or ask for another one",
+            "the link is not valid for this file, or its creator's token was rotated; use the complete link unchanged, or \
+             ask for a new one",
         )
     };
     let token_hash = match app.store.token_hash(by).await {
         Ok(hash) => hash,
-        Err(StoreError::NotFound(_)) => return Err(not_ours()),
+        Err(StoreError::NotFound(_)) => return Err(invalid()),
         Err(error) => return Err(error.into()),
     };
-    let signature = blake3::Hash::from_hex(signature).map_err(|_| not_ours())?;
-    // Hashes are compared in a time that tells nothing of where they differ.
+    let signature = blake3::Hash::from_hex(signature).map_err(|_| invalid())?;
+    // `blake3::Hash` compares in constant time.
     if signature != sign(app, &token_hash, path, until, by) {
-        return Err(not_ours());
+        return Err(invalid());
     }
     let now = app.config.clock.now();
     if now.duration_since(Timestamp::UNIX_EPOCH) >= SignedDuration::from_secs(until) {
-        let at = Timestamp::from_second(until).map_err(|_| not_ours())?;
+        let at = Timestamp::from_second(until).map_err(|_| invalid())?;
         let shown = at.strftime("%Y-%m-%d %H:%M:%S UTC");
         return Err(Problem::new(
             ProblemKind::LinkExpired,
-            format!("the link was good until {shown}; ask who gave it to you for another one"),
+            format!("the link expired at {shown}; ask the person who gave it to you for a new one"),
         )
         .with("expired_at", at.to_string()));
     }
-    match app.store.holder_of(by, now).await? {
-        Ok(Holder { token, who }) => {
+    match app.store.verify_token_id(by, now).await? {
+        Ok(VerifiedToken { token, principal }) => {
             app.check_rate(token.id)?;
-            let maker = Caller { token, who };
-            watched::asked_by(&maker.actor());
-            Ok(maker)
+            let creator = Caller { token, principal };
+            request_log::record_actor(&creator.actor());
+            Ok(creator)
         }
-        Err(Refusal::Revoked(_) | Refusal::Expired(_) | Refusal::Unknown | Refusal::WrongKind) => {
+        Err(TokenRejection::Revoked(_) | TokenRejection::Expired(_) | TokenRejection::Unknown | TokenRejection::WrongKind) => {
             Err(Problem::new(
                 ProblemKind::LinkInvalid,
-                "the token that made the link was revoked or has expired, and its links with it; ask for another one",
+                "the token of the link's creator was revoked or has expired, and its links with it; ask for a new one",
             ))
         }
     }

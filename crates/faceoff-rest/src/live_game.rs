@@ -1,11 +1,11 @@
-//! A game as it is played, by server-sent events.
+//! The stream of a live game (server-sent events).
 
-use super::told::{LAST_EVENT_ID, told};
-use crate::live_reader::{LiveReader, parse_mark};
+use super::sse::{LAST_EVENT_ID, sse_response};
+use crate::live_reader::{LiveReader, parse_cursor};
 use axum::{Extension, extract::State, http::HeaderMap, response::IntoResponse};
 use faceoff_service::{
     app::App,
-    ending::Ending,
+    shutdown::Shutdown,
     extract::PathParam,
     problem::{Problem, ProblemKind},
     viewer::Viewer,
@@ -15,50 +15,55 @@ use faceoff_types::GameId;
 use futures::stream;
 use std::sync::Arc;
 
-/// Follows a game: `snapshot` (how it stands), then every `happening` in order, and `position` ten times a second at
-/// most, of which only the newest is told; `waiting` while no slot plays it; at the end `over`, and the stream ends.
+/// Streams a live game (server-sent events).
 ///
-/// The id of a happening is `ATTEMPT.NUMBER`. Who comes again with the header `Last-Event-ID` gets a snapshot and all
-/// that happened since; of another attempt everything. Streams end after an hour at most, and when the server ends.
+/// The first event is `snapshot`, the current state. Then follow all `happening` events in chronological order, and
+/// `position` at most ten times a second; of these only the newest is sent. `waiting` is sent while the game waits for
+/// a slot. At the end `over` is sent, and the stream ends.
+///
+/// The id of a happening is `ATTEMPT.NUMBER`. A client that reconnects with the header `Last-Event-ID` gets a snapshot
+/// and all happenings since then; after a new attempt, all of its happenings. A stream ends after at most an hour, and
+/// when the server shuts down.
 #[utoipa::path(
     get, path = "/games/{id}/live", tag = "public", security((), ("team" = []), ("organiser" = [])),
     params(
         ("id" = GameId, Path),
-        ("Last-Event-ID" = Option<String>, Header, description = "the id of the last event that came", example = "1.17"),
+        ("Last-Event-ID" = Option<String>, Header, description = "id of the last received event", example = "1.17"),
     ),
     responses(
         (status = 200, body = String, content_type = "text/event-stream"),
-        (status = 400, description = "the header is none of this stream's ids"),
+        (status = 400, description = "`Last-Event-ID` is not an event id of this stream"),
         (status = 404),
-        (status = 503, description = "as many readers as may be are following games"),
+        (status = 503, description = "the server has as many readers of live games as it may"),
     )
 )]
 pub(crate) async fn watch_game(
     viewer: Viewer,
     State(app): State<App>,
     PathParam(id): PathParam<GameId>,
-    ending: Option<Extension<Ending>>,
+    shutdown: Option<Extension<Shutdown>>,
     headers: HeaderMap,
 ) -> Result<impl IntoResponse, Problem> {
-    game::known(&app, viewer, id).await?;
-    let seen = headers
+    game::find_visible(&app, viewer, id).await?;
+    let last_event_id = headers
         .get(LAST_EVENT_ID)
-        .map(|value| parse_mark(value.to_str().unwrap_or_default()))
+        .map(|value| parse_cursor(value.to_str().unwrap_or_default()))
         .transpose()?;
-    let Ok(place) = Arc::clone(&app.watching).try_acquire_owned() else {
+    let Ok(permit) = Arc::clone(&app.live_reader_permits).try_acquire_owned() else {
         return Err(Problem::new(
             ProblemKind::Busy,
             format!(
-                "{} readers follow games, and more may not at a time; try again, or ask GET /api/v1/games/{id} now and then",
+                "the server has {} readers of live games, which is the maximum; try again later, or poll GET \
+                 /api/v1/games/{id}",
                 app.config.limits.live_readers
             ),
         ));
     };
-    let ending = ending.map(|Extension(ending)| ending);
-    let reader = LiveReader::new(app, id, seen, ending, place);
+    let shutdown = shutdown.map(|Extension(shutdown)| shutdown);
+    let reader = LiveReader::new(app, id, last_event_id, shutdown, permit);
     let batches = stream::unfold(reader, |mut reader| async {
         let batch = reader.next().await?;
         Some((batch, reader))
     });
-    Ok(told(batches))
+    Ok(sse_response(batches))
 }

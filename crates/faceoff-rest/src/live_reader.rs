@@ -1,14 +1,14 @@
-//! Somebody who follows a game: what is told next, and when.
+//! A reader of a live game's stream: which events it gets next, and when.
 
 use axum::response::sse::Event;
 use faceoff_api::views::live::{LiveEnd, LiveEndState, LiveWait};
 use faceoff_service::{
     app::App,
-    ending::Ending,
+    shutdown::Shutdown,
     problem::{Problem, ProblemKind},
 };
-use faceoff_store::{GameState, LiveMark, LiveNews, LiveWatch, StoreError};
-use faceoff_types::{GameHappening, GameId, LiveGame, LiveHappening};
+use faceoff_store::{GameState, LiveCursor, LiveUpdate, LiveSubscription, StoreError};
+use faceoff_types::{GameEvent, GameId, LiveGame, LiveEvent};
 use serde::Serialize;
 use std::time::Duration;
 use tokio::{
@@ -16,36 +16,36 @@ use tokio::{
     time::{Instant, sleep, sleep_until},
 };
 
-/// Between two looks at a game that is played: so often a position is told at most.
-const PACE: Duration = Duration::from_millis(100);
-/// Between two looks whether a slot has begun it, or whether it was called off.
-const WAITING: Duration = Duration::from_secs(1);
-/// Nobody holds a connection for longer; who wants more comes again and loses nothing.
-const LONGEST: Duration = Duration::from_secs(3600);
+/// Minimum time between two batches of a running game, and so between two positions.
+const BATCH_INTERVAL: Duration = Duration::from_millis(100);
+/// Time between two checks whether the game has started or was cancelled.
+const POLL_INTERVAL: Duration = Duration::from_secs(1);
+/// Longest connection; a client that reconnects loses no event.
+const MAX_DURATION: Duration = Duration::from_secs(3600);
 
 #[derive(Debug)]
 pub(crate) struct LiveReader {
     app: App,
     game: GameId,
-    watch: Option<LiveWatch>,
-    seen: Option<LiveMark>,
-    /// The attempt of which a snapshot was told on this stream.
-    shown_attempt: Option<u32>,
-    /// The step of the position that was told last.
-    shown_step: Option<u32>,
-    /// Was it told, since the last snapshot, that nobody plays the game?
-    waits: bool,
+    subscription: Option<LiveSubscription>,
+    cursor: Option<LiveCursor>,
+    /// The attempt whose snapshot was sent.
+    sent_attempt: Option<u32>,
+    /// The step of the position that was sent last.
+    sent_step: Option<u32>,
+    /// Whether `waiting` was sent since the last snapshot.
+    sent_waiting: bool,
     is_over: bool,
-    /// Nothing is told before.
+    /// Earliest time of the next batch.
     not_before: Instant,
     until: Instant,
-    ending: Option<Ending>,
-    _place: OwnedSemaphorePermit,
+    shutdown: Option<Shutdown>,
+    _permit: OwnedSemaphorePermit,
 }
 
-/// How the database has a game.
-enum Stands {
-    /// It is, or is about to be, played: which attempt, if one is under way.
+/// State of a game in the database.
+enum StoredState {
+    /// Pending or running; the running attempt.
     Open(Option<u32>),
     Over(LiveEndState),
 }
@@ -54,140 +54,140 @@ impl LiveReader {
     pub(crate) fn new(
         app: App,
         game: GameId,
-        seen: Option<LiveMark>,
-        ending: Option<Ending>,
-        place: OwnedSemaphorePermit,
+        cursor: Option<LiveCursor>,
+        shutdown: Option<Shutdown>,
+        permit: OwnedSemaphorePermit,
     ) -> Self {
         let now = Instant::now();
         Self {
             app,
             game,
-            watch: None,
-            seen,
-            shown_attempt: None,
-            shown_step: None,
-            waits: false,
+            subscription: None,
+            cursor,
+            sent_attempt: None,
+            sent_step: None,
+            sent_waiting: false,
             is_over: false,
             not_before: now,
-            until: now + LONGEST,
-            ending,
-            _place: place,
+            until: now + MAX_DURATION,
+            shutdown,
+            _permit: permit,
         }
     }
 
-    /// What is told next, as soon as there is something; `None`: nothing more.
+    /// The next events, as soon as there are any; `None` at the end of the stream.
     pub(crate) async fn next(&mut self) -> Option<Vec<Event>> {
         if self.is_over {
             return None;
         }
-        let mut ending = self.ending.clone();
+        let mut shutdown = self.shutdown.clone();
         let until = self.until;
-        let told = tokio::select! {
-            () = Ending::wait(ending.as_mut()) => return None,
+        let batch = tokio::select! {
+            () = Shutdown::wait(shutdown.as_mut()) => return None,
             () = sleep_until(until) => return None,
-            told = self.told() => told,
+            batch = self.next_batch() => batch,
         };
-        self.not_before = Instant::now() + PACE;
-        match told {
+        self.not_before = Instant::now() + BATCH_INTERVAL;
+        match batch {
             Ok(events) => Some(events),
             Err(problem) => {
-                // The answer has begun, so that nothing but its end can say so; the log has the cause.
-                tracing::debug!(game = %self.game, detail = problem.detail(), "a stream ends");
+                // The response has begun, so an error can only end it; the cause is logged.
+                tracing::debug!(game = %self.game, detail = problem.detail(), "a game's stream ends");
                 None
             }
         }
     }
 
-    async fn told(&mut self) -> Result<Vec<Event>, Problem> {
+    async fn next_batch(&mut self) -> Result<Vec<Event>, Problem> {
         sleep_until(self.not_before).await;
         loop {
-            if self.watch.is_none() {
-                self.watch = self.app.store.live_games().watch(self.game);
+            if self.subscription.is_none() {
+                self.subscription = self.app.store.live_games().subscribe(self.game);
             }
-            let (events, is_watched) = match &mut self.watch {
-                Some(watch) => {
-                    let news = watch.news(self.seen);
-                    if news.stands.is_over {
-                        (self.after_the_end(news).await?, true)
+            let (events, is_live) = match &mut self.subscription {
+                Some(subscription) => {
+                    let update = subscription.read_since(self.cursor);
+                    if update.state.is_over {
+                        (self.events_after_end(update).await?, true)
                     } else {
-                        (self.under_way(news)?, true)
+                        (self.running_events(update)?, true)
                     }
                 }
-                None => (self.unwatched().await?, false),
+                None => (self.without_live_data().await?, false),
             };
             if !events.is_empty() {
                 return Ok(events);
             }
-            self.wait(is_watched).await;
+            self.wait(is_live).await;
         }
     }
 
-    /// Until there may be something else to tell.
-    async fn wait(&mut self, is_watched: bool) {
-        match &mut self.watch {
-            Some(watch) if is_watched => {
+    /// Waits until there may be new events.
+    async fn wait(&mut self, is_live: bool) {
+        match &mut self.subscription {
+            Some(subscription) if is_live => {
                 tokio::select! {
-                    is_told = watch.changed() => {
-                        if !is_told {
-                            self.watch = None;
+                    has_changed = subscription.changed() => {
+                        if !has_changed {
+                            self.subscription = None;
                         }
                     }
-                    // What the organiser does with a game that is over is not told there.
-                    () = sleep(WAITING) => {}
+                    // The subscription does not report what organisers do with a game that has ended.
+                    () = sleep(POLL_INTERVAL) => {}
                 }
             }
-            _ => sleep(WAITING).await,
+            _ => sleep(POLL_INTERVAL).await,
         }
     }
 
-    /// An attempt goes on.
-    fn under_way(&mut self, news: LiveNews) -> Result<Vec<Event>, Problem> {
+    /// Events of a running attempt.
+    fn running_events(&mut self, update: LiveUpdate) -> Result<Vec<Event>, Problem> {
         let mut events = Vec::new();
-        self.tell(&news, &mut events)?;
-        if let Some(position) = news.stands.position
-            && self.shown_step != Some(position.step)
+        self.push_game_events(&update, &mut events)?;
+        if let Some(position) = update.state.position
+            && self.sent_step != Some(position.step)
         {
-            self.shown_step = Some(position.step);
+            self.sent_step = Some(position.step);
             events.push(event("position", &position)?);
         }
         Ok(events)
     }
 
-    /// A snapshot where none of the attempt was told, and all that happened since.
-    fn tell(&mut self, news: &LiveNews, events: &mut Vec<Event>) -> Result<(), Problem> {
-        let attempt = news.stands.attempt;
-        if self.shown_attempt != Some(attempt) {
-            self.shown_attempt = Some(attempt);
-            self.shown_step = news.stands.position.map(|position| position.step);
-            self.waits = false;
-            events.push(event("snapshot", &news.stands)?);
+    /// Adds the attempt's snapshot, unless it was sent, and all game events since.
+    fn push_game_events(&mut self, update: &LiveUpdate, events: &mut Vec<Event>) -> Result<(), Problem> {
+        let attempt = update.state.attempt;
+        if self.sent_attempt != Some(attempt) {
+            self.sent_attempt = Some(attempt);
+            self.sent_step = update.state.position.map(|position| position.step);
+            self.sent_waiting = false;
+            events.push(event("snapshot", &update.state)?);
         }
-        for (happening, number) in news.happenings.iter().zip(news.after.happenings + 1..) {
-            events.push(numbered(happening, attempt, number)?);
+        for (game_event, number) in update.events.iter().zip(update.start.events + 1..) {
+            events.push(numbered_event(game_event, attempt, number)?);
         }
-        self.seen = Some(news.mark);
+        self.cursor = Some(update.end);
         Ok(())
     }
 
-    /// The last attempt that was told of is over: with it the game, unless it is played again.
-    async fn after_the_end(&mut self, news: LiveNews) -> Result<Vec<Event>, Problem> {
-        let attempt = news.stands.attempt;
-        let has_ended = self.has_ended(&news);
+    /// Events after the end of an attempt: the game has ended, unless it is rerun.
+    async fn events_after_end(&mut self, update: LiveUpdate) -> Result<Vec<Event>, Problem> {
+        let attempt = update.state.attempt;
+        let has_ended = self.has_ended(&update);
         let mut events = Vec::new();
-        match self.stands().await? {
-            Stands::Over(state) => {
-                self.tell(&news, &mut events)?;
+        match self.stored_state().await? {
+            StoredState::Over(state) => {
+                self.push_game_events(&update, &mut events)?;
                 events.push(self.end(state)?);
             }
-            // Its result is being stored.
-            Stands::Open(Some(running)) if running == attempt && has_ended => {
-                self.tell(&news, &mut events)?;
+            // The attempt has ended, and its result is being stored.
+            StoredState::Open(Some(running)) if running == attempt && has_ended => {
+                self.push_game_events(&update, &mut events)?;
                 events.push(self.end(LiveEndState::Played)?);
             }
-            Stands::Open(_) => {
-                // What nobody was shown the beginning of is not told when it is over, and no result either.
-                if self.shown_attempt == Some(attempt) {
-                    self.tell(&news, &mut events)?;
+            StoredState::Open(_) => {
+                // An attempt without a result whose beginning was not sent is skipped.
+                if self.sent_attempt == Some(attempt) {
+                    self.push_game_events(&update, &mut events)?;
                 }
                 events.extend(self.waiting()?);
             }
@@ -195,36 +195,36 @@ impl LiveReader {
         Ok(events)
     }
 
-    fn has_ended(&mut self, news: &LiveNews) -> bool {
-        let last = match news.happenings.last() {
+    fn has_ended(&mut self, update: &LiveUpdate) -> bool {
+        let last = match update.events.last() {
             Some(last) => Some(last.clone()),
             None => self
-                .watch
+                .subscription
                 .as_mut()
-                .and_then(|watch| watch.news(None).happenings.pop()),
+                .and_then(|subscription| subscription.read_since(None).events.pop()),
         };
-        last.is_some_and(|last| matches!(last.what, GameHappening::Ended { .. }))
+        last.is_some_and(|last| matches!(last.event, GameEvent::Ended { .. }))
     }
 
-    /// No slot of this process has played it, or long ago.
-    async fn unwatched(&mut self) -> Result<Vec<Event>, Problem> {
-        let Stands::Over(state) = self.stands().await? else {
+    /// Events of a game without live data: no slot reports it to this process, or its data was dropped.
+    async fn without_live_data(&mut self) -> Result<Vec<Event>, Problem> {
+        let StoredState::Over(state) = self.stored_state().await? else {
             return Ok(self.waiting()?.into_iter().collect());
         };
         let mut events = Vec::new();
-        if let Some(stands) = self.result().await? {
-            events.push(event("snapshot", &stands)?);
+        if let Some(snapshot) = self.final_snapshot().await? {
+            events.push(event("snapshot", &snapshot)?);
         }
         events.push(self.end(state)?);
         Ok(events)
     }
 
-    /// That nobody plays it at the moment, once.
+    /// The event that the game waits for a slot, once.
     fn waiting(&mut self) -> Result<Option<Event>, Problem> {
-        if self.waits {
+        if self.sent_waiting {
             return Ok(None);
         }
-        self.waits = true;
+        self.sent_waiting = true;
         event("waiting", &LiveWait { game: self.game }).map(Some)
     }
 
@@ -234,23 +234,23 @@ impl LiveReader {
         event("over", &LiveEnd { game, state })
     }
 
-    async fn stands(&self) -> Result<Stands, Problem> {
+    async fn stored_state(&self) -> Result<StoredState, Problem> {
         let game = match self.app.store.game(self.game).await {
-            Err(StoreError::NotFound(_)) => return Ok(Stands::Over(LiveEndState::Cancelled)),
+            Err(StoreError::NotFound(_)) => return Ok(StoredState::Over(LiveEndState::Cancelled)),
             game => game?,
         };
         Ok(match game.state {
-            GameState::Queued => Stands::Open(None),
-            GameState::Running { attempt, .. } => Stands::Open(Some(attempt)),
-            GameState::Played(_) => Stands::Over(LiveEndState::Played),
-            GameState::Broken { .. } => Stands::Over(LiveEndState::Broken),
-            GameState::Void { .. } => Stands::Over(LiveEndState::Void),
-            GameState::Cancelled { .. } => Stands::Over(LiveEndState::Cancelled),
+            GameState::Queued => StoredState::Open(None),
+            GameState::Running { attempt, .. } => StoredState::Open(Some(attempt)),
+            GameState::Played(_) => StoredState::Over(LiveEndState::Played),
+            GameState::PlatformFailed { .. } => StoredState::Over(LiveEndState::Broken),
+            GameState::Void { .. } => StoredState::Over(LiveEndState::Void),
+            GameState::Cancelled { .. } => StoredState::Over(LiveEndState::Cancelled),
         })
     }
 
-    /// How a game stood at its end whose happenings are forgotten.
-    async fn result(&self) -> Result<Option<LiveGame>, Problem> {
+    /// Snapshot of the end of a game without live data; `None` without a result.
+    async fn final_snapshot(&self) -> Result<Option<LiveGame>, Problem> {
         let GameState::Played(row) = self.app.store.game(self.game).await?.state else {
             return Ok(None);
         };
@@ -273,27 +273,27 @@ fn event(name: &str, data: &impl Serialize) -> Result<Event, Problem> {
     event.json_data(data).map_err(Problem::internal)
 }
 
-fn numbered(happening: &LiveHappening, attempt: u32, number: u32) -> Result<Event, Problem> {
-    Ok(event("happening", happening)?.id(format!("{attempt}.{number}")))
+fn numbered_event(game_event: &LiveEvent, attempt: u32, number: u32) -> Result<Event, Problem> {
+    Ok(event("happening", game_event)?.id(format!("{attempt}.{number}")))
 }
 
-/// An id as [`numbered`] gives it.
+/// Parses an event id as [`numbered`] writes it.
 ///
 /// # Errors
 /// `InvalidRequest`.
-pub(crate) fn parse_mark(text: &str) -> Result<LiveMark, Problem> {
-    let parsed = text.split_once('.').and_then(|(attempt, happenings)| {
-        Some(LiveMark {
+pub(crate) fn parse_cursor(text: &str) -> Result<LiveCursor, Problem> {
+    let parsed = text.split_once('.').and_then(|(attempt, events)| {
+        Some(LiveCursor {
             attempt: attempt.parse().ok()?,
-            happenings: happenings.parse().ok()?,
+            events: events.parse().ok()?,
         })
     });
     parsed.ok_or_else(|| {
         Problem::new(
             ProblemKind::InvalidRequest,
             format!(
-                "the header Last-Event-ID is the id of the last event that came, as in 1.17, got {text:?}; without it all is \
-                 told from the beginning"
+                "expected the header Last-Event-ID to be the id of an event, as in 1.17, got {text:?}; leave it out to start \
+                 from the beginning"
             ),
         )
     })

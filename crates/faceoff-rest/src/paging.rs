@@ -1,5 +1,5 @@
-//! Lists that grow with the season, page by page. A page is named by the row that it comes behind, so that what is added
-//! meanwhile shifts nothing: who walks a list meets every row once that was there when they began.
+//! Paging of lists. A page is identified by the row before it, so rows that are added meanwhile shift nothing: a client
+//! that reads all pages gets every row that existed at the beginning exactly once.
 
 use axum::{
     Json,
@@ -15,26 +15,26 @@ use serde::{Deserialize, Serialize, de::DeserializeOwned};
 use std::{fmt::Display, str::FromStr};
 use utoipa::IntoParams;
 
-const PAGE: u32 = 100;
-const LONGEST_PAGE: u32 = 200;
+const DEFAULT_LIMIT: u32 = 100;
+const MAX_LIMIT: u32 = 200;
 
-/// Which page of a list.
+/// Query parameters of a paged list.
 #[derive(Debug, Deserialize, IntoParams)]
 #[into_params(parameter_in = Query)]
 pub(crate) struct PageQuery {
-    /// Rows at most; without it 100.
+    /// Maximum number of rows. Default: 100.
     #[param(minimum = 1, maximum = 200)]
     limit: Option<u32>,
-    /// Those behind a row: as the header `Link` of the page before says.
+    /// Return the rows after this one. Taken from the header `Link` of the previous page.
     after: Option<String>,
 }
 
-/// A page that is asked for, of rows that these ids name.
+/// A requested page of a list whose rows have ids of type `I`.
 #[derive(Debug)]
 pub(crate) struct Page<I> {
     pub(crate) limit: u32,
     pub(crate) after: Option<I>,
-    /// The list, with what else is asked of it.
+    /// Path of the list with its other query parameters.
     list: String,
 }
 
@@ -48,9 +48,9 @@ where
     async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self, Problem> {
         let QueryParams(PageQuery { limit, after }) =
             QueryParams::from_request_parts(parts, state).await?;
-        let limit = limit.unwrap_or(PAGE);
-        if !(1..=LONGEST_PAGE).contains(&limit) {
-            let detail = format!("expected 1 to {LONGEST_PAGE}, got {limit}");
+        let limit = limit.unwrap_or(DEFAULT_LIMIT);
+        if !(1..=MAX_LIMIT).contains(&limit) {
+            let detail = format!("expected 1 to {MAX_LIMIT}, got {limit}");
             return Err(Problem::invalid("limit", detail));
         }
         let uri = match OriginalUri::from_request_parts(parts, state).await {
@@ -59,24 +59,24 @@ where
         };
         let after = after.map(|text| text.parse::<I>());
         let after = after.transpose().map_err(|error| {
-            let detail = format!("after: {error}; follow the header Link of the page before");
+            let detail = format!("after: {error}; use the header Link of the previous page");
             Problem::new(ProblemKind::InvalidRequest, detail)
         })?;
         let others = uri.query().unwrap_or_default().split('&');
-        let others = others.filter(|one| !one.is_empty() && !one.starts_with("after="));
-        let list = others.fold(format!("{}?", uri.path()), |list, one| {
-            format!("{list}{one}&")
+        let others = others.filter(|param| !param.is_empty() && !param.starts_with("after="));
+        let list = others.fold(format!("{}?", uri.path()), |list, param| {
+            format!("{list}{param}&")
         });
         Ok(Self { limit, after, list })
     }
 }
 
 impl<I: Display + PartialEq> Page<I> {
-    /// Of a list that is read whole, since it stays short.
+    /// The page of a short list that is read completely.
     ///
     /// # Errors
-    /// `InvalidRequest` if the row that the page comes behind is not in it.
-    pub(crate) fn cut<T>(
+    /// `InvalidRequest` if `after` is not in the list.
+    pub(crate) fn select<T>(
         &self,
         rows: impl IntoIterator<Item = T>,
         id: impl Fn(&T) -> I,
@@ -85,14 +85,14 @@ impl<I: Display + PartialEq> Page<I> {
         if let Some(after) = &self.after
             && !rows.any(|row| id(&row) == *after)
         {
-            return Err(self.unknown());
+            return Err(self.unknown_row());
         }
         let rows: Vec<T> = rows.take(self.limit as usize + 1).collect();
-        Ok(self.of_more(rows, id))
+        Ok(self.page(rows, id))
     }
 
-    /// Of its rows, and one more if there are more.
-    pub(crate) fn of_more<T>(&self, mut rows: Vec<T>, id: impl Fn(&T) -> I) -> Paged<T> {
+    /// The page with these rows; one row more than `limit` shows that there is a next page.
+    pub(crate) fn page<T>(&self, mut rows: Vec<T>, id: impl Fn(&T) -> I) -> Paged<T> {
         let has_more = rows.len() > self.limit as usize;
         rows.truncate(self.limit as usize);
         let last = rows.last().filter(|_| has_more);
@@ -100,22 +100,22 @@ impl<I: Display + PartialEq> Page<I> {
         Paged { rows, next }
     }
 
-    /// Of a list that depends on the time: the pages to come are of the same.
-    pub(crate) fn always_of(mut self, name: &str, value: impl Display) -> Self {
+    /// Adds a query parameter to the link of the next page, for a list whose default depends on the time.
+    pub(crate) fn with_parameter(mut self, name: &str, value: impl Display) -> Self {
         self.list.push_str(&format!("{name}={value}&"));
         self
     }
 
-    /// The row that it comes behind is none of the list.
-    pub(crate) fn unknown(&self) -> Problem {
+    /// The problem that `after` is not in the list.
+    pub(crate) fn unknown_row(&self) -> Problem {
         Problem::new(
             ProblemKind::InvalidRequest,
-            "after: there is no such row in the list, or none any more; begin again without it",
+            "after: expected a row of the list, got an unknown or removed one; start again without it",
         )
     }
 }
 
-/// A page, and where the next one is.
+/// A page with the link to the next one.
 #[derive(Debug)]
 pub(crate) struct Paged<T> {
     rows: Vec<T>,
@@ -123,7 +123,7 @@ pub(crate) struct Paged<T> {
 }
 
 impl<T> Paged<T> {
-    /// As it is shown.
+    /// Converts each row.
     pub(crate) fn map<V>(self, view: impl FnMut(T) -> V) -> Paged<V> {
         Paged {
             rows: self.rows.into_iter().map(view).collect(),
@@ -131,8 +131,8 @@ impl<T> Paged<T> {
         }
     }
 
-    /// As they are shown together.
-    pub(crate) async fn seen<V>(
+    /// Converts all rows together.
+    pub(crate) async fn map_all<V>(
         self,
         views: impl AsyncFnOnce(Vec<T>) -> Result<Vec<V>, Problem>,
     ) -> Result<Paged<V>, Problem> {
@@ -145,20 +145,20 @@ impl<T> Paged<T> {
 
 impl<T: Serialize> IntoResponse for Paged<T> {
     fn into_response(self) -> Response {
-        let mut answer = Json(&self.rows).into_response();
-        // What cannot stand in a header came with the request, and did not get here.
+        let mut response = Json(&self.rows).into_response();
+        // The link consists of parts of the request's URI, so it is always valid in a header.
         if let Some(next) = self.next.and_then(|next| HeaderValue::try_from(next).ok()) {
-            answer.headers_mut().insert(header::LINK, next);
+            response.headers_mut().insert(header::LINK, next);
         }
-        answer
+        response
     }
 }
 
-/// What a list's query says beside the page.
+/// The query parameters of a list other than those of the page.
 #[derive(Debug)]
-pub(crate) struct BesidePage<T>(pub(crate) T);
+pub(crate) struct ListQuery<T>(pub(crate) T);
 
-impl<S, T> FromRequestParts<S> for BesidePage<T>
+impl<S, T> FromRequestParts<S> for ListQuery<T>
 where
     S: Sync,
     T: DeserializeOwned,
@@ -168,7 +168,7 @@ where
     async fn from_request_parts(parts: &mut Parts, _: &S) -> Result<Self, Problem> {
         let query = parts.uri.query().unwrap_or_default().split('&');
         let others: Vec<&str> = query
-            .filter(|one| !one.starts_with("limit=") && !one.starts_with("after="))
+            .filter(|param| !param.starts_with("limit=") && !param.starts_with("after="))
             .collect();
         let uri = Uri::try_from(format!("/?{}", others.join("&"))).map_err(Problem::internal)?;
         Query::try_from_uri(&uri)

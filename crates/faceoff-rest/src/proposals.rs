@@ -1,6 +1,6 @@
-//! Trials and re-evaluations: made, looked at, applied or dropped by the organiser, and seen by nobody else.
+//! Trials and proposed re-evaluations: started, applied or dropped by organisers, and visible only to them.
 
-use super::recorded::Recorded;
+use super::stored_dataset::StoredDataset;
 use crate::paging::{Page, PageQuery, Paged};
 use axum::{Json, extract::State, http::StatusCode};
 use faceoff_api::{
@@ -8,7 +8,7 @@ use faceoff_api::{
     views::proposal::{ProposalStateView, ProposalView},
 };
 use faceoff_service::{
-    acts::deciding::checked_reason,
+    services::decisions::checked_reason,
     app::App,
     auth::Organiser,
     extract::{Json as Body, OptionalJson, PathParam},
@@ -16,10 +16,10 @@ use faceoff_service::{
     viewer::Viewer,
     views::proposal,
 };
-use faceoff_store::{EvaluationState, Reevaluation, Settled, StoreError};
+use faceoff_store::{EvaluationState, Reevaluation, ProposalOutcome, StoreError};
 use faceoff_types::{EvaluationId, ProposalId, StageDay, StageId};
 
-/// All trials and proposals, the newest first, without what they play.
+/// Lists all trials and proposals, newest first, without their evaluations.
 #[utoipa::path(
     get, path = "/proposals", tag = "organiser", security(("organiser" = [])),
     params(PageQuery),
@@ -30,13 +30,13 @@ pub(crate) async fn list_proposals(
     page: Page<ProposalId>,
     State(app): State<App>,
 ) -> Result<Paged<ProposalView>, Problem> {
-    let page = page.cut(app.store.proposals().await?, |proposal| proposal.id)?;
-    page.seen(async |proposals| proposal::heads(&app, proposals).await)
+    let page = page.select(app.store.proposals().await?, |proposal| proposal.id)?;
+    page.map_all(async |proposals| proposal::heads(&app, proposals).await)
         .await
 }
 
-/// One, with what it plays; once all of it is played, the board as it is and as it would be, and whose rank or score
-/// would change.
+/// Returns a trial or proposal with its evaluations. Once all have ended, it also contains the board before and after,
+/// and the teams whose rank or score would change.
 #[utoipa::path(
     get, path = "/proposals/{id}", tag = "organiser", security(("organiser" = [])),
     params(("id" = ProposalId, Path)),
@@ -50,15 +50,16 @@ pub(crate) async fn proposal(
     proposal::find(&app, id).await.map(Json)
 }
 
-/// Plays what is active, or one submission, by the stage's rules on episodes that nothing else plays: no turn, no
-/// board, behind everything that counts.
+/// Starts a trial: evaluates all active submissions, or one submission, by the stage's rules on episodes of its own.
+///
+/// It never counts, and its jobs run behind all jobs that count.
 #[utoipa::path(
     post, path = "/stages/{id}/trial", tag = "organiser", security(("organiser" = [])),
     params(("id" = StageId, Path)), request_body = Trial,
     responses(
         (status = 201, body = ProposalView),
         (status = 404),
-        (status = 409, description = "there is nothing valid to play, the stage has closed, or the season is closed"),
+        (status = 409, description = "there is no valid submission, the stage has closed, or the season is closed"),
         (status = 422),
     )
 )]
@@ -74,20 +75,20 @@ pub(crate) async fn start_trial(
         .store
         .propose_trial(organiser.actor(), id, submission, reason, now)
         .await?;
-    tracing::info!(proposal = %trial.id, stage = %id, reason, "a trial was started");
+    tracing::info!(proposal = %trial.id, stage = %id, reason, "trial started");
     let view = proposal::find(&app, trial.id).await?;
     Ok((StatusCode::CREATED, Json(view)))
 }
 
-/// Plays results that count once more, beside them: one evaluation, a whole day, or a day by the stage's newest
-/// rules. Nothing changes before it is applied.
+/// Proposes a re-evaluation: repeats one evaluation, a whole day, or a day by the stage's newest rules. Nothing changes
+/// until it is applied.
 #[utoipa::path(
     post, path = "/stages/{id}/proposals", tag = "organiser", security(("organiser" = [])),
     params(("id" = StageId, Path)), request_body = NewProposal,
     responses(
         (status = 201, body = ProposalView),
         (status = 404),
-        (status = 409, description = "nothing of it counts, its day is under way, there are no other rules, or the season is closed"),
+        (status = 409, description = "no such evaluation counts, the day is not released, there are no newer rules, or the season is closed"),
         (status = 422),
     )
 )]
@@ -98,23 +99,23 @@ pub(crate) async fn propose(
     Body(wanted): Body<NewProposal>,
 ) -> Result<(StatusCode, Json<ProposalView>), Problem> {
     let reason = checked_reason(&wanted.reason)?;
-    let of = |date| StageDay { stage: id, date };
-    let what = match (wanted.evaluation, wanted.day, wanted.new_rules) {
+    let stage_day = |date| StageDay { stage: id, date };
+    let reevaluation = match (wanted.evaluation, wanted.day, wanted.new_rules) {
         (Some(evaluation), None, false) => {
-            if app.store.evaluation(evaluation).await?.of.stage != id {
+            if app.store.evaluation(evaluation).await?.stage_day.stage != id {
                 return Err(Problem::not_found("evaluation in this stage"));
             }
             Reevaluation::Evaluation(evaluation)
         }
-        (None, Some(day), false) => Reevaluation::Day(of(day)),
-        (None, Some(day), true) => Reevaluation::Rules(of(day)),
+        (None, Some(day), false) => Reevaluation::Day(stage_day(day)),
+        (None, Some(day), true) => Reevaluation::Rules(stage_day(day)),
         (Some(_), _, true) => {
             let detail =
-                "other rules are for a whole day: name the “day”, and leave out “evaluation”";
+                "expected “day” with new rules, got “evaluation”; name the “day”, and leave out “evaluation”";
             return Err(Problem::invalid("new_rules", detail));
         }
         _ => {
-            let detail = "expected either “evaluation” or “day”, what is to be played again";
+            let detail = "expected exactly one of “evaluation” and “day”; name what to repeat";
             return Err(Problem::invalid("day", detail));
         }
     };
@@ -122,21 +123,21 @@ pub(crate) async fn propose(
     let now = app.config.clock.now();
     let proposal = app
         .store
-        .propose_reevaluation(organiser.actor(), what, reason, now)
+        .propose_reevaluation(organiser.actor(), reevaluation, reason, now)
         .await?;
-    tracing::info!(proposal = %proposal.id, stage = %id, reason, "a re-evaluation was proposed");
+    tracing::info!(proposal = %proposal.id, stage = %id, reason, "re-evaluation proposed");
     let view = proposal::find(&app, proposal.id).await?;
     Ok((StatusCode::CREATED, Json(view)))
 }
 
-/// Has what a proposal has played count: what it played again is voided, with its reason, unless it is by other rules.
+/// Applies a proposal: its evaluations count. The repeated ones are voided with its reason, unless it uses newer rules.
 #[utoipa::path(
     post, path = "/proposals/{id}/apply", tag = "organiser", security(("organiser" = [])),
     params(("id" = ProposalId, Path)), request_body = Confirmation,
     responses(
         (status = 200, body = ProposalView),
         (status = 404),
-        (status = 409, description = "not confirmed with the date (nothing is done), a trial, not played to its end, settled, the boards are frozen, or what it would replace counts no more"),
+        (status = 409, description = "not confirmed with the date (nothing is done), it is a trial, has unfinished evaluations, or is already applied or dropped; the boards are frozen; or an evaluation that it would replace no longer counts"),
     )
 )]
 pub(crate) async fn apply_proposal(
@@ -150,25 +151,25 @@ pub(crate) async fn apply_proposal(
         (view.day, view.state, &view.outcome)
     {
         let ranks = outcome.changes.iter().filter(|change| {
-            change.old.map(|standing| standing.rank) != change.new.map(|standing| standing.rank)
+            change.old.map(|old| old.rank) != change.new.map(|new| new.rank)
         });
-        let what = format!(
-            "{} evaluations of {day} would count from now on in the place of those that they play again, {} teams would \
-             have another row and {} another rank, and everybody would read {:?}",
+        let effect = format!(
+            "{} evaluations of {day} would replace those that they repeat; {} teams would have another row and {} another \
+             rank; the reason {:?} would be public",
             view.evaluations.len(),
             outcome.changes.len(),
             ranks.count(),
             view.reason
         );
-        Problem::check_confirmed(confirm.as_deref(), &day.to_string(), &what)?;
+        Problem::check_confirmed(confirm.as_deref(), &day.to_string(), &effect)?;
     }
     let now = app.config.clock.now();
     app.store.apply_proposal(organiser.actor(), id, now).await?;
-    tracing::info!(proposal = %id, "a proposal was applied");
+    tracing::info!(proposal = %id, "proposal applied");
     proposal::find(&app, id).await.map(Json)
 }
 
-/// Has what a trial or a proposal has played never count; what is under way of it is stopped.
+/// Drops a trial or proposal: it never counts. Its unfinished evaluations are cancelled, and its datasets removed.
 #[utoipa::path(
     post, path = "/proposals/{id}/drop", tag = "organiser", security(("organiser" = [])),
     params(("id" = ProposalId, Path)),
@@ -176,7 +177,7 @@ pub(crate) async fn apply_proposal(
     responses(
         (status = 200, body = ProposalView),
         (status = 404),
-        (status = 409, description = "not confirmed with the stage's name (nothing is done), or it is settled"),
+        (status = 409, description = "not confirmed with the stage's name (nothing is done), or it is already applied or dropped"),
     )
 )]
 pub(crate) async fn drop_proposal(
@@ -187,20 +188,20 @@ pub(crate) async fn drop_proposal(
 ) -> Result<Json<ProposalView>, Problem> {
     let view = proposal::find(&app, id).await?;
     if view.settled_at.is_none() {
-        let what = format!(
-            "{} evaluations would never count, what is under way of them be stopped, and their datasets be removed",
+        let effect = format!(
+            "{} evaluations would never count; unfinished ones would be cancelled, and their datasets removed",
             view.evaluations.len()
         );
-        Problem::check_confirmed(confirm.as_deref(), view.stage_name.as_str(), &what)?;
+        Problem::check_confirmed(confirm.as_deref(), view.stage_name.as_str(), &effect)?;
     }
     let now = app.config.clock.now();
     app.store.drop_proposal(organiser.actor(), id, now).await?;
-    tracing::info!(proposal = %id, "a proposal was dropped");
+    tracing::info!(proposal = %id, "proposal dropped");
     proposal::find(&app, id).await.map(Json)
 }
 
-/// The dataset of what a trial or a proposal has played, that is not applied. `None` of what it is not, and for
-/// everybody but organisers.
+/// The dataset of an evaluation of a trial or a proposal that is not applied. `None` for other evaluations, and unless
+/// the viewer is an organiser.
 ///
 /// # Errors
 /// `Gone` once it is dropped; `Conflict` if it has no dataset.
@@ -208,24 +209,24 @@ pub(super) async fn dataset(
     viewer: Viewer,
     app: &App,
     id: EvaluationId,
-) -> Result<Option<Recorded>, Problem> {
+) -> Result<Option<StoredDataset>, Problem> {
     if viewer != Viewer::Organiser {
         return Ok(None);
     }
-    let (proposal, draft) = match app.store.draft(id).await {
+    let (proposal, draft) = match app.store.proposed_evaluation(id).await {
         Ok(found) => found,
         Err(StoreError::NotFound(_)) => return Ok(None),
         Err(error) => return Err(error.into()),
     };
-    match proposal.settled {
-        // It is an evaluation like others.
-        Some(Settled::Applied(_)) => return Ok(None),
-        Some(Settled::Dropped(at)) => {
+    match proposal.outcome {
+        // It is an ordinary evaluation now.
+        Some(ProposalOutcome::Applied(_)) => return Ok(None),
+        Some(ProposalOutcome::Dropped(at)) => {
             return Err(Problem::new(
                 ProblemKind::Gone,
                 format!(
-                    "the proposal {} was dropped at {at}, and its datasets with it; GET /api/v1/proposals/{} still tells \
-                     what came of it",
+                    "the proposal {} was dropped at {at}, and its datasets removed; GET /api/v1/proposals/{} still returns its \
+                     results",
                     proposal.id, proposal.id
                 ),
             ));
@@ -245,7 +246,7 @@ pub(super) async fn dataset(
                     stage.day(proposal.created_at).date
                 }
             };
-            return Ok(Some(Recorded {
+            return Ok(Some(StoredDataset {
                 team: draft.team,
                 day,
                 dataset,
@@ -253,15 +254,15 @@ pub(super) async fn dataset(
             }));
         }
         EvaluationState::Queued | EvaluationState::Running { .. } | EvaluationState::Finalising => {
-            "is not finished; follow it there until its state is “finished”"
+            "has not finished; poll it there until its state is “finished”"
         }
         EvaluationState::AgentFailed { .. } => {
-            "has no dataset, since the agent failed too often; its faults are there"
+            "has no dataset, because the agent had too many faults, which are listed there"
         }
         EvaluationState::PlatformFailed { .. }
         | EvaluationState::NotPlayed { .. }
         | EvaluationState::Cancelled { .. } => {
-            "has no dataset, since it was not played to its end; the reason is there"
+            "has no dataset, because it did not finish; the reason is given there"
         }
     };
     Err(Problem::new(

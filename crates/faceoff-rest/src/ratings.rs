@@ -1,18 +1,18 @@
-//! What games say of submissions beside the standings, and of each two teams.
+//! Ratings and head-to-head records of a tournament.
 
 use axum::{Json, extract::State};
 use faceoff_scoring::tournament::{HeadToHead, rating::Ratings};
 use faceoff_service::{app::App, extract::PathParam, problem::Problem, views::ratings};
 use faceoff_types::TournamentId;
 
-/// Bradley–Terry ratings of the submissions that played, from results and from goals, with intervals. They stand beside
-/// the standings and never in their place.
+/// Returns Bradley–Terry ratings of the submissions that played, from results and from goals, with confidence
+/// intervals. For information only: they do not affect the standings.
 #[utoipa::path(
     get, path = "/tournaments/{id}/ratings", tag = "public", params(("id" = TournamentId, Path)),
     responses(
         (status = 200, body = Ratings),
         (status = 404),
-        (status = 409, description = "games connect more submissions than are rated together"),
+        (status = 409, description = "the games connect more submissions than the rating supports"),
     )
 )]
 pub(crate) async fn ratings(
@@ -23,7 +23,7 @@ pub(crate) async fn ratings(
     Ok(Json((*rated).clone()))
 }
 
-/// The record of each two teams that met.
+/// Returns the head-to-head record of each pair of teams that met.
 #[utoipa::path(
     get, path = "/tournaments/{id}/head-to-head", tag = "public", params(("id" = TournamentId, Path)),
     responses((status = 200, body = Vec<HeadToHead>), (status = 404))

@@ -1,13 +1,13 @@
-//! Teams that want to take part.
+//! Registrations of teams.
 
 use crate::paging::{Page, PageQuery, Paged};
 use axum::{Json, extract::State, http::StatusCode};
 use faceoff_api::{
-    requests::{Reason, Register},
+    requests::{Reason, RegistrationRequest},
     views::invitation::{NewRegistrationView, RegistrationView},
 };
 use faceoff_service::{
-    acts::registering,
+    services::registrations,
     app::App,
     auth::Organiser,
     extract::{Json as Body, PathParam},
@@ -16,24 +16,24 @@ use faceoff_service::{
 };
 use faceoff_types::RegistrationId;
 
-/// Registers a team, if the season takes registrations: it waits for the organisers.
+/// Registers a team, if the season accepts registrations. The organisers approve or refuse it.
 #[utoipa::path(
-    post, path = "/registrations", tag = "public", request_body = Register,
+    post, path = "/registrations", tag = "public", request_body = RegistrationRequest,
     responses(
         (status = 201, body = NewRegistrationView),
-        (status = 409, description = "registration is closed, too many wait, the name is taken, or the terms are not accepted"),
+        (status = 409, description = "registration is closed, too many registrations are pending, the name is taken, or the terms are not accepted"),
         (status = 422),
     )
 )]
 pub(crate) async fn register(
     State(app): State<App>,
-    Body(body): Body<Register>,
+    Body(body): Body<RegistrationRequest>,
 ) -> Result<(StatusCode, Json<NewRegistrationView>), Problem> {
-    let view = registering::registered(&app, body).await?;
+    let view = registrations::register(&app, body).await?;
     Ok((StatusCode::CREATED, Json(view)))
 }
 
-/// All registrations, the newest first.
+/// Lists all registrations, newest first.
 #[utoipa::path(
     get, path = "/registrations", tag = "organiser", security(("organiser" = [])),
     params(PageQuery),
@@ -45,18 +45,19 @@ pub(crate) async fn list_registrations(
     State(app): State<App>,
 ) -> Result<Paged<RegistrationView>, Problem> {
     let registrations = app.store.registrations().await?;
-    let page = page.cut(registrations, |registration| registration.id)?;
+    let page = page.select(registrations, |registration| registration.id)?;
     Ok(page.map(invitation::registration))
 }
 
-/// Lets a registered team take part: the link of its registration is its first member's for seven days from now on.
+/// Approves a registration and creates the team. The registration's link lets the first member join, for seven days
+/// from now.
 #[utoipa::path(
     post, path = "/registrations/{id}/approve", tag = "organiser", security(("organiser" = [])),
     params(("id" = RegistrationId, Path)),
     responses(
         (status = 200, body = RegistrationView),
         (status = 404),
-        (status = 409, description = "it was decided about, or the name is taken meanwhile"),
+        (status = 409, description = "it was already approved or refused, or the name has been taken meanwhile"),
     )
 )]
 pub(crate) async fn approve_registration(
@@ -64,7 +65,7 @@ pub(crate) async fn approve_registration(
     State(app): State<App>,
     PathParam(id): PathParam<RegistrationId>,
 ) -> Result<Json<RegistrationView>, Problem> {
-    let approved = registering::approve_registration(&app, organiser.actor(), id);
+    let approved = registrations::approve_registration(&app, organiser.actor(), id);
     approved.await.map(Json)
 }
 
@@ -74,7 +75,7 @@ pub(crate) async fn approve_registration(
     params(("id" = RegistrationId, Path)), request_body = Reason,
     responses(
         (status = 200, body = RegistrationView),
-        (status = 404), (status = 409, description = "it was decided about"), (status = 422),
+        (status = 404), (status = 409, description = "it was already approved or refused"), (status = 422),
     )
 )]
 pub(crate) async fn refuse_registration(
@@ -83,6 +84,6 @@ pub(crate) async fn refuse_registration(
     PathParam(id): PathParam<RegistrationId>,
     Body(Reason { reason }): Body<Reason>,
 ) -> Result<Json<RegistrationView>, Problem> {
-    let refused = registering::refuse_registration(&app, organiser.actor(), id, &reason);
+    let refused = registrations::refuse_registration(&app, organiser.actor(), id, &reason);
     refused.await.map(Json)
 }

@@ -1,7 +1,7 @@
-//! How sure a champion is: the schedule played again, on demand.
+//! Replays of a tournament's schedule, to estimate how certain its champion is.
 
 use axum::{Json, extract::State, http::StatusCode};
-use faceoff_api::{requests::NewReplays, views::certainty::CertaintyView};
+use faceoff_api::{requests::NewReplays, views::champion_shares::ChampionSharesView};
 use faceoff_service::{
     app::App,
     auth::Organiser,
@@ -12,15 +12,16 @@ use faceoff_service::{
 use faceoff_store::MAX_REPLAYS;
 use faceoff_types::TournamentId;
 
-/// Has the whole schedule played again, so many times more, with the same submissions and fresh seeds, behind all that
-/// counts. None of it counts, and no recording is kept.
+/// Replays the whole schedule several times with the same submissions and other seeds.
+///
+/// Replays never count, are not recorded, and run behind all games that count.
 #[utoipa::path(
     post, path = "/tournaments/{id}/replays", tag = "organiser", security(("organiser" = [])),
     params(("id" = TournamentId, Path)), request_body = NewReplays,
     responses(
-        (status = 201, body = CertaintyView),
+        (status = 201, body = ChampionSharesView),
         (status = 404),
-        (status = 409, description = "a round is to come or under way, there would be more than 1000 replays or 10,000 games, or tournament or season is closed"),
+        (status = 409, description = "not all rounds are over, there would be more than 1000 replays or 10,000 games, or the tournament or the season is closed"),
         (status = 422),
     )
 )]
@@ -29,7 +30,7 @@ pub(crate) async fn order_replays(
     State(app): State<App>,
     PathParam(id): PathParam<TournamentId>,
     Body(NewReplays { times }): Body<NewReplays>,
-) -> Result<(StatusCode, Json<CertaintyView>), Problem> {
+) -> Result<(StatusCode, Json<ChampionSharesView>), Problem> {
     if !(1..=MAX_REPLAYS).contains(&times) {
         let detail = format!("expected 1 to {MAX_REPLAYS}, got {times}");
         return Err(Problem::invalid("times", detail));
@@ -37,41 +38,40 @@ pub(crate) async fn order_replays(
     let now = app.config.clock.now();
     let games = app
         .store
-        .order_replays(organiser.actor(), id, times, now)
+        .request_replays(organiser.actor(), id, times, now)
         .await?;
-    tracing::info!(tournament = %id, times, games, "replays ordered");
-    let view = replays::certainty(&app, id).await?;
+    tracing::info!(tournament = %id, times, games, "replays queued");
+    let view = replays::champion_shares(&app, id).await?;
     Ok((StatusCode::CREATED, Json((*view).clone())))
 }
 
-/// Calls off the replays that are not over.
+/// Cancels all unfinished replays.
 #[utoipa::path(
     delete, path = "/tournaments/{id}/replays", tag = "organiser", security(("organiser" = [])),
     params(("id" = TournamentId, Path)),
-    responses((status = 200, body = CertaintyView), (status = 404))
+    responses((status = 200, body = ChampionSharesView), (status = 404))
 )]
 pub(crate) async fn cancel_replays(
     organiser: Organiser,
     State(app): State<App>,
     PathParam(id): PathParam<TournamentId>,
-) -> Result<Json<CertaintyView>, Problem> {
+) -> Result<Json<ChampionSharesView>, Problem> {
     let now = app.config.clock.now();
     let games = app.store.cancel_replays(organiser.actor(), id, now).await?;
-    tracing::info!(tournament = %id, games, "replays called off");
-    let view = replays::certainty(&app, id).await?;
+    tracing::info!(tournament = %id, games, "replays cancelled");
+    let view = replays::champion_shares(&app, id).await?;
     Ok(Json((*view).clone()))
 }
 
-/// How often each team would have been champion, had the schedule been played with other seeds, with 95 % Wilson
-/// intervals.
+/// Returns how often each team becomes champion in the replays, with 95 % Wilson intervals.
 #[utoipa::path(
     get, path = "/tournaments/{id}/certainty", tag = "public", params(("id" = TournamentId, Path)),
-    responses((status = 200, body = CertaintyView), (status = 404))
+    responses((status = 200, body = ChampionSharesView), (status = 404))
 )]
 pub(crate) async fn certainty(
     State(app): State<App>,
     PathParam(id): PathParam<TournamentId>,
-) -> Result<Json<CertaintyView>, Problem> {
-    let view = replays::certainty(&app, id).await?;
+) -> Result<Json<ChampionSharesView>, Problem> {
+    let view = replays::champion_shares(&app, id).await?;
     Ok(Json((*view).clone()))
 }

@@ -1,6 +1,5 @@
-//! Decisions of the organiser's against results and teams, and over the queue. Each takes effect at once, has a reason that everybody may
-//! read, and is done only when its request names what it is about, if
-//! it cannot be undone.
+//! Organisers' decisions about results, teams and the queue. Each takes effect at once and has a public reason. One that
+//! cannot be undone needs a confirmation with the name of the affected resource.
 
 use axum::{Json, extract::State, http::StatusCode};
 use faceoff_api::{
@@ -8,7 +7,7 @@ use faceoff_api::{
     views::{day::DayView, evaluation::EvaluationView, team::TeamView},
 };
 use faceoff_service::{
-    acts::rulings,
+    services::rulings,
     app::App,
     auth::Organiser,
     extract::{Json as Body, PathParam, PathParams},
@@ -16,15 +15,15 @@ use faceoff_service::{
 };
 use faceoff_types::{EvaluationId, StageDay, StageId, TeamId};
 
-/// Takes a finished evaluation off the boards, or a failure of the agent off its team's day: it can be read on, counts
-/// no more, and may be played again (`rerun`).
+/// Voids a finished evaluation or an agent failure: it disappears from the boards and does not count. It stays readable
+/// and can be rerun.
 #[utoipa::path(
     post, path = "/evaluations/{id}/void", tag = "organiser", security(("organiser" = [])),
     params(("id" = EvaluationId, Path)), request_body = Decision,
     responses(
         (status = 200, body = EvaluationView),
         (status = 404),
-        (status = 409, description = "not confirmed with the team's name (nothing is done), under way, it does not count, or its stage is signed off"),
+        (status = 409, description = "not confirmed with the team's name (nothing is done), it has not ended or does not count, or its stage is signed off"),
         (status = 422),
     )
 )]
@@ -38,14 +37,15 @@ pub(crate) async fn void_evaluation(
     voided.await.map(Json)
 }
 
-/// Voids a whole day: what has ended leaves the boards, what is under way is cancelled, and the day is released.
+/// Voids a whole day: its evaluations disappear from the boards, unfinished ones are cancelled, and the day is
+/// released.
 #[utoipa::path(
     post, path = "/stages/{id}/days/{day}/void", tag = "organiser", security(("organiser" = [])),
     params(("id" = StageId, Path), ("day" = Date, Path, example = "2026-03-01")), request_body = Decision,
     responses(
         (status = 200, body = DayView),
         (status = 404),
-        (status = 409, description = "not confirmed with the date (nothing is done), nothing of the day counts, or its stage is signed off"),
+        (status = 409, description = "not confirmed with the date (nothing is done), no evaluation of the day counts, or its stage is signed off"),
         (status = 422),
     )
 )]
@@ -56,18 +56,18 @@ pub(crate) async fn void_day(
     Body(decision): Body<Decision>,
 ) -> Result<Json<DayView>, Problem> {
     let PathParams([stage, day]) = day;
-    let of: StageDay = format!("{stage}/{day}")
+    let stage_day: StageDay = format!("{stage}/{day}")
         .parse()
         .map_err(|_| Problem::not_found("day"))?;
-    let voided = rulings::void_day(&app, organiser.actor(), of, &decision);
+    let voided = rulings::void_day(&app, organiser.actor(), stage_day, &decision);
     voided.await.map(Json)
 }
 
-/// Holds the queue: nothing is begun, what is begun is played to its end, days start and wait. `GET /season` tells
-/// everybody.
+/// Pauses the queue: no job starts, running ones continue. Evaluation days still start, and wait. `GET /season` shows
+/// the pause.
 #[utoipa::path(
     post, path = "/queue/pause", tag = "organiser", security(("organiser" = [])), request_body = Reason,
-    responses((status = 204), (status = 409, description = "it is paused"), (status = 422))
+            responses((status = 204), (status = 409, description = "the queue is already paused"), (status = 422))
 )]
 pub(crate) async fn pause_queue(
     organiser: Organiser,
@@ -78,10 +78,10 @@ pub(crate) async fn pause_queue(
     Ok(StatusCode::NO_CONTENT)
 }
 
-/// Lets a paused queue go on.
+/// Resumes a paused queue.
 #[utoipa::path(
     post, path = "/queue/resume", tag = "organiser", security(("organiser" = [])),
-    responses((status = 204), (status = 409, description = "it is not paused"))
+    responses((status = 204),         (status = 409, description = "the queue is not paused"))
 )]
 pub(crate) async fn resume_queue(
     organiser: Organiser,
@@ -91,14 +91,15 @@ pub(crate) async fn resume_queue(
     Ok(StatusCode::NO_CONTENT)
 }
 
-/// Disqualifies a team at once: what it plays is cancelled, it leaves all boards, and neither uploads nor plays.
+/// Disqualifies a team at once: its unfinished evaluations are cancelled, it disappears from all boards, and it can
+/// neither upload nor be evaluated.
 #[utoipa::path(
     post, path = "/teams/{id}/disqualify", tag = "organiser", security(("organiser" = [])),
     params(("id" = TeamId, Path)), request_body = Decision,
     responses(
         (status = 200, body = TeamView),
         (status = 404),
-        (status = 409, description = "not confirmed with the team's name (nothing is done), or it is disqualified"),
+        (status = 409, description = "not confirmed with the team's name (nothing is done), or the team is already disqualified"),
         (status = 422),
     )
 )]
@@ -112,14 +113,14 @@ pub(crate) async fn disqualify_team(
     team.await.map(Json)
 }
 
-/// Lets a disqualified team play and be ranked again. What was cancelled can be played again (`rerun`).
+/// Lifts a team's disqualification. Its cancelled evaluations can be rerun.
 #[utoipa::path(
     post, path = "/teams/{id}/reinstate", tag = "organiser", security(("organiser" = [])),
     params(("id" = TeamId, Path)), request_body = Reason,
     responses(
         (status = 200, body = TeamView),
         (status = 404),
-        (status = 409, description = "it is not disqualified"),
+        (status = 409, description = "the team is not disqualified"),
         (status = 422),
     )
 )]

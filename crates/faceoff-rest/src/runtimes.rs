@@ -1,12 +1,12 @@
-//! What agents find on this server.
+//! Runtimes and resource limits of agents.
 
 use axum::{Json, extract::State};
 use faceoff_api::views::runtimes::RuntimesView;
 use faceoff_service::{app::App, problem::Problem, views::runtimes};
 
-/// What agents find here: each runtime with its interpreter and packages, as found inside the sandbox when the server
-/// started; the machine; and the limits, the server's and those of each stage and tournament that is not over.
+/// Returns the runtimes with their interpreters and packages, as found inside the sandbox at the server's start; the
+/// machine; and the resource limits of the server and of each stage and tournament that has not ended.
 #[utoipa::path(get, path = "/runtimes", tag = "public", responses((status = 200, body = RuntimesView)))]
 pub(crate) async fn runtimes(State(app): State<App>) -> Result<Json<RuntimesView>, Problem> {
-    runtimes::now(&app).await.map(Json)
+    runtimes::build(&app).await.map(Json)
 }

@@ -1,4 +1,4 @@
-//! The season: its name, rules, the commitment to its secret, and its end.
+//! The season.
 
 use axum::{Json, extract::State};
 use faceoff_api::{
@@ -6,7 +6,7 @@ use faceoff_api::{
     views::season::SeasonView,
 };
 use faceoff_service::{
-    acts::teams,
+    services::teams,
     app::App,
     auth::Organiser,
     extract::Json as Body,
@@ -15,7 +15,7 @@ use faceoff_service::{
     views::season::{self, SeasonHead},
 };
 
-/// The season.
+/// Returns the season: name, commitment, stages, days, and the seeds that are revealed.
 #[utoipa::path(
     get, path = "/season", tag = "public", security((), ("team" = []), ("organiser" = [])),
     responses((status = 200, body = SeasonView))
@@ -24,15 +24,15 @@ pub(crate) async fn season(
     viewer: Viewer,
     State(app): State<App>,
 ) -> Result<Json<SeasonView>, Problem> {
-    season::now(&app, viewer).await.map(Json)
+    season::build(&app, viewer).await.map(Json)
 }
 
-/// Lets anybody register a team, or nobody; sets the divisions.
+/// Changes whether teams can register, and the divisions.
 #[utoipa::path(
     patch, path = "/season", tag = "organiser", security(("organiser" = [])), request_body = SeasonChange,
     responses(
         (status = 200, body = SeasonView),
-        (status = 409, description = "a team is in a division that is left out, one is there twice, or the season is closed"),
+        (status = 409, description = "a removed division has teams, a division is listed twice, or the season is closed"),
         (status = 422),
     )
 )]
@@ -42,16 +42,16 @@ pub(crate) async fn change_season(
     Body(change): Body<SeasonChange>,
 ) -> Result<Json<SeasonView>, Problem> {
     teams::change_season(&app, organiser.actor(), &change).await?;
-    season::now(&app, Viewer::Organiser).await.map(Json)
+    season::build(&app, Viewer::Organiser).await.map(Json)
 }
 
-/// Closes the season for good: its secret becomes public, and nothing more is uploaded or evaluated.
+/// Closes the season for good: its secret becomes public, and nothing can be uploaded or evaluated any more.
 #[utoipa::path(
     post, path = "/season/close", tag = "organiser", security(("organiser" = [])),
     request_body = CloseSeason,
     responses(
         (status = 200, body = SeasonView),
-        (status = 409, description = "evaluations are queued or running, a stage is blind or waits for its final day, or it is closed already"),
+        (status = 409, description = "evaluations are queued or running, a stage is blind or waits for its final day, or the season is already closed"),
         (status = 422, description = "not the season's name"),
     )
 )]
@@ -60,7 +60,7 @@ pub(crate) async fn close_season(
     State(app): State<App>,
     Body(CloseSeason { confirm }): Body<CloseSeason>,
 ) -> Result<Json<SeasonView>, Problem> {
-    let name = SeasonHead::now(&app).await?.name;
+    let name = SeasonHead::load(&app).await?.name;
     if confirm != name {
         let detail = format!(
             "expected the season's name {name:?}, got {confirm:?}; closing cannot be undone"
@@ -70,5 +70,5 @@ pub(crate) async fn close_season(
     let now = app.config.clock.now();
     app.store.close_season(organiser.actor(), now).await?;
     tracing::info!(season = name, "season closed; its secret is public");
-    season::now(&app, Viewer::Organiser).await.map(Json)
+    season::build(&app, Viewer::Organiser).await.map(Json)
 }

@@ -1,7 +1,7 @@
-//! The season as one file, to take along.
+//! Download of the season archive.
 
 use super::document::Binary;
-use crate::archive::{self, one_at_a_time};
+use crate::archive::{self, archive_busy};
 use axum::{
     body::Body,
     extract::State,
@@ -13,18 +13,19 @@ use faceoff_archive::Edition;
 use faceoff_service::{app::App, auth::Organiser, extract::QueryParams, problem::Problem};
 use std::sync::Arc;
 
-/// The season as it is now: a `.tar.zst` with results, events, datasets and a database that `faceoff import` shows on
-/// another server. For everybody (`edition=public`) it holds what a visitor gets; for the organiser also submissions, all
-/// datasets and the whole log.
+/// Downloads the season as a `.tar.zst` file: results, events, datasets, and a database that `faceoff import` shows on
+/// another server.
 ///
-/// One is made at a time. What is under way is not in it.
+/// The public edition (`edition=public`) contains what visitors can see. The organiser's edition also contains
+/// submissions, all datasets and the complete event log. Unfinished evaluations are not included. Only one archive is
+/// made at a time.
 #[utoipa::path(
     get, path = "/season/archive", tag = "organiser", security(("organiser" = [])), params(ArchiveQuery),
     responses(
         (status = 200, body = inline(Binary), content_type = "application/zstd"),
-        (status = 409, description = "this server shows a public archive, and the organiser's was asked for"),
-        (status = 503, description = "another one is being made"),
-        (status = 507, description = "the server's disk has too little room"),
+        (status = 409, description = "this server shows a public archive, which has no organiser's edition"),
+        (status = 503, description = "another archive is being made"),
+        (status = 507, description = "the server's disk has too little free space"),
     )
 )]
 pub(crate) async fn season_archive(
@@ -33,8 +34,8 @@ pub(crate) async fn season_archive(
     QueryParams(query): QueryParams<ArchiveQuery>,
 ) -> Result<Response, Problem> {
     let edition = query.edition.unwrap_or(Edition::Organiser);
-    let Ok(permit) = Arc::clone(&app.archiving).try_acquire_owned() else {
-        return Err(one_at_a_time());
+    let Ok(permit) = Arc::clone(&app.archive_permit).try_acquire_owned() else {
+        return Err(archive_busy());
     };
     let prepared = archive::prepare(&app, edition).await?;
     tracing::info!(
@@ -42,7 +43,7 @@ pub(crate) async fn season_archive(
         %edition,
         files = prepared.manifest.files.len(),
         bytes = prepared.manifest.total_bytes(),
-        "an archive of the season is sent"
+        "sending a season archive"
     );
     let disposition = format!("attachment; filename=\"{}\"", prepared.file_name());
     let headers = [

@@ -1,4 +1,4 @@
-//! Signing in and out, for browsers.
+//! Sessions of browsers: signing in and out.
 
 use axum::{
     Json,
@@ -6,39 +6,39 @@ use axum::{
     http::{HeaderMap, StatusCode, header},
     response::{AppendHeaders, IntoResponse},
 };
-use faceoff_api::{requests::SignIn, views::person::PersonView};
+use faceoff_api::{requests::SignInRequest, views::user::UserView};
 use faceoff_service::{
-    acts::signing_in::sign_in, app::App, auth::Caller, extract::Json as Body, problem::Problem,
-    session, views::person,
+    services::sessions::sign_in, app::App, auth::Caller, extract::Json as Body, problem::Problem,
+    session, views::user,
 };
 
-/// Signs in by name and password: the answer sets the cookie of a session, for pages of this server.
+/// Signs in with name and password. The response sets the session cookie for pages of this server.
 #[utoipa::path(
-    post, path = "/sessions", tag = "people", request_body = SignIn,
+    post, path = "/sessions", tag = "people", request_body = SignInRequest,
     responses(
-        (status = 201, body = PersonView),
-        (status = 401, description = "name and password do not belong together"),
-        (status = 403, description = "it comes from a foreign page"),
+        (status = 201, body = UserView),
+        (status = 401, description = "wrong name or password"),
+        (status = 403, description = "the request comes from a page of another site"),
         (status = 429, description = "too many wrong passwords"),
     )
 )]
 pub(crate) async fn create_session(
     State(app): State<App>,
     headers: HeaderMap,
-    Body(SignIn { name, password }): Body<SignIn>,
+    Body(SignInRequest { name, password }): Body<SignInRequest>,
 ) -> Result<impl IntoResponse, Problem> {
-    // A foreign page must not sign its visitors in as somebody else.
+    // A page of another site must not sign its visitors in under another account.
     if headers.contains_key(header::ORIGIN) || headers.contains_key("sec-fetch-site") {
-        session::check_own_page(&headers)?;
+        session::check_same_origin(&headers)?;
     }
     let (id, secret) = sign_in(&app, &name, password).await?;
-    let person = app.store.person(id).await?;
+    let user = app.store.user(id).await?;
     let cookie = session::set_cookie(&app.config, Some(secret.as_str()))?;
     let cookie = AppendHeaders([(header::SET_COOKIE, cookie)]);
-    Ok((StatusCode::CREATED, cookie, Json(person::of(person))))
+    Ok((StatusCode::CREATED, cookie, Json(user::view(user))))
 }
 
-/// Ends the session whose cookie came, or revokes the token that did.
+/// Ends the session, or revokes the token, of this request.
 #[utoipa::path(
     delete, path = "/sessions/current", tag = "people", security(("team" = []), ("organiser" = [])),
     responses((status = 204))

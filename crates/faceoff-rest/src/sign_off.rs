@@ -1,4 +1,4 @@
-//! What follows a stage's close: its final day, where it has one, and the signing off of its result.
+//! After a stage has closed: its final day, and the sign-off of its result.
 
 use axum::{Json, extract::State};
 use faceoff_api::{
@@ -6,7 +6,7 @@ use faceoff_api::{
     views::{day::DayView, stage::StageView},
 };
 use faceoff_service::{
-    acts::settling,
+    services::stage_results,
     app::App,
     auth::Organiser,
     extract::{OptionalJson, PathParam},
@@ -14,15 +14,16 @@ use faceoff_service::{
 };
 use faceoff_types::StageId;
 
-/// Starts a stage's final day, once, after its close: what each team has active now plays it, on episodes of its own.
-/// Only of a stage whose standings are `final`.
+/// Starts a stage's final day: each team's active submission is evaluated on episodes of its own.
+///
+/// Possible once, after the stage has closed, and only if its standings are `final`.
 #[utoipa::path(
     post, path = "/stages/{id}/final", tag = "organiser", security(("organiser" = [])),
     params(("id" = StageId, Path)),
     responses(
         (status = 200, body = DayView),
         (status = 404),
-        (status = 409, description = "its standings are others, it has not closed, its final day or another day of this date has had its cut, no team has a valid submission, it is signed off, or the season is closed"),
+        (status = 409, description = "its standings are not `final`, it has not closed, its final day or another day of this date has had its cutoff, no team has a valid submission, it is signed off, or the season is closed"),
     )
 )]
 pub(crate) async fn start_final_day(
@@ -30,11 +31,11 @@ pub(crate) async fn start_final_day(
     State(app): State<App>,
     PathParam(id): PathParam<StageId>,
 ) -> Result<Json<DayView>, Problem> {
-    let started = settling::start_final_day(&app, organiser.actor(), id);
+    let started = stage_results::start_final_day(&app, organiser.actor(), id);
     started.await.map(Json)
 }
 
-/// Signs a closed stage's result off: it was provisional, and nothing of the stage changes any more.
+/// Signs off the result of a closed stage, which was provisional. The stage cannot be changed afterwards.
 #[utoipa::path(
     post, path = "/stages/{id}/finalise", tag = "organiser", security(("organiser" = [])),
     params(("id" = StageId, Path)),
@@ -42,7 +43,7 @@ pub(crate) async fn start_final_day(
     responses(
         (status = 200, body = StageView),
         (status = 404),
-        (status = 409, description = "not confirmed with the stage's name (nothing is done); or it has not closed, evaluations of it are under way, it is blind, its final day is owed, or it is signed off"),
+        (status = 409, description = "not confirmed with the stage's name (nothing is done), it has not closed, has unfinished evaluations, is blind, lacks its final day, or is already signed off"),
         (status = 422),
     )
 )]
@@ -52,6 +53,6 @@ pub(crate) async fn finalise_stage(
     PathParam(id): PathParam<StageId>,
     OptionalJson(Confirmation { confirm }): OptionalJson<Confirmation>,
 ) -> Result<Json<StageView>, Problem> {
-    let signed = settling::finalise_stage(&app, organiser.actor(), id, confirm.as_deref());
+    let signed = stage_results::finalise_stage(&app, organiser.actor(), id, confirm.as_deref());
     signed.await.map(Json)
 }

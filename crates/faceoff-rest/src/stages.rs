@@ -1,4 +1,4 @@
-//! The season's stages: made and changed by the organiser, seen by everybody.
+//! Stages of the season.
 
 use axum::{Json, extract::State, http::StatusCode};
 use faceoff_api::{
@@ -6,7 +6,7 @@ use faceoff_api::{
     views::stage::StageView,
 };
 use faceoff_service::{
-    acts::staging,
+    services::stages,
     app::App,
     auth::Organiser,
     extract::{Json as Body, PathParam},
@@ -16,7 +16,7 @@ use faceoff_service::{
 };
 use faceoff_types::StageId;
 
-/// All stages, the first to open first.
+/// Lists all stages, in order of their opening.
 #[utoipa::path(
     get, path = "/stages", tag = "public", security((), ("team" = []), ("organiser" = [])),
     responses((status = 200, body = Vec<StageView>))
@@ -25,10 +25,10 @@ pub(crate) async fn list_stages(
     viewer: Viewer,
     State(app): State<App>,
 ) -> Result<Json<Vec<StageView>>, Problem> {
-    stage::all_seen_by(&app, viewer).await.map(Json)
+    stage::all_for_viewer(&app, viewer).await.map(Json)
 }
 
-/// One stage.
+/// Returns a stage.
 #[utoipa::path(
     get, path = "/stages/{id}", tag = "public", security((), ("team" = []), ("organiser" = [])),
     params(("id" = StageId, Path)),
@@ -40,15 +40,15 @@ pub(crate) async fn stage(
     PathParam(id): PathParam<StageId>,
 ) -> Result<Json<StageView>, Problem> {
     let view = stage::find(&app, id).await?;
-    stage::seen_by(view, &app, viewer).await.map(Json)
+    stage::for_viewer(view, &app, viewer).await.map(Json)
 }
 
-/// Makes a stage: from its opening on its rules are fixed.
+/// Creates a stage. Its rules are fixed once it opens.
 #[utoipa::path(
     post, path = "/stages", tag = "organiser", security(("organiser" = [])), request_body = NewStage,
     responses(
         (status = 201, body = StageView),
-        (status = 409, description = "the name is taken, the times cannot be, or the season is closed"),
+        (status = 409, description = "the name is taken, the times are impossible, or the season is closed"),
         (status = 422),
     )
 )]
@@ -57,19 +57,21 @@ pub(crate) async fn create_stage(
     State(app): State<App>,
     Body(new): Body<NewStage>,
 ) -> Result<(StatusCode, Json<StageView>), Problem> {
-    let view = staging::create_stage(&app, organiser.actor(), new).await?;
+    let view = stages::create_stage(&app, organiser.actor(), new).await?;
     Ok((StatusCode::CREATED, Json(view)))
 }
 
-/// Changes a stage. Other rules of one that is open are another revision, which begins an empty board. `blind` false opens
-/// a blind stage. Another `retention` is no other rule; what it would remove is to be confirmed.
+/// Changes a stage.
+///
+/// New rules of an open stage begin a new revision with an empty board. `blind: false` reveals a blind stage. Another
+/// `retention` does not begin a revision, but must be confirmed if it removes files.
 #[utoipa::path(
     patch, path = "/stages/{id}", tag = "organiser", security(("organiser" = [])),
     params(("id" = StageId, Path)), request_body = StageChange,
     responses(
         (status = 200, body = StageView),
         (status = 404),
-        (status = 409, description = "what is to be changed has begun or is over, the name is taken, other rules or standings of an open stage, or what another retention would remove, are not confirmed, it is signed off, or the season is closed"),
+        (status = 409, description = "the field can no longer be changed; the name is taken; new rules or standings of an open stage, or a retention that removes files, are not confirmed; the stage is signed off; or the season is closed"),
         (status = 422),
     )
 )]
@@ -79,6 +81,6 @@ pub(crate) async fn change_stage(
     PathParam(id): PathParam<StageId>,
     Body(change): Body<StageChange>,
 ) -> Result<Json<StageView>, Problem> {
-    let changed = staging::change_stage(&app, organiser.actor(), id, change);
+    let changed = stages::change_stage(&app, organiser.actor(), id, change);
     changed.await.map(Json)
 }

@@ -1,4 +1,4 @@
-//! How much room the teams' files take.
+//! Disk usage of teams.
 
 use axum::{Json, extract::State};
 use faceoff_api::views::storage::StorageView;
@@ -9,10 +9,10 @@ use faceoff_service::{
     problem::Problem,
     views::storage,
 };
-use faceoff_store::Counted;
+use faceoff_store::StorageScope;
 use faceoff_types::TeamId;
 
-/// The room that the files of each team take, by name.
+/// Returns the disk usage of all teams, by name.
 #[utoipa::path(
     get, path = "/storage", tag = "organiser", security(("organiser" = [])),
     responses((status = 200, body = Vec<StorageView>))
@@ -24,7 +24,7 @@ pub(crate) async fn storage(
     storage::all(&app).await.map(Json)
 }
 
-/// The room that the files of a team take; for itself and the organiser.
+/// Returns the disk usage of a team. For the team and organisers.
 #[utoipa::path(
     get, path = "/teams/{id}/storage", tag = "team", security(("team" = []), ("organiser" = [])),
     params(("id" = TeamId, Path)),
@@ -38,9 +38,9 @@ pub(crate) async fn team_storage(
     let team = app.store.team(id).await;
     caller.visible("team", team, |team| team.id)?;
     let counted = if caller.is_organiser() {
-        Counted::All
+        StorageScope::All
     } else {
-        Counted::Released
+        StorageScope::Released
     };
     storage::find(&app, id, counted).await.map(Json)
 }

@@ -1,4 +1,4 @@
-//! Teams: invited, described, renamed, retired.
+//! Teams: creating, changing and retiring them.
 
 use crate::paging::{Page, PageQuery, Paged};
 use axum::{Json, extract::State, http::StatusCode};
@@ -8,7 +8,7 @@ use faceoff_api::{
     views::team::{TeamView, TeamWithToken},
 };
 use faceoff_service::{
-    acts::teams,
+    services::teams,
     app::App,
     auth::{Caller, Organiser},
     extract::{Json as Body, PathParam},
@@ -17,13 +17,13 @@ use faceoff_service::{
 };
 use faceoff_types::{TeamId, TeamName};
 
-/// Creates a team and returns its token, once.
+/// Creates a team. Its token is returned only once.
 #[utoipa::path(
     post, path = "/teams", tag = "organiser", security(("organiser" = [])), request_body = NewTeam,
     responses(
         (status = 201, body = TeamWithToken),
         (status = 409, description = "the name is taken"),
-        (status = 422, description = "not a team name"),
+        (status = 422, description = "not a valid team name"),
     )
 )]
 pub(crate) async fn create_team(
@@ -43,13 +43,13 @@ pub(crate) async fn create_team(
         .await?;
     tracing::info!(team = %team.name, id = %team.id, "team created");
     let view = TeamWithToken {
-        team: team::of(team),
+        team: team::view(team),
         token: token.as_str().to_owned(),
     };
     Ok((StatusCode::CREATED, Json(view)))
 }
 
-/// All teams.
+/// Lists all teams.
 #[utoipa::path(
     get, path = "/teams", tag = "organiser", security(("organiser" = [])),
     params(PageQuery),
@@ -60,10 +60,10 @@ pub(crate) async fn list_teams(
     page: Page<TeamId>,
     State(app): State<App>,
 ) -> Result<Paged<TeamView>, Problem> {
-    page.cut(team::all(&app).await?, |team| team.id)
+    page.select(team::all(&app).await?, |team| team.id)
 }
 
-/// Replaces a team's own tokens by a new one; the old ones are worth nothing from now on. Its members' stay.
+/// Replaces all of a team's tokens by a new one; the old ones become invalid. Tokens of its members are not affected.
 #[utoipa::path(
     post, path = "/teams/{id}/token", tag = "organiser", security(("organiser" = [])),
     params(("id" = TeamId, Path)),
@@ -87,14 +87,14 @@ pub(crate) async fn replace_token(
     }))
 }
 
-/// Changes a team's name, or what it tells of itself. By an organiser or a member; the division, and whether it is a baseline, by an organiser alone.
+/// Changes a team's name or profile. For organisers and members; division and baseline for organisers only.
 #[utoipa::path(
     patch, path = "/teams/{id}", tag = "people", security(("team" = []), ("organiser" = [])),
     params(("id" = TeamId, Path)), request_body = requests::TeamChange,
     responses(
         (status = 200, body = TeamView),
         (status = 403), (status = 404),
-        (status = 409, description = "the name is taken, there is no such division, a board that is signed off would have other ranks, or the season is closed"),
+        (status = 409, description = "the name is taken, there is no such division, ranks of a signed-off board would change, or the season is closed"),
         (status = 422),
     )
 )]
@@ -108,14 +108,14 @@ pub(crate) async fn change_team(
     changed.await.map(Json)
 }
 
-/// Takes a team out of all days to come, by its own wish: it neither uploads nor plays; its results stay.
+/// Retires a team on its own wish: it can neither upload nor be evaluated; its results stay.
 #[utoipa::path(
     post, path = "/teams/{id}/retire", tag = "people", security(("team" = []), ("organiser" = [])),
     params(("id" = TeamId, Path)), request_body = Confirmation,
     responses(
         (status = 200, body = TeamView),
         (status = 403), (status = 404),
-        (status = 409, description = "not confirmed with the team's name (nothing is done), or it has retired"),
+        (status = 409, description = "not confirmed with the team's name (nothing is done), or the team has already retired"),
     )
 )]
 pub(crate) async fn retire_team(
@@ -124,26 +124,27 @@ pub(crate) async fn retire_team(
     PathParam(id): PathParam<TeamId>,
     Body(Confirmation { confirm }): Body<Confirmation>,
 ) -> Result<Json<TeamView>, Problem> {
-    let team = teams::own(&app, &caller, id).await?;
-    let what = format!(
-        "{} would neither upload nor enter a day from now on; what had its cut goes on, and its results stay",
+    let team = teams::find_own(&app, &caller, id).await?;
+    let effect = format!(
+        "{} could neither upload nor be evaluated from now on; evaluations whose cutoff has passed would continue, and its \
+         results stay",
         team.name
     );
-    Problem::check_confirmed(confirm.as_deref(), team.name.as_str(), &what)?;
+    Problem::check_confirmed(confirm.as_deref(), team.name.as_str(), &effect)?;
     let now = app.config.clock.now();
     let team = app.store.retire_team(caller.actor(), id, now).await?;
     tracing::info!(team = %team.name, %id, actor = %caller.actor(), "team retired");
-    Ok(Json(team::of(team)))
+    Ok(Json(team::view(team)))
 }
 
-/// Lets a team that has retired play again.
+/// Undoes the retirement of a team.
 #[utoipa::path(
     post, path = "/teams/{id}/return", tag = "people", security(("team" = []), ("organiser" = [])),
     params(("id" = TeamId, Path)),
     responses(
         (status = 200, body = TeamView),
         (status = 403), (status = 404),
-        (status = 409, description = "it has not retired"),
+        (status = 409, description = "the team has not retired"),
     )
 )]
 pub(crate) async fn return_team(
@@ -151,14 +152,14 @@ pub(crate) async fn return_team(
     State(app): State<App>,
     PathParam(id): PathParam<TeamId>,
 ) -> Result<Json<TeamView>, Problem> {
-    teams::own(&app, &caller, id).await?;
+    teams::find_own(&app, &caller, id).await?;
     let now = app.config.clock.now();
     let team = app.store.return_team(caller.actor(), id, now).await?;
     tracing::info!(team = %team.name, %id, actor = %caller.actor(), "team returned");
-    Ok(Json(team::of(team)))
+    Ok(Json(team::view(team)))
 }
 
-/// One team, as everybody may know it.
+/// Returns a team's public profile.
 #[utoipa::path(
     get, path = "/teams/{id}", tag = "public", params(("id" = TeamId, Path)),
     responses((status = 200, body = TeamView), (status = 404))

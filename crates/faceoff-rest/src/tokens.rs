@@ -1,34 +1,34 @@
-//! Keys to the API: named, expiring, rotated and revoked at once.
+//! API tokens.
 
 use crate::paging::{Page, PageQuery, Paged};
 use axum::{Json, extract::State, http::StatusCode};
 use faceoff_api::{
     requests,
     views::{
-        person::WhoView,
+        user::CallerView,
         token::{NewTokenView, TokenView},
     },
 };
 use faceoff_service::{
-    acts::keys,
+    services::tokens,
     app::App,
     auth::Caller,
     extract::{Json as Body, PathParam},
     problem::Problem,
-    views::{person, token},
+    views::{user, token},
 };
 use faceoff_types::TokenId;
 
-/// Who the caller is: their role, their team, and the token with which they call.
+/// Returns the caller: role, team, and the token of this request.
 #[utoipa::path(
     get, path = "/whoami", tag = "people", security(("team" = []), ("organiser" = [])),
-    responses((status = 200, body = WhoView), (status = 401))
+    responses((status = 200, body = CallerView), (status = 401))
 )]
-pub(crate) async fn whoami(caller: Caller) -> Json<WhoView> {
-    Json(person::who(caller.who, token::of(caller.token)))
+pub(crate) async fn whoami(caller: Caller) -> Json<CallerView> {
+    Json(user::caller(caller.principal, token::view(caller.token)))
 }
 
-/// The tokens and sessions that the caller may manage, the newest first: an organiser's are all of them.
+/// Lists the tokens and sessions that the caller may manage, newest first; organisers see all.
 #[utoipa::path(
     get, path = "/tokens", tag = "people", security(("team" = []), ("organiser" = [])),
     params(PageQuery),
@@ -39,19 +39,19 @@ pub(crate) async fn list_tokens(
     page: Page<TokenId>,
     State(app): State<App>,
 ) -> Result<Paged<TokenView>, Problem> {
-    let page = page.cut(keys::tokens(&app, &caller).await?, |token| token.id)?;
-    Ok(page.map(token::of))
+    let page = page.select(tokens::tokens(&app, &caller).await?, |token| token.id)?;
+    Ok(page.map(token::view))
 }
 
-/// Makes a token and returns it, once.
+/// Creates a token. Its secret is returned only once.
 #[utoipa::path(
     post, path = "/tokens", tag = "people", security(("team" = []), ("organiser" = [])),
     request_body = requests::NewToken,
     responses(
         (status = 201, body = NewTokenView),
-        (status = 403, description = "a team's own token makes no others"),
+        (status = 403, description = "a team's token cannot create tokens"),
         (status = 404, description = "no such team"),
-        (status = 409, description = "there are as many as there may be, or it would be worth nothing"),
+        (status = 409, description = "the owner has as many tokens as allowed, or the token would already be expired"),
         (status = 422),
     )
 )]
@@ -60,18 +60,18 @@ pub(crate) async fn create_token(
     State(app): State<App>,
     Body(new): Body<requests::NewToken>,
 ) -> Result<(StatusCode, Json<NewTokenView>), Problem> {
-    let view = keys::create_token(&app, &caller, new).await?;
+    let view = tokens::create_token(&app, &caller, new).await?;
     Ok((StatusCode::CREATED, Json(view)))
 }
 
-/// Gives a token another secret and returns it, once; from then on the old one is worth nothing.
+/// Replaces a token's secret; the new one is returned only once. The old secret becomes invalid.
 #[utoipa::path(
     post, path = "/tokens/{id}/rotate", tag = "people", security(("team" = []), ("organiser" = [])),
     params(("id" = TokenId, Path)),
     responses(
         (status = 200, body = NewTokenView),
         (status = 404),
-        (status = 409, description = "it is a session, revoked, has expired, or is the host's of the data folder"),
+        (status = 409, description = "it is a session, is revoked or expired, or is the host's token in the data folder"),
     )
 )]
 pub(crate) async fn rotate_token(
@@ -79,10 +79,10 @@ pub(crate) async fn rotate_token(
     State(app): State<App>,
     PathParam(id): PathParam<TokenId>,
 ) -> Result<Json<NewTokenView>, Problem> {
-    keys::rotate_token(&app, &caller, id).await.map(Json)
+    tokens::rotate_token(&app, &caller, id).await.map(Json)
 }
 
-/// Revokes a token, or ends a session: from then on it is worth nothing.
+/// Revokes a token, or ends a session.
 #[utoipa::path(
     delete, path = "/tokens/{id}", tag = "people", security(("team" = []), ("organiser" = [])),
     params(("id" = TokenId, Path)),
@@ -93,5 +93,5 @@ pub(crate) async fn revoke_token(
     State(app): State<App>,
     PathParam(id): PathParam<TokenId>,
 ) -> Result<Json<TokenView>, Problem> {
-    keys::revoke_token(&app, &caller, id).await.map(Json)
+    tokens::revoke_token(&app, &caller, id).await.map(Json)
 }

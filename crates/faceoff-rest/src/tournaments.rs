@@ -1,4 +1,4 @@
-//! The season's tournaments: opened, changed, held, closed by the organiser, seen by everybody.
+//! Tournaments: creating, changing, pausing and closing them.
 
 use axum::{
     Json,
@@ -12,10 +12,10 @@ use faceoff_api::{
     views::tournament::{TournamentHead, TournamentView},
 };
 use faceoff_service::{
-    acts::{
-        deciding::checked_reason,
-        entering,
-        staging::{check_offered, check_robot},
+    services::{
+        decisions::checked_reason,
+        entrants,
+        stages::{check_offered, check_robot},
     },
     app::App,
     auth::Organiser,
@@ -28,7 +28,7 @@ use faceoff_types::{Ruleset, StageName, TournamentId, TournamentRules, Tournamen
 use serde::{Serialize, de::DeserializeOwned};
 use serde_json::{Map, Value};
 
-/// All tournaments, the first one first.
+/// Lists all tournaments, in order of creation.
 #[utoipa::path(
     get, path = "/tournaments", tag = "public", responses((status = 200, body = Vec<TournamentHead>))
 )]
@@ -38,7 +38,7 @@ pub(crate) async fn list_tournaments(
     tournament::heads(&app).await.map(Json)
 }
 
-/// One: rules, teams, rounds, tables, and what comes next.
+/// Returns a tournament: rules, entrants, rounds and standings.
 #[utoipa::path(
     get, path = "/tournaments/{id}", tag = "public", params(("id" = TournamentId, Path)),
     responses((status = 200, body = TournamentView), (status = 404))
@@ -50,12 +50,12 @@ pub(crate) async fn tournament(
     tournament::find(&app, id).await.map(Json)
 }
 
-/// Opens a tournament. Until its first round is started, teams and rules may change, and games that do not count be
-/// played.
+/// Creates a tournament. Until its first round starts, entrants and rules may change, and test and friendly games can
+/// be played.
 #[utoipa::path(
     post, path = "/tournaments", tag = "organiser", security(("organiser" = [])), request_body = NewTournament,
     responses(
-        (status = 201, body = TournamentView, headers(("Location" = String, description = "where it is, from the server's root"))),
+        (status = 201, body = TournamentView, headers(("Location" = String, description = "path of the tournament"))),
         (status = 404, description = "no such stage"),
         (status = 409, description = "the name is taken, or the season is closed"),
         (status = 422),
@@ -75,12 +75,12 @@ pub(crate) async fn open_tournament(
         (None, None) => Some(stage::current(&app).await?),
     };
     let entrants = match (&new.teams, &stage) {
-        (Some(teams), _) => entering::named(&app, "teams", teams).await?,
-        (None, Some(stage)) => entering::by_tier(&app, stage).await?,
+        (Some(teams), _) => entrants::find_by_names(&app, "teams", teams).await?,
+        (None, Some(stage)) => entrants::qualified_teams(&app, stage).await?,
         (None, None) => Vec::new(),
     };
-    entering::check_count(entrants.len())?;
-    let wanted = faceoff_store::NewTournament {
+    entrants::check_count(entrants.len())?;
+    let new_tournament = faceoff_store::NewTournament {
         name,
         stage: stage.map(|stage| stage.id),
         rules,
@@ -90,24 +90,24 @@ pub(crate) async fn open_tournament(
     let now = app.config.clock.now();
     let opened = app
         .store
-        .open_tournament(organiser.actor(), &wanted, now)
+        .open_tournament(organiser.actor(), &new_tournament, now)
         .await?;
     tracing::info!(
-        tournament = %opened.name, id = %opened.id, teams = wanted.entrants.len(), "tournament opened"
+        tournament = %opened.name, id = %opened.id, teams = new_tournament.entrants.len(), "tournament opened"
     );
     let location = [(header::LOCATION, paths::tournament(opened.id))];
     let view = tournament::find(&app, opened.id).await?;
     Ok((StatusCode::CREATED, AppendHeaders(location), Json(view)))
 }
 
-/// Changes a tournament: its rules until the first round is started, the rest until it is closed.
+/// Changes a tournament: its rules until the first round starts, everything else until it is closed.
 #[utoipa::path(
     patch, path = "/tournaments/{id}", tag = "organiser", security(("organiser" = [])),
     params(("id" = TournamentId, Path)), request_body = TournamentChange,
     responses(
         (status = 200, body = TournamentView),
         (status = 404),
-        (status = 409, description = "rules once a round was started, anything once it is closed, or the name is taken"),
+        (status = 409, description = "rules after the first round has started, any change after the tournament is closed, or the name is taken"),
         (status = 422),
     )
 )]
@@ -117,16 +117,16 @@ pub(crate) async fn change_tournament(
     PathParam(id): PathParam<TournamentId>,
     Body(change): Body<TournamentChange>,
 ) -> Result<Json<TournamentView>, Problem> {
-    let is = app.store.tournament(id).await?;
+    let current = app.store.tournament(id).await?;
     let rules = match change.rules {
-        Some(fields) => Some(changed_rules(&app, &is.rules, Some(fields)).await?),
+        Some(fields) => Some(changed_rules(&app, &current.rules, Some(fields)).await?),
         None => None,
     };
     let settings = match change.settings {
-        Some(fields) => Some(changed_settings(&is.settings, Some(fields))?),
+        Some(fields) => Some(changed_settings(&current.settings, Some(fields))?),
         None => None,
     };
-    let wanted = faceoff_store::TournamentChange {
+    let tournament_change = faceoff_store::TournamentChange {
         name: change.name.as_deref().map(name).transpose()?,
         rules,
         settings,
@@ -135,20 +135,20 @@ pub(crate) async fn change_tournament(
     let now = app.config.clock.now();
     let changed = app
         .store
-        .change_tournament(organiser.actor(), id, &wanted, now)
+        .change_tournament(organiser.actor(), id, &tournament_change, now)
         .await?;
     tracing::info!(tournament = %changed.name, %id, "tournament changed");
     tournament::find(&app, id).await.map(Json)
 }
 
-/// Holds a tournament: no game of it begins; what is played goes on to its end.
+/// Pauses a tournament: no game starts; running ones continue.
 #[utoipa::path(
     post, path = "/tournaments/{id}/pause", tag = "organiser", security(("organiser" = [])),
     params(("id" = TournamentId, Path)), request_body = Reason,
     responses(
         (status = 200, body = TournamentView),
         (status = 404),
-        (status = 409, description = "it is paused or closed"),
+        (status = 409, description = "the tournament is already paused, or closed"),
         (status = 422),
     )
 )]
@@ -167,14 +167,14 @@ pub(crate) async fn pause_tournament(
     tournament::find(&app, id).await.map(Json)
 }
 
-/// Lets a paused tournament go on.
+/// Resumes a paused tournament.
 #[utoipa::path(
     post, path = "/tournaments/{id}/resume", tag = "organiser", security(("organiser" = [])),
     params(("id" = TournamentId, Path)),
     responses(
         (status = 200, body = TournamentView),
         (status = 404),
-        (status = 409, description = "it is not paused, or closed"),
+        (status = 409, description = "the tournament is not paused, or is closed"),
     )
 )]
 pub(crate) async fn resume_tournament(
@@ -190,14 +190,14 @@ pub(crate) async fn resume_tournament(
     tournament::find(&app, id).await.map(Json)
 }
 
-/// Closes a tournament for good: nothing of it changes any more.
+/// Closes a tournament for good: nothing of it can change any more.
 #[utoipa::path(
     post, path = "/tournaments/{id}/close", tag = "organiser", security(("organiser" = [])),
     params(("id" = TournamentId, Path)), request_body = Confirmation,
     responses(
         (status = 200, body = TournamentView),
         (status = 404),
-        (status = 409, description = "not confirmed with its name (nothing is done), a game is open or waits to be played again, or it is closed"),
+        (status = 409, description = "not confirmed with its name (nothing is done), a game is unfinished or has to be rerun, or the tournament is already closed"),
     )
 )]
 pub(crate) async fn close_tournament(
@@ -208,13 +208,13 @@ pub(crate) async fn close_tournament(
 ) -> Result<Json<TournamentView>, Problem> {
     let record = app.store.tournament_record(id).await?;
     let (tournament, rounds) = (record.tournament, record.rounds.len());
-    let what = format!(
-        "nothing of the tournament {:?} would change any more, {rounds} of {} rounds were started, and the recordings of \
-         their games would come out as its settings say",
+    let effect = format!(
+        "the tournament {:?} would be closed for good, with {rounds} of {} rounds started; recordings of its games would be \
+         published according to its settings",
         tournament.name.as_str(),
         tournament.rules.format.last_round()
     );
-    Problem::check_confirmed(confirm.as_deref(), tournament.name.as_str(), &what)?;
+    Problem::check_confirmed(confirm.as_deref(), tournament.name.as_str(), &effect)?;
     let now = app.config.clock.now();
     app.store
         .close_tournament(organiser.actor(), id, now)
@@ -228,31 +228,31 @@ fn name(text: &str) -> Result<StageName, Problem> {
         .map_err(|error| Problem::invalid("name", error))
 }
 
-/// A stage by its id, or by its name, whatever the case of its letters.
+/// A stage by its id, or by its name, ignoring case.
 async fn find_stage(app: &App, text: &str) -> Result<Stage, Problem> {
     if let Ok(id) = text.parse() {
         return Ok(app.store.stage(id).await?);
     }
     let stages = app.store.stages().await?;
     let names: Vec<String> = stages.iter().map(|stage| stage.name.to_string()).collect();
-    let wanted = text.to_lowercase();
+    let name = text.to_lowercase();
     let mut found = stages.into_iter();
-    let found = found.find(|stage| stage.name.as_str().to_lowercase() == wanted);
+    let found = found.find(|stage| stage.name.as_str().to_lowercase() == name);
     found.ok_or_else(|| {
         let detail = format!("expected one of {}, got {text:?}", names.join(", "));
         Problem::invalid("stage", detail)
     })
 }
 
-/// What is there, with other values for the fields that were sent.
-fn merged<T: Serialize + DeserializeOwned>(
-    what: &str,
-    is: &T,
+/// `current` with the fields of a JSON merge patch.
+fn apply_patch<T: Serialize + DeserializeOwned>(
+    name: &str,
+    current: &T,
     fields: Option<Map<String, Value>>,
 ) -> Result<T, Problem> {
-    let value = serde_json::to_value(is).map_err(Problem::internal)?;
+    let value = serde_json::to_value(current).map_err(Problem::internal)?;
     let Value::Object(mut all) = value else {
-        return Err(Problem::internal(format_args!("{what} are no object")));
+        return Err(Problem::internal(format_args!("{name} are not a JSON object")));
     };
     for (field, value) in fields.unwrap_or_default() {
         match value {
@@ -261,24 +261,24 @@ fn merged<T: Serialize + DeserializeOwned>(
         }
     }
     let value = Value::Object(all);
-    objects_only::check::<T>(&value).map_err(|error| Problem::invalid(what, error))?;
-    serde_path_to_error::deserialize(value).map_err(|error| Problem::invalid(what, error))
+    objects_only::check::<T>(&value).map_err(|error| Problem::invalid(name, error))?;
+    serde_path_to_error::deserialize(value).map_err(|error| Problem::invalid(name, error))
 }
 
 async fn changed_rules(
     app: &App,
-    is: &TournamentRules,
+    current: &TournamentRules,
     fields: Option<Map<String, Value>>,
 ) -> Result<TournamentRules, Problem> {
-    let is_named = fields
+    let sets_ruleset = fields
         .as_ref()
         .is_some_and(|fields| fields.contains_key("ruleset"));
-    let mut rules: TournamentRules = merged("rules", is, fields)?;
-    // An upgrade of the program alone changes nothing of a tournament.
-    if rules != *is {
-        if is_named && rules.ruleset != Ruleset::CURRENT {
+    let mut rules: TournamentRules = apply_patch("rules", current, fields)?;
+    // An upgrade of the server alone does not change a tournament.
+    if rules != *current {
+        if sets_ruleset && rules.ruleset != Ruleset::CURRENT {
             let detail = format!(
-                "ruleset: expected {}, the current one, got {}; leave it out",
+                "ruleset: expected the current one, {}, got {}; leave it out",
                 Ruleset::CURRENT,
                 rules.ruleset
             );
@@ -295,10 +295,10 @@ async fn changed_rules(
 }
 
 fn changed_settings(
-    is: &TournamentSettings,
+    current: &TournamentSettings,
     fields: Option<Map<String, Value>>,
 ) -> Result<TournamentSettings, Problem> {
-    let settings: TournamentSettings = merged("settings", is, fields)?;
+    let settings: TournamentSettings = apply_patch("settings", current, fields)?;
     settings
         .check()
         .map_err(|error| Problem::invalid("settings", error))?;

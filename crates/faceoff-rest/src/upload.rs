@@ -1,4 +1,4 @@
-//! Uploading an agent.
+//! Uploading submissions.
 
 use super::document::Binary;
 use axum::{
@@ -10,7 +10,7 @@ use axum::{
 };
 use faceoff_api::{paths, views::submission::SubmissionView};
 use faceoff_service::{
-    acts::uploading::{Incoming, upload},
+    services::uploads::{IncomingBundle, upload},
     app::App,
     auth::TeamCaller,
     extract::QueryParams,
@@ -24,15 +24,15 @@ use utoipa::IntoParams;
 #[serde(deny_unknown_fields)]
 #[into_params(parameter_in = Query)]
 pub(crate) struct UploadQuery {
-    /// Name of the archive, e.g. `striker.tar.gz`; shown with the submission.
+    /// File name of the bundle, e.g. `striker.tar.gz`; shown with the submission.
     file_name: Option<String>,
 }
 
-/// Another place for the archive's name, for clients that cannot set a query.
+/// Alternative to the query parameter, for clients that cannot set a query.
 const FILE_NAME: HeaderName = HeaderName::from_static("x-file-name");
 
-/// Media types that an archive may claim; none at all is fine too.
-const ARCHIVE_TYPES: [&str; 8] = [
+/// Accepted media types of bundles; the header may also be left out.
+const BUNDLE_TYPES: [&str; 8] = [
     "application/octet-stream",
     "application/gzip",
     "application/x-gzip",
@@ -43,17 +43,17 @@ const ARCHIVE_TYPES: [&str; 8] = [
     "application/x-zip-compressed",
 ];
 
-/// Uploads a bundle: the request's body is the archive itself (.tar.gz, .tar.zst, .zip, or .tar of a container image).
+/// Uploads a bundle. The request body is the bundle itself (.tar.gz, .tar.zst, .zip, or .tar of a container image).
 ///
-/// It is unpacked and started in a smoke run; follow the submission until it is `valid` or `invalid`.
+/// It is unpacked and checked in a validation run; poll the submission until its state is `valid` or `invalid`.
 #[utoipa::path(
     post, path = "/submissions", tag = "team", security(("team" = [])),
     params(
         UploadQuery,
-        ("X-File-Name" = Option<String>, Header, description = "another place for the archive's name", example = "striker.tar.gz"),
+        ("X-File-Name" = Option<String>, Header, description = "file name of the bundle, as an alternative to the query parameter", example = "striker.tar.gz"),
     ),
     request_body(
-        description = "the archive itself",
+        description = "the bundle itself",
         content(
             (inline(Binary) = "application/octet-stream"),
             (inline(Binary) = "application/gzip"),
@@ -66,13 +66,13 @@ const ARCHIVE_TYPES: [&str; 8] = [
         )
     ),
     responses(
-        (status = 201, body = SubmissionView, headers(("Location" = String, description = "where it is, from the server's root"))),
-        (status = 408, description = "the body stalled, or came too slowly"),
+        (status = 201, body = SubmissionView, headers(("Location" = String, description = "path of the submission"))),
+        (status = 408, description = "the upload stalled, or was too slow"),
         (status = 409, description = "the season is closed, or the team's storage is full"),
-        (status = 413, description = "larger than max_bundle_bytes"),
-        (status = 415, description = "not one of the archive formats"),
-        (status = 429, description = "several uploads are under way or wait for their smoke run, or the day's quota is spent"),
-        (status = 507, description = "the server's disk has too little room"),
+        (status = 413, description = "larger than `max_bundle_bytes`"),
+        (status = 415, description = "not a supported bundle format"),
+        (status = 429, description = "too many uploads are running, too many submissions wait for their validation run, or the daily quota is used up"),
+        (status = 507, description = "the server's disk has too little free space"),
     )
 )]
 pub(crate) async fn create_submission(
@@ -88,7 +88,7 @@ pub(crate) async fn create_submission(
         .or_else(|| Some(headers.get(FILE_NAME)?.to_str().ok()?.to_owned()))
         .unwrap_or_default();
     let announced = headers.get(header::CONTENT_LENGTH);
-    let incoming = Incoming {
+    let incoming = IncomingBundle {
         bytes: announced.and_then(|value| value.to_str().ok()?.parse().ok()),
         claimed_name,
         body,
@@ -111,15 +111,14 @@ fn check_media_type(headers: &HeaderMap) -> Result<(), Problem> {
         .unwrap_or_default()
         .trim()
         .to_ascii_lowercase();
-    if ARCHIVE_TYPES.contains(&essence.as_str()) {
+    if BUNDLE_TYPES.contains(&essence.as_str()) {
         return Ok(());
     }
     Err(Problem::new(
         ProblemKind::UnsupportedMediaType,
         format!(
-            "expected the archive itself as the body, with “Content-Type: application/octet-stream”; \
-             got {text:?}. With curl: --data-binary @agent.tar.gz -H 'Content-Type: \
-             application/octet-stream'"
+            "expected the bundle itself as the body, with “Content-Type: application/octet-stream”, got {text:?}. With \
+             curl: --data-binary @agent.tar.gz -H 'Content-Type: application/octet-stream'"
         ),
     ))
 }

@@ -1,11 +1,11 @@
-//! Webhooks: programs of a team, or of the organisers, that are told of what happens.
+//! Webhooks: addresses of a team, or of the organisers, to which events are delivered.
 
 use axum::{Json, extract::State, http::StatusCode};
 use faceoff_api::{
     requests,
     views::webhook::{DeliveryView, NewWebhookView, WebhookView},
 };
-use faceoff_notify::{About, WebhookSecret, message};
+use faceoff_notify::{NoticeFilter, WebhookSecret, message};
 use faceoff_service::{
     app::App,
     auth::Caller,
@@ -14,16 +14,16 @@ use faceoff_service::{
     text,
     views::webhook,
 };
-use faceoff_store::{NewWebhook, StoreError, Webhook, WebhookChange, Who};
+use faceoff_store::{NewWebhook, StoreError, Webhook, WebhookChange, Principal};
 use faceoff_types::WebhookId;
 use serde_json::json;
 
 /// Longest name of a webhook.
 const NAME_CHARS: usize = 80;
-/// Deliveries that are shown.
-const SHOWN: u32 = 200;
+/// Deliveries in a list.
+const MAX_DELIVERIES: u32 = 200;
 
-/// Whose webhooks a caller sees: an organiser all, others their team's.
+/// Whether the caller may see a webhook: organisers all, others their team's.
 fn may_see(caller: &Caller, webhook: &Webhook) -> bool {
     caller.is_organiser() || webhook.team.is_some_and(|team| caller.may_see(team))
 }
@@ -36,21 +36,21 @@ async fn find(app: &App, caller: &Caller, id: WebhookId) -> Result<Webhook, Prob
     }
 }
 
-/// Whoever finds a team's token must not have everything told to an address that outlives it.
-fn check_person(caller: &Caller) -> Result<(), Problem> {
-    match caller.who {
-        Who::Host | Who::Organiser(_) | Who::Member(..) => Ok(()),
-        Who::Team(_) => Err(Problem::new(
+/// A leaked team token must not create webhooks that outlive it.
+fn check_not_team_token(caller: &Caller) -> Result<(), Problem> {
+    match caller.principal {
+        Principal::Host | Principal::Organiser(_) | Principal::Member(..) => Ok(()),
+        Principal::Team(_) => Err(Problem::new(
             ProblemKind::Forbidden,
-            "a team's own token makes and changes no webhooks; a member does, or an organiser",
+            "a team's token cannot create or change webhooks; use a member's token, or an organiser's",
         )),
     }
 }
 
-/// What may be changed by the caller.
+/// A webhook that the caller may change.
 async fn find_changeable(app: &App, caller: &Caller, id: WebhookId) -> Result<Webhook, Problem> {
     let webhook = find(app, caller, id).await?;
-    check_person(caller)?;
+    check_not_team_token(caller)?;
     Ok(webhook)
 }
 
@@ -61,11 +61,11 @@ fn checked_url(app: &App, url: &str) -> Result<String, Problem> {
 }
 
 fn checked_about(about: &[String]) -> Result<Vec<String>, Problem> {
-    let about = About::of(about).map_err(|error| Problem::invalid("about", error))?;
-    Ok(about.words())
+    let about = NoticeFilter::parse(about).map_err(|error| Problem::invalid("about", error))?;
+    Ok(about.to_words())
 }
 
-/// The webhooks of the caller's team, the oldest first; an organiser's are all of them.
+/// Lists the webhooks of the caller's team, oldest first; organisers see all.
 #[utoipa::path(
     get, path = "/webhooks", tag = "people", security(("team" = []), ("organiser" = [])),
     responses((status = 200, body = Vec<WebhookView>))
@@ -79,20 +79,20 @@ pub(crate) async fn list_webhooks(
     webhooks.retain(|webhook| may_see(&caller, webhook));
     let views = webhooks.into_iter();
     Ok(Json(
-        views.map(|webhook| webhook::of(webhook, now)).collect(),
+        views.map(|webhook| webhook::view(webhook, now)).collect(),
     ))
 }
 
-/// Makes a webhook, of the caller's team or of the organisers, and returns its secret, once. It is told of what happens
-/// from now on.
+/// Creates a webhook of the caller's team or of the organisers. Its secret is returned only once. Events from now on
+/// are delivered.
 #[utoipa::path(
     post, path = "/webhooks", tag = "people", security(("team" = []), ("organiser" = [])),
     request_body = requests::NewWebhook,
     responses(
         (status = 201, body = NewWebhookView),
-        (status = 403, description = "a team's own token makes none"),
-        (status = 409, description = "there are as many as there may be"),
-        (status = 422, description = "the URL may not be told anything, or `about` names nothing that there is"),
+        (status = 403, description = "a team's token cannot create webhooks"),
+        (status = 409, description = "the owner has as many webhooks as allowed"),
+        (status = 422, description = "the URL is not allowed, or `about` contains an unknown filter"),
     )
 )]
 pub(crate) async fn create_webhook(
@@ -100,11 +100,11 @@ pub(crate) async fn create_webhook(
     State(app): State<App>,
     Body(new): Body<requests::NewWebhook>,
 ) -> Result<(StatusCode, Json<NewWebhookView>), Problem> {
-    check_person(&caller)?;
+    check_not_team_token(&caller)?;
     let secret = WebhookSecret::generate().map_err(Problem::internal)?;
     let new = NewWebhook {
         team: caller.team().map(|team| team.id),
-        name: text::line("name", &new.name, NAME_CHARS)?,
+        name: text::single_line("name", &new.name, NAME_CHARS)?,
         url: checked_url(&app, &new.url)?,
         about: checked_about(&new.about)?,
         secret: secret.bytes(),
@@ -113,13 +113,13 @@ pub(crate) async fn create_webhook(
     let webhook = app.store.create_webhook(caller.actor(), new, now).await?;
     tracing::info!(webhook = %webhook.id, actor = %caller.actor(), "webhook created");
     let view = NewWebhookView {
-        webhook: webhook::of(webhook, now),
-        secret: secret.shown(),
+        webhook: webhook::view(webhook, now),
+        secret: secret.encoded(),
     };
     Ok((StatusCode::CREATED, Json(view)))
 }
 
-/// A webhook.
+/// Returns a webhook.
 #[utoipa::path(
     get, path = "/webhooks/{id}", tag = "people", security(("team" = []), ("organiser" = [])),
     params(("id" = WebhookId, Path)),
@@ -131,18 +131,18 @@ pub(crate) async fn webhook(
     PathParam(id): PathParam<WebhookId>,
 ) -> Result<Json<WebhookView>, Problem> {
     let webhook = find(&app, &caller, id).await?;
-    Ok(Json(webhook::of(webhook, app.config.clock.now())))
+    Ok(Json(webhook::view(webhook, app.config.clock.now())))
 }
 
-/// Changes a webhook; one that is dead is told again, of what happens from now on.
+/// Changes a webhook. A dead one can be reactivated, and then receives events from now on.
 #[utoipa::path(
     patch, path = "/webhooks/{id}", tag = "people", security(("team" = []), ("organiser" = [])),
     params(("id" = WebhookId, Path)), request_body = requests::WebhookChanges,
     responses(
         (status = 200, body = WebhookView),
-        (status = 403, description = "a team's own token changes none"),
+        (status = 403, description = "a team's token cannot change webhooks"),
         (status = 404),
-        (status = 422, description = "the URL may not be told anything, or `about` names nothing that there is"),
+        (status = 422, description = "the URL is not allowed, or `about` contains an unknown filter"),
     )
 )]
 pub(crate) async fn change_webhook(
@@ -154,36 +154,37 @@ pub(crate) async fn change_webhook(
     let before = find_changeable(&app, &caller, id).await?;
     let name = changes.name.as_deref();
     let url = changes.url.as_deref();
-    // An address that a team has its secret for must not lead what it is told to somebody else.
+    // Only the team may redirect its webhook: its receiver trusts the secret.
     if url.is_some() && before.team != caller.team().map(|team| team.id) {
         return Err(Problem::new(
             ProblemKind::Forbidden,
-            "where a team's webhook is says a member of the team; you can remove it (DELETE /api/v1/webhooks/ID)",
+            "only a member of the team can change the address of its webhook; you can remove it (DELETE \
+             /api/v1/webhooks/ID)",
         ));
     }
     let change = WebhookChange {
         name: name
-            .map(|name| text::line("name", name, NAME_CHARS))
+            .map(|name| text::single_line("name", name, NAME_CHARS))
             .transpose()?,
         url: url.map(|url| checked_url(&app, url)).transpose()?,
         about: changes.about.as_deref().map(checked_about).transpose()?,
-        revived: changes.state.is_some(),
+        enable: changes.state.is_some(),
     };
     let now = app.config.clock.now();
     let webhook = app
         .store
         .change_webhook(caller.actor(), id, change, now)
         .await?;
-    Ok(Json(webhook::of(webhook, now)))
+    Ok(Json(webhook::view(webhook, now)))
 }
 
-/// Removes a webhook: nothing is sent there any more.
+/// Removes a webhook. Deliveries stop at once.
 #[utoipa::path(
     delete, path = "/webhooks/{id}", tag = "people", security(("team" = []), ("organiser" = [])),
     params(("id" = WebhookId, Path)),
     responses(
         (status = 204),
-        (status = 403, description = "a team's own token removes none"),
+        (status = 403, description = "a team's token cannot remove webhooks"),
         (status = 404),
     )
 )]
@@ -199,13 +200,13 @@ pub(crate) async fn remove_webhook(
     Ok(StatusCode::NO_CONTENT)
 }
 
-/// Gives a webhook another secret and returns it, once. For a day what is sent is signed by both.
+/// Replaces a webhook's secret; the new one is returned only once. For a day, deliveries are signed with both.
 #[utoipa::path(
     post, path = "/webhooks/{id}/rotate", tag = "people", security(("team" = []), ("organiser" = [])),
     params(("id" = WebhookId, Path)),
     responses(
         (status = 200, body = NewWebhookView),
-        (status = 403, description = "it is a team's, and the caller is no member"),
+        (status = 403, description = "the webhook belongs to a team, and the caller is not a member"),
         (status = 404),
     )
 )]
@@ -218,7 +219,8 @@ pub(crate) async fn rotate_webhook(
     if webhook.team != caller.team().map(|team| team.id) {
         return Err(Problem::new(
             ProblemKind::Forbidden,
-            "the secret of a team's webhook is for its members alone; you can remove it (DELETE /api/v1/webhooks/ID)",
+            "only a member of the team can rotate the secret of its webhook; you can remove it (DELETE \
+             /api/v1/webhooks/ID)",
         ));
     }
     let secret = WebhookSecret::generate().map_err(Problem::internal)?;
@@ -229,20 +231,20 @@ pub(crate) async fn rotate_webhook(
         .await?;
     tracing::info!(webhook = %id, actor = %caller.actor(), "webhook rotated");
     Ok(Json(NewWebhookView {
-        webhook: webhook::of(webhook, now),
-        secret: secret.shown(),
+        webhook: webhook::view(webhook, now),
+        secret: secret.encoded(),
     }))
 }
 
-/// Tells a webhook something that has not happened, of the type `test`; what comes of it is among its deliveries.
+/// Sends a test delivery of the kind `test` to a webhook. Its outcome is listed among the deliveries.
 #[utoipa::path(
     post, path = "/webhooks/{id}/test", tag = "people", security(("team" = []), ("organiser" = [])),
     params(("id" = WebhookId, Path)),
     responses(
-        (status = 202, body = DeliveryView, description = "it is sent in a moment"),
-        (status = 403, description = "a team's own token tests none"),
+        (status = 202, body = DeliveryView, description = "the delivery is queued"),
+        (status = 403, description = "a team's token cannot test webhooks"),
         (status = 404),
-        (status = 409, description = "it is dead, or a test waits already"),
+        (status = 409, description = "the webhook is dead, or a test is already pending"),
     )
 )]
 pub(crate) async fn test_webhook(
@@ -258,7 +260,7 @@ pub(crate) async fn test_webhook(
     Ok((StatusCode::ACCEPTED, Json(webhook::delivery(delivery))))
 }
 
-/// What a webhook was told, or is about to be, the newest first: the last 200, for two weeks.
+/// Lists a webhook's deliveries of the last two weeks, newest first, 200 at most.
 #[utoipa::path(
     get, path = "/webhooks/{id}/deliveries", tag = "people", security(("team" = []), ("organiser" = [])),
     params(("id" = WebhookId, Path)),
@@ -270,7 +272,7 @@ pub(crate) async fn list_deliveries(
     PathParam(id): PathParam<WebhookId>,
 ) -> Result<Json<Vec<DeliveryView>>, Problem> {
     find(&app, &caller, id).await?;
-    let deliveries = app.store.deliveries(id, SHOWN).await?;
+    let deliveries = app.store.deliveries(id, MAX_DELIVERIES).await?;
     Ok(Json(
         deliveries.into_iter().map(webhook::delivery).collect(),
     ))

@@ -1,9 +1,9 @@
-//! Who works for the server on other machines.
+//! Remote workers.
 
 use axum::{Json, extract::State, http::StatusCode};
 use faceoff_api::{requests::Reason, views::workers::WorkersView};
 use faceoff_service::{
-    acts::workers,
+    services::workers,
     app::App,
     auth::Organiser,
     extract::{Json as Body, PathParam},
@@ -12,7 +12,7 @@ use faceoff_service::{
 };
 use faceoff_store::WorkerName;
 
-/// Who plays beside the server's own slots, what they do, what keeps others from it, and of whom nothing is taken.
+/// Returns the remote workers with the state of their slots, their problems, and the bans.
 #[utoipa::path(
     get, path = "/workers", tag = "organiser", security(("organiser" = [])),
     responses((status = 200, body = WorkersView))
@@ -24,15 +24,17 @@ pub(crate) async fn workers(
     views::workers::with_bans(&app).await.map(Json)
 }
 
-/// Takes nothing of a worker any more. What it plays now, and what it has played of evaluations that go on, is played again by others; what
-/// is over stays, and `GET /workers` lists it.
+/// Bans a worker: its results are rejected.
+///
+/// Its running jobs, and its parts of evaluations that have not ended, are run again by others. Results of ended
+/// evaluations and games stay; `GET /workers` lists them.
 #[utoipa::path(
     post, path = "/workers/{name}/ban", tag = "organiser", security(("organiser" = [])),
     params(("name" = String, Path, example = "rack-1")), request_body = Reason,
     responses(
         (status = 204),
-        (status = 404, description = "no worker can be called so"),
-        (status = 409, description = "it is banned"),
+        (status = 404, description = "not a valid worker name"),
+        (status = 409, description = "the worker is already banned"),
         (status = 422),
     )
 )]
@@ -46,14 +48,14 @@ pub(crate) async fn ban_worker(
     Ok(StatusCode::NO_CONTENT)
 }
 
-/// Takes a worker's work again.
+/// Lifts a worker's ban.
 #[utoipa::path(
     post, path = "/workers/{name}/readmit", tag = "organiser", security(("organiser" = [])),
     params(("name" = String, Path, example = "rack-1")),
     responses(
         (status = 204),
-        (status = 404, description = "no worker can be called so"),
-        (status = 409, description = "it is not banned"),
+        (status = 404, description = "not a valid worker name"),
+        (status = 409, description = "the worker is not banned"),
     )
 )]
 pub(crate) async fn readmit_worker(

@@ -1,41 +1,41 @@
-//! A whole game of 45,000 control steps between two compiled agents that answer at once, each in its sandbox,
-//! recorded: how long it takes, and what of it is this thread's own. `STEPS=5000` plays a shorter one; `SHOWN=1` tells of
-//! it, as a server does for those who watch.
+//! A whole recorded game of 45,000 control steps between two compiled agents that answer at once, each in its sandbox:
+//! its duration, and the share of this thread. `STEPS=5000` runs a shorter game; `SHOWN=1` adds the live feed, as on a
+//! server with viewers.
 //!
-//! The agents are this very program, started with `--agent`.
+//! The agents are this program, started with `--agent`.
 #![expect(clippy::unwrap_used, reason = "a benchmark that cannot go on ends")]
 #![expect(clippy::print_stdout, reason = "a benchmark reports to the terminal")]
 
 mod instant;
 
 use faceoff_runner::{
-    AgentEnvironment, Commentary, GameAudience, GameObserver, GameSpec, POSITION_EVERY, run_game,
+    AgentEnvironment, LiveFeed, LiveFeedSink, GameObserver, GameSpec, POSITION_INTERVAL, run_game,
 };
 use faceoff_sandbox::{Isolation, affinity};
 use faceoff_types::{
-    GAME_WINDOWS, GameLimits, LiveHappening, LivePosition, Profile, Ruleset, Seed, WINDOW_STEPS,
+    GAME_WINDOWS, GameLimits, LiveEvent, LivePosition, Profile, Ruleset, Seed, WINDOW_STEPS,
 };
 use instant::{InstantAgent, environment, instant_agent};
 use std::{fs, time::Instant};
 
-struct Nobody;
+struct NullObserver;
 
-impl GameObserver for Nobody {
+impl GameObserver for NullObserver {
     fn cancelled(&self) -> bool {
         false
     }
 }
 
-/// Keeps what it hears, as the server's hub does.
+/// Keeps the received events, as the server's hub does.
 #[derive(Default)]
-struct Audience {
-    happenings: Vec<LiveHappening>,
+struct CollectingSink {
+    events: Vec<LiveEvent>,
     positions: u32,
 }
 
-impl GameAudience for Audience {
-    fn hear(&mut self, happenings: Vec<LiveHappening>, _: LivePosition) {
-        self.happenings.extend(happenings);
+impl LiveFeedSink for CollectingSink {
+    fn receive(&mut self, events: Vec<LiveEvent>, _: LivePosition) {
+        self.events.extend(events);
         self.positions += 1;
     }
 
@@ -57,8 +57,8 @@ fn main() {
     };
     let cpus = affinity::allowed().unwrap();
     let env = environment(isolation);
-    // A CPU for each, where there are three.
-    let of = |agent: usize| AgentEnvironment {
+    // Separate CPUs for both agents and this thread, if there are three.
+    let env_of = |agent: usize| AgentEnvironment {
         agent_cpus: cpus
             .get(agent)
             .filter(|_| cpus.len() > 2)
@@ -67,7 +67,7 @@ fn main() {
             .collect(),
         ..env.clone()
     };
-    let envs = [of(1), of(2)];
+    let envs = [env_of(1), env_of(2)];
     let seed = Seed::from_number(1);
     let spec = GameSpec {
         ruleset: Ruleset::CURRENT,
@@ -84,13 +84,13 @@ fn main() {
     println!("{} CPUs; load before: {}", cpus.len(), load().trim());
     let (started, cpu_started_s) = (Instant::now(), cpu_time_s());
     let bundles = [&agent.bundle; 2];
-    let mut audience = std::env::var_os("SHOWN").map(|_| Audience::default());
-    let report = match &mut audience {
-        Some(audience) => {
-            let mut commentary = Commentary::new(audience, POSITION_EVERY);
-            run_game(&spec, bundles, envs.each_ref(), out.path(), &mut commentary)
+    let mut sink = std::env::var_os("SHOWN").map(|_| CollectingSink::default());
+    let report = match &mut sink {
+        Some(sink) => {
+            let mut feed = LiveFeed::new(sink, POSITION_INTERVAL);
+            run_game(&spec, bundles, envs.each_ref(), out.path(), &mut feed)
         }
-        None => run_game(&spec, bundles, envs.each_ref(), out.path(), &mut Nobody),
+        None => run_game(&spec, bundles, envs.each_ref(), out.path(), &mut NullObserver),
     }
     .unwrap();
     let (wall_s, cpu_s) = (
@@ -118,17 +118,17 @@ fn main() {
             1e3 * times.max
         );
     }
-    if let Some(audience) = audience {
+    if let Some(sink) = sink {
         println!(
-            "shown: {} happenings, {} positions",
-            audience.happenings.len(),
-            audience.positions
+            "live feed: {} events, {} positions",
+            sink.events.len(),
+            sink.positions
         );
     }
     println!("load after: {}", load().trim());
 }
 
-/// CPU time of this thread: other work on the machine does not count.
+/// CPU time of this thread, without other work on the host.
 fn cpu_time_s() -> f64 {
     let now = rustix::time::clock_gettime(rustix::time::ClockId::ThreadCPUTime);
     now.tv_sec as f64 + 1e-9 * now.tv_nsec as f64

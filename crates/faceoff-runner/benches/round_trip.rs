@@ -1,23 +1,22 @@
-//! What the platform adds to an agent's time, and what recording adds to the simulator's:
+//! The overhead of the platform on an agent's time, and of recording on the simulator's:
 //!
 //! * `bare pipe`: the bytes of one question and one answer go to a compiled child process and back
 //!   through two pipes, with blocking reads and writes and nothing else;
 //! * `protocol`: the same bytes through the session (sandbox, deadlines, serialising, strict
 //!   parsing) with a compiled agent that answers at once;
 //! * `control step`: one step of the simulator alone;
-//! * then the same shard twice, with nothing kept of its steps and with its recording: the difference is what
-//!   recording costs.
+//! * then the same shard with and without recording; the difference is the cost of recording.
 //!
-//! The agent is this very program, started with `--agent` or `--echo`.
+//! The agent is this program, started with `--agent` or `--echo`.
 #![expect(clippy::unwrap_used, reason = "a benchmark that cannot go on ends")]
 #![expect(clippy::print_stdout, reason = "a benchmark reports to the terminal")]
 
 mod instant;
 
 use criterion::{BatchSize, Criterion};
-use faceoff_episode::{Arena, Nowhere};
+use faceoff_episode::{Arena, NullSink};
 use faceoff_runner::{
-    AgentEnvironment, Counters, Observer, Session, ShardSpec, play_shard, run_shard,
+    AgentEnvironment, KernelCounters, Observer, Session, ShardSpec, play_shard, run_shard,
 };
 use faceoff_sandbox::{Isolation, affinity};
 use faceoff_types::{EpisodeOutcome, Interpolation, Profile, Ruleset, Seed, Task};
@@ -36,9 +35,9 @@ fn observation() -> Vec<f64> {
         .collect()
 }
 
-/// How often episodes are played without and with recording: enough that a machine whose speed varies by a tenth
-/// from one second to the next agrees with itself to a percent or two.
-const RECORDING_TURNS: usize = 41;
+/// Repetitions of the episodes without and with recording. Enough for a result within one or two percent on a host
+/// whose speed varies by a tenth within seconds.
+const RECORDING_ROUNDS: usize = 41;
 
 fn main() {
     let mode = std::env::args().nth(1).unwrap_or_default();
@@ -113,7 +112,7 @@ fn round_trips(criterion: &mut Criterion) {
                 step += 1;
             });
         });
-        // What a team is charged: the clock stops with the last byte of the answer.
+        // The time charged to a team: the clock stops with the last byte of the answer.
         let mut charged: Vec<f64> = (0..5000)
             .map(|_| {
                 step += 1;
@@ -132,11 +131,11 @@ fn round_trips(criterion: &mut Criterion) {
     group.finish();
 }
 
-/// Both kinds of round trip in turns, so that the machine's other work meets both alike, and both on
-/// the same CPUs, since waking another CPU costs more than all the rest.
+/// Alternates both kinds of round trip, so that other load affects both in the same way. Both use the same CPUs,
+/// because waking another CPU costs more than all the rest.
 fn medians(placement: &str, here: usize, there: usize) {
-    const TURNS: usize = 200;
-    const PER_TURN: usize = 100;
+    const ROUNDS: usize = 200;
+    const PER_ROUND: usize = 100;
     let observation = observation();
     let mut question = Vec::new();
     Message::step(17, &observation).write_line(&mut question);
@@ -153,14 +152,14 @@ fn medians(placement: &str, here: usize, there: usize) {
         .unwrap();
     session.reset(0).unwrap();
     let (mut bare_s, mut protocol_s) = (Vec::new(), Vec::new());
-    for turn in 0..TURNS {
-        for _ in 0..PER_TURN {
+    for round in 0..ROUNDS {
+        for _ in 0..PER_ROUND {
             let started = Instant::now();
             bare.round_trip(&question);
             bare_s.push(started.elapsed().as_secs_f64());
         }
-        for index in 0..PER_TURN {
-            let step = u32::try_from(turn * PER_TURN + index).unwrap();
+        for index in 0..PER_ROUND {
+            let step = u32::try_from(round * PER_ROUND + index).unwrap();
             let started = Instant::now();
             session.step(step, &observation).unwrap();
             protocol_s.push(started.elapsed().as_secs_f64());
@@ -254,8 +253,8 @@ fn steps(criterion: &mut Criterion) {
     });
     group.finish();
 
-    // The same episodes without and with recording, in turns, since the machine's speed varies; the first turn warms
-    // up.
+    // Alternates the same episodes without and with recording, because the host's speed varies. The first round is a
+    // warm-up.
     let agent = InstantAgent::new();
     let env = environment(Isolation::Sandboxed {
         given_up: Vec::new(),
@@ -273,25 +272,25 @@ fn steps(criterion: &mut Criterion) {
         perturbations: Default::default(),
     };
     let mut steps = 0;
-    let mut turns: Vec<(f64, f64)> = (0..=RECORDING_TURNS)
+    let mut rounds: Vec<(f64, f64)> = (0..=RECORDING_ROUNDS)
         .map(|_| {
             let started = cpu_time_s();
             steps = play_unrecorded(&agent, &env, &spec);
             let bare_s = cpu_time_s() - started;
             let started = cpu_time_s();
-            run_shard(&spec, &agent.bundle, &env, out.path(), &mut Nobody).unwrap();
+            run_shard(&spec, &agent.bundle, &env, out.path(), &mut NullObserver).unwrap();
             (bare_s, cpu_time_s() - started)
         })
         .skip(1)
         .collect();
-    turns.sort_by(|a, b| (a.1 / a.0).total_cmp(&(b.1 / b.0)));
-    let (bare_s, recorded_s) = turns[RECORDING_TURNS / 2];
+    rounds.sort_by(|a, b| (a.1 / a.0).total_cmp(&(b.1 / b.0)));
+    let (bare_s, recorded_s) = rounds[RECORDING_ROUNDS / 2];
     let bytes = fs::metadata(out.path().join("steps.parquet"))
         .unwrap()
         .len();
     println!(
         "{steps} steps: {:.1} us of CPU time per step without recording, {:.1} us with it \
-         ({:+.1} %, median of {RECORDING_TURNS} turns); {:.0} bytes per step",
+         ({:+.1} %, median of {RECORDING_ROUNDS} rounds); {:.0} bytes per step",
         1e6 * bare_s / f64::from(steps),
         1e6 * recorded_s / f64::from(steps),
         100.0 * (recorded_s / bare_s - 1.0),
@@ -299,31 +298,31 @@ fn steps(criterion: &mut Criterion) {
     );
 }
 
-/// CPU time of this thread: other work on the machine does not count.
+/// CPU time of this thread, without other work on the host.
 fn cpu_time_s() -> f64 {
     let now = rustix::time::clock_gettime(rustix::time::ClockId::ThreadCPUTime);
     now.tv_sec as f64 + 1e-9 * now.tv_nsec as f64
 }
 
-/// Plays a shard and keeps nothing of its steps. Returns how many they were.
+/// Runs a shard without recording; returns the number of steps.
 fn play_unrecorded(agent: &InstantAgent, env: &AgentEnvironment, spec: &ShardSpec) -> u32 {
-    let mut nowhere = Nowhere;
+    let mut nowhere = NullSink;
     let report = play_shard(
         spec,
         &agent.bundle,
         env,
         &mut nowhere,
-        &mut Nobody,
-        &Counters,
+        &mut NullObserver,
+        &KernelCounters,
     );
     let outcomes = report.unwrap().outcomes;
     outcomes.iter().map(|outcome| outcome.steps).sum()
 }
 
-struct Nobody;
+struct NullObserver;
 
-impl Observer for Nobody {
-    fn episode_done(&mut self, _: &EpisodeOutcome) {}
+impl Observer for NullObserver {
+    fn on_episode_end(&mut self, _: &EpisodeOutcome) {}
     fn cancelled(&self) -> bool {
         false
     }

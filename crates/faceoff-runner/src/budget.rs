@@ -1,10 +1,10 @@
-//! How long an agent may take in all (RULES, "Real time is the rule"): a limit per answer alone would
-//! let it hold a slot for days.
+//! Time budgets over many answers (RULES, "Real time is the rule"): with only a limit per answer, an agent could
+//! occupy a slot for days.
 
 use faceoff_sim::model::CONTROL_STEP_S;
 use faceoff_types::{AgentFaultKind, Phase, TimeLimits};
 
-/// What the answers of one episode may add up to.
+/// Budget for the sum of the answer times of one episode.
 #[derive(Debug)]
 pub(crate) struct EpisodeBudget<'a> {
     time: &'a TimeLimits,
@@ -24,17 +24,17 @@ impl<'a> EpisodeBudget<'a> {
     /// Counts an answer.
     ///
     /// # Errors
-    /// The agent has used up the time of all steps so far.
+    /// When the agent has used up the time of all steps so far.
     pub fn spend(&mut self, answer_s: f64) -> Result<(), AgentFaultKind> {
         self.used_s += answer_s;
         self.steps += 1;
         let control_s = f64::from(self.steps) * CONTROL_STEP_S;
         let limit_s = self.time.episode_control_times * control_s + self.time.episode_extra_s;
-        within(Phase::Step, self.used_s, limit_s)
+        check_limit(Phase::Step, self.used_s, limit_s)
     }
 }
 
-/// What the answers to `reset` of all episodes of a shard may add up to.
+/// Budget for the sum of the answer times to `reset` in all episodes of a shard.
 #[derive(Debug)]
 pub(crate) struct ResetBudget {
     limit_s: f64,
@@ -49,21 +49,21 @@ impl ResetBudget {
         }
     }
 
-    /// Counts an answer, or a wait for one that did not come.
+    /// Counts the time of an answer, or of a wait without an answer.
     pub fn spend(&mut self, wait_s: f64) {
         self.used_s += wait_s;
     }
 
-    /// Is there time for resets?
+    /// Checks the budget.
     ///
     /// # Errors
-    /// The agent has used up that of all.
+    /// When the agent has used up the time of all resets.
     pub fn check(&self) -> Result<(), AgentFaultKind> {
-        within(Phase::Reset, self.used_s, self.limit_s)
+        check_limit(Phase::Reset, self.used_s, self.limit_s)
     }
 }
 
-fn within(phase: Phase, used_s: f64, limit_s: f64) -> Result<(), AgentFaultKind> {
+fn check_limit(phase: Phase, used_s: f64, limit_s: f64) -> Result<(), AgentFaultKind> {
     if used_s <= limit_s {
         return Ok(());
     }
@@ -78,8 +78,8 @@ fn within(phase: Phase, used_s: f64, limit_s: f64) -> Result<(), AgentFaultKind>
 mod tests {
     use super::*;
 
-    /// How many answers of `answer_s` are taken.
-    fn taken(answer_s: f64) -> u32 {
+    /// Number of answers of `answer_s` that the budget allows.
+    fn allowed_answers(answer_s: f64) -> u32 {
         let time = TimeLimits::default();
         let mut budget = EpisodeBudget::new(&time);
         (0..500)
@@ -88,14 +88,14 @@ mod tests {
     }
 
     #[test]
-    fn an_episode_may_take_twice_its_control_time_and_two_seconds() {
-        assert_eq!(taken(0.04), 500);
-        assert_eq!(taken(0.07), 66, "66 · 0.07 s < 66 · 0.04 s + 2 s");
-        assert_eq!(taken(0.9), 2);
+    fn episode_budget_is_twice_the_control_time_plus_two_seconds() {
+        assert_eq!(allowed_answers(0.04), 500);
+        assert_eq!(allowed_answers(0.07), 66, "66 · 0.07 s < 66 · 0.04 s + 2 s");
+        assert_eq!(allowed_answers(0.9), 2);
     }
 
     #[test]
-    fn resets_share_a_budget_that_grows_with_the_shard() {
+    fn reset_budget_grows_with_the_shard() {
         let mut budget = ResetBudget::new(&TimeLimits::default(), 50);
         for _ in 0..4 {
             budget.spend(10.0);

@@ -1,5 +1,4 @@
-//! A team's bundle: an archive is unpacked without trusting a byte of it, a developer's folder is
-//! opened as it is.
+//! A team's bundle: unpacks an archive without trusting any byte of it, or opens a developer's folder in place.
 
 mod budget;
 mod entry;
@@ -17,7 +16,7 @@ pub use error::BundleError;
 pub use faceoff_types::BundleLimits;
 pub use image::Image;
 
-use budget::{Budget, Members, Watched};
+use budget::{Budget, MultiStreamReader, CancellableReader};
 use faceoff_types::{ArchiveFormat, IMAGE_RUNTIME};
 use faceoff_wire::{MANIFEST_MAX_BYTES, Manifest};
 use fs_err::File;
@@ -28,39 +27,43 @@ use std::{
 };
 use tree::Tree;
 
-/// Name of the file that makes a folder a bundle.
+/// Name of the manifest: a folder that contains it is a bundle.
 const MANIFEST_NAME: &str = "agent.toml";
 
 #[derive(Debug, Clone)]
 pub struct Bundle {
-    /// The folder that holds `agent.toml`.
+    /// The folder that contains `agent.toml`.
     pub dir: PathBuf,
-    /// What `agent.toml` says.
+    /// The content of `agent.toml`.
     pub manifest: Manifest,
-    /// The container image that the bundle is; `dir` is its `/agent`. A developer's folder is none.
+    /// Set if the bundle is a container image; then `dir` is its `/agent`. `None` for a developer's folder.
     pub image: Option<Image>,
 }
 
-/// Unpacks a `.tar.gz`, `.tar.zst` or `.zip`, told apart by its first bytes, into the folder
-/// `into`, which is created and must be empty. A tar, plain or compressed, that has no `agent.toml` but is a
-/// container image, as `docker save` or an OCI layout has it, becomes the image's root.
+/// Unpacks an archive into the folder `into`, which is created and must be empty.
 ///
-/// Files become 0644, or 0755 where the archive has an executable bit; symbolic links stay links
-/// if they lead to a place inside the bundle. Limits hold while bytes stream, so that a
-/// decompression bomb is stopped at the limit whatever its headers claim, and count all that an
-/// archive is made of: headers, long names, padding, directories and streams one after another as well as
-/// the files. Of an image they hold for its layers as they come and, once more, for what they hold; layers
-/// take twice [`BundleLimits::unpacked_bytes`] of the disk at most. `cancelled` is asked for every piece.
+/// The first bytes determine the format: `.tar.gz`, `.tar.zst` or `.zip`. A tar, plain or compressed, without
+/// `agent.toml` may be a container image, as written by `docker save` or in an OCI layout. It becomes the image's root.
 ///
-/// Of a `.zip` nothing is written before its directory has been checked: numbers, names, kinds and stated
-/// sizes. Of any archive a folder is made when something is put into it, or at the end. After an error `into`
-/// holds a part of the archive; the caller removes it.
+/// Files get mode 0644, or 0755 if the archive has an executable bit. Symbolic links stay links if they lead to a path
+/// inside the bundle.
+///
+/// Limits apply while bytes stream, so that a decompression bomb is stopped at the limit, whatever its headers claim.
+/// They count everything that an archive consists of: headers, long names, padding, directories and successive streams
+/// as well as the files. For an image they apply to its layers as packed and, separately, to the content of the
+/// layers. Layers take at most twice [`BundleLimits::unpacked_bytes`] of the disk. `cancelled` is called for every
+/// piece.
+///
+/// The directory of a `.zip` is checked before anything is written: numbers, names, kinds and stated sizes. Folders are
+/// created when something is put into them, or at the end. After an error `into` contains a part of the archive, which
+/// the caller removes.
 ///
 /// # Errors
 /// [`BundleError::Invalid`] with the entry's name for links that leave the bundle, absolute or
-/// `..` paths, devices, set-id bits, duplicate names, a broken archive, a limit met, a missing or
-/// wrong `agent.toml`, an image that is none, is for another machine, or differs from its digests; [`BundleError::Io`] where reading or writing the disk fails, or takes longer
-/// than [`BundleLimits::unpack_s`]; [`BundleError::Cancelled`] when `cancelled` said so.
+/// `..` paths, devices, set-id bits, duplicate names, a damaged archive, an exceeded limit, or a missing or
+/// wrong `agent.toml`. Also for an image that is incomplete, is for another platform, or differs from its digests.
+/// [`BundleError::Io`] if reading or writing the disk fails, or takes longer than [`BundleLimits::unpack_s`].
+/// [`BundleError::Cancelled`] if `cancelled` returned `true`.
 pub fn unpack(
     archive: &Path,
     into: &Path,
@@ -69,7 +72,7 @@ pub fn unpack(
 ) -> Result<Bundle, BundleError> {
     let now = Instant::now;
     let budget = Budget::new(limits, &now, cancelled);
-    budget.verdict(unpack_within(archive, into, &budget))
+    budget.own_failure_or(unpack_within(archive, into, &budget))
 }
 
 fn unpack_within<'a>(
@@ -108,7 +111,7 @@ fn unpack_within<'a>(
         budget,
     );
     let format = budget
-        .verdict(read)
+        .own_failure_or(read)
         .map_err(|error| tree.explain_refusal(error))?;
     match (tree.bundle_root(MANIFEST_NAME), format) {
         (Some(_), ArchiveFormat::Tar) => Err(BundleError::Invalid(
@@ -143,7 +146,7 @@ fn read_into<'a>(
 ) -> Result<ArchiveFormat, BundleError> {
     let buffered = 64 << 10;
     let watched =
-        |file: File| BufReader::with_capacity(buffered, Watched::new(file.into_file(), budget));
+        |file: File| BufReader::with_capacity(buffered, CancellableReader::new(file.into_file(), budget));
     let format = format.ok_or_else(|| {
         BundleError::Invalid(
             "the bundle is no archive that is accepted: expected .tar.gz, .tar.zst or .zip, or the .tar of a \
@@ -153,13 +156,13 @@ fn read_into<'a>(
     })?;
     match format {
         ArchiveFormat::TarGz => {
-            let streams: Members<'_, _, flate2::bufread::GzDecoder<_>> =
-                Members::new(watched(file), budget).map_err(BundleError::reading(""))?;
+            let streams: MultiStreamReader<'_, _, flate2::bufread::GzDecoder<_>> =
+                MultiStreamReader::new(watched(file), budget).map_err(BundleError::on_read(""))?;
             tar_archive::unpack(streams, tree, budget)?;
         }
         ArchiveFormat::TarZst => {
-            let streams: Members<'_, _, zstd::Decoder<'static, _>> =
-                Members::new(watched(file), budget).map_err(BundleError::reading(""))?;
+            let streams: MultiStreamReader<'_, _, zstd::Decoder<'static, _>> =
+                MultiStreamReader::new(watched(file), budget).map_err(BundleError::on_read(""))?;
             tar_archive::unpack(streams, tree, budget)?;
         }
         ArchiveFormat::Zip => {
@@ -190,7 +193,7 @@ pub fn open(path: &Path, scratch: &Path, limits: &BundleLimits) -> Result<Bundle
     }
 }
 
-/// A folder of files, which brings no runtime of its own.
+/// Opens a folder of files, which has no runtime of its own.
 fn open_dir(path: &Path) -> Result<Bundle, BundleError> {
     let bundle = read_manifest(path)?;
     if bundle.manifest.runtime == IMAGE_RUNTIME {
@@ -202,7 +205,7 @@ fn open_dir(path: &Path) -> Result<Bundle, BundleError> {
     Ok(bundle)
 }
 
-/// The folder of an agent in its image.
+/// Opens the folder of an agent in its image.
 fn open_image(agent: &Path, image: Image) -> Result<Bundle, BundleError> {
     let bundle = read_manifest(agent)?;
     if bundle.manifest.runtime != IMAGE_RUNTIME {
@@ -218,19 +221,19 @@ fn open_image(agent: &Path, image: Image) -> Result<Bundle, BundleError> {
     })
 }
 
-fn read_manifest(path: &Path) -> Result<Bundle, BundleError> {
-    let dir = fs_err::canonicalize(path)?;
-    let place = dir.join(MANIFEST_NAME);
-    let teams_own = |error: io::Error| match error.kind() {
+fn read_manifest(dir: &Path) -> Result<Bundle, BundleError> {
+    let dir = fs_err::canonicalize(dir)?;
+    let manifest_path = dir.join(MANIFEST_NAME);
+    let agent_fault = |error: io::Error| match error.kind() {
         io::ErrorKind::NotFound => no_manifest(),
         io::ErrorKind::PermissionDenied => {
             BundleError::Invalid(format!("{MANIFEST_NAME} cannot be read: permission denied"))
         }
         _ => error.into(),
     };
-    // Looked at before it is opened: opening a pipe waits for somebody to write.
-    let kind = fs_err::symlink_metadata(&place)
-        .map_err(teams_own)?
+    // Check the kind before opening: opening a named pipe blocks until a writer opens it.
+    let kind = fs_err::symlink_metadata(&manifest_path)
+        .map_err(agent_fault)?
         .file_type();
     if !kind.is_file() {
         let kind = if kind.is_dir() {
@@ -245,8 +248,8 @@ fn read_manifest(path: &Path) -> Result<Bundle, BundleError> {
         )));
     }
     let mut bytes = Vec::new();
-    File::open(&place)
-        .map_err(teams_own)?
+    File::open(&manifest_path)
+        .map_err(agent_fault)?
         .take(MANIFEST_MAX_BYTES + 1)
         .read_to_end(&mut bytes)?;
     let text = String::from_utf8(bytes)

@@ -1,6 +1,6 @@
-//! The slot's noise floor: round trips to a calibration agent, a thread of our own that sits on the
-//! agent's CPUs and answers at once, in messages as long as those of a step. It waits in a read and
-//! uses nothing while the agent plays.
+//! The slot's noise floor: round trips to a calibration agent. It is a thread of the service on the agent's CPUs,
+//! which answers at once, with messages as long as those of a step. While the agent runs, it waits in a read and uses
+//! no CPU time.
 
 use crate::fault::PlatformFault;
 use faceoff_sandbox::affinity::pin_current_thread;
@@ -14,13 +14,13 @@ use std::{
 };
 
 /// Round trips before the first episode.
-const BEFORE: u32 = 200;
+const ROUND_TRIPS_BEFORE: u32 = 200;
 /// Round trips after each episode.
-const BETWEEN: u32 = 10;
-/// Bytes of an answer with two times seven numbers of full length.
+const ROUND_TRIPS_BETWEEN: u32 = 10;
+/// Length of an answer with two times seven numbers of full precision.
 const ANSWER_BYTES: usize = 320;
 
-/// The calibration agent. It ends with this.
+/// The calibration agent; its thread ends on drop.
 #[derive(Debug)]
 struct CalibrationAgent {
     question: Vec<u8>,
@@ -32,7 +32,7 @@ struct CalibrationAgent {
 }
 
 impl CalibrationAgent {
-    /// Starts the thread, on the agent's CPUs; without any, wherever the calling thread may run.
+    /// Starts the thread on the agent's CPUs; if the list is empty, with the affinity of the calling thread.
     ///
     /// # Errors
     /// When the host has no socket or thread left.
@@ -70,10 +70,10 @@ impl CalibrationAgent {
             let asked = Instant::now();
             to_agent
                 .write_all(&self.question)
-                .map_err(PlatformFault::io("asking the calibration agent"))?;
+                .map_err(PlatformFault::io("writing to the calibration agent"))?;
             self.from_agent
                 .read_exact(&mut self.answer)
-                .map_err(PlatformFault::io("hearing the calibration agent"))?;
+                .map_err(PlatformFault::io("reading from the calibration agent"))?;
             times_s.push(asked.elapsed().as_secs_f64());
         }
         Ok(())
@@ -91,7 +91,7 @@ impl Drop for CalibrationAgent {
     }
 }
 
-/// The noise floor of one agent's CPUs, measured while a slot plays.
+/// The noise floor of one agent's CPUs, measured while a slot runs a job.
 #[derive(Debug)]
 pub(crate) struct Calibration {
     agent: CalibrationAgent,
@@ -104,7 +104,7 @@ impl Calibration {
     pub fn start(agent_cpus: &[usize]) -> Result<Self, PlatformFault> {
         let mut agent = CalibrationAgent::start(agent_cpus)?;
         let mut before_s = Vec::new();
-        agent.measure(BEFORE, &mut before_s)?;
+        agent.measure(ROUND_TRIPS_BEFORE, &mut before_s)?;
         Ok(Self {
             agent,
             before_s,
@@ -114,7 +114,7 @@ impl Calibration {
 
     /// Measures between two of them.
     pub fn between_episodes(&mut self) -> Result<(), PlatformFault> {
-        self.agent.measure(BETWEEN, &mut self.during_s)
+        self.agent.measure(ROUND_TRIPS_BETWEEN, &mut self.during_s)
     }
 
     pub fn finish(
@@ -133,7 +133,7 @@ impl Calibration {
     }
 }
 
-/// Answers until no question can come.
+/// Answers until the question channel is closed.
 fn answer(cpus: &[usize], length: usize, mut questions: UnixStream, mut answers: UnixStream) {
     if let Err(error) = pin_current_thread(cpus) {
         tracing::warn!(%error, "the calibration agent cannot be pinned to the agent's CPUs");
@@ -181,7 +181,7 @@ mod tests {
     }
 
     #[test]
-    fn every_question_is_answered_and_timed() {
+    fn round_trips_are_measured() {
         let mut agent = CalibrationAgent::start(&[]).unwrap();
         let mut times_s = Vec::new();
         agent.measure(5, &mut times_s).unwrap();

@@ -3,28 +3,26 @@ use faceoff_sandbox::{Isolation, Layer, Limits, Runtime};
 use faceoff_types::{IMAGE_RUNTIME, TimeLimits};
 use std::collections::BTreeMap;
 
-/// How agents are run on this machine.
+/// Environment of agents on this host.
 #[derive(Debug, Clone)]
 pub struct AgentEnvironment {
-    /// What the process tree may use.
+    /// Resource limits of an agent's process tree.
     pub limits: Limits,
-    /// How long it may take.
     pub time: TimeLimits,
-    /// What separates it from the host.
     pub isolation: Isolation,
     /// The runtimes that `agent.toml` may name.
     pub runtimes: BTreeMap<String, Runtime>,
     /// May agents be container images (runtime `image`)?
     pub images: bool,
-    /// CPUs for the agent; the thread that simulates keeps off them. Empty: no pinning.
+    /// CPUs for the agent; the simulating thread does not use them. Empty: no pinning.
     pub agent_cpus: Vec<usize>,
-    /// Who ends an agent that holds its evaluator, or whose job was cancelled.
+    /// Kills an agent that blocks its evaluator, or whose job was cancelled.
     pub supervision: Supervision,
 }
 
 impl AgentEnvironment {
-    /// Has the agent a cgroup that counts and limits its CPU time?
-    pub(crate) fn counts_cpus(&self) -> bool {
+    /// Does a cgroup count and limit the agent's CPU time?
+    pub(crate) fn has_cpu_accounting(&self) -> bool {
         self.isolation.enforces(Layer::CgroupCpu)
     }
 
@@ -35,16 +33,16 @@ impl AgentEnvironment {
             || a.agent_cpus.iter().any(|cpu| b.agent_cpus.contains(cpu))
     }
 
-    /// Are container images run here? They need the sandbox's namespaces.
+    /// Can agents be container images on this host? They need the sandbox's namespaces.
     #[must_use]
-    pub fn runs_images(&self) -> bool {
+    pub fn supports_images(&self) -> bool {
         self.images && self.isolation.enforces(Layer::Namespaces)
     }
 
-    /// What `agent.toml` may name as its runtime here.
+    /// The runtimes that `agent.toml` may name on this host.
     #[must_use]
-    pub fn offered(&self) -> Vec<String> {
-        let image = self.runs_images().then(|| IMAGE_RUNTIME.to_owned());
+    pub fn runtime_names(&self) -> Vec<String> {
+        let image = self.supports_images().then(|| IMAGE_RUNTIME.to_owned());
         self.runtimes.keys().cloned().chain(image).collect()
     }
 }

@@ -1,17 +1,17 @@
-//! The agent's process and single questions to it: a line is sent, a line comes back in time or does
-//! not, and whose doing that is. What the lines mean is the session's business.
+//! The agent's process and single exchanges with it: sends a line, waits for the answer until its limit, and
+//! classifies failures as agent fault or platform fault. The session interprets the lines.
 
 use crate::{
     bundle::Bundle,
     config::AgentEnvironment,
-    cpu_use::CpuUse,
-    fault::{PlatformFault, Trouble},
-    host_watch::{Evidence, GLANCE_LASTS, HostWatch, LONGEST_EXTENSION, Over, Wait},
-    supervisor::{Busy, Ended, Supervised},
-    waited::Waited,
+    cpu_usage::CpuUsage,
+    fault::{PlatformFault, SessionError},
+    host_interference::{WaitCounters, BASELINE_MAX_AGE, InterferenceMonitor, MAX_EXTENSION, Extension, AnswerWait},
+    supervisor::{BusyGuard, KillReason, SupervisedAgent},
+    wait_breakdown::WaitBreakdown,
 };
 use faceoff_sandbox::{
-    AgentProcess, AnswerState, Glance, Layer, ReadLine, Runtime, SpawnError, SpawnSpec, WriteError,
+    AgentProcess, AnswerState, Baseline, Layer, ReadLine, Runtime, SpawnError, SpawnSpec, WriteError,
     affinity,
 };
 use faceoff_types::{AgentFaultKind, Phase, TimeLimits};
@@ -21,59 +21,60 @@ use std::{
     time::{Duration, Instant},
 };
 
-/// Who answered within this time is looked out for as long at the next question, where that costs the agent
-/// nothing: to sleep and be woken takes about as long as such an answer, an interpreter's included.
-const QUICK: Duration = Duration::from_micros(100);
+/// If the last answer took less than this, the evaluator busy-polls this long for the next one, provided that this
+/// costs the agent no CPU time. Sleeping and waking up takes about as long as such an answer, even from an
+/// interpreted agent.
+const SPIN_TIME: Duration = Duration::from_micros(100);
 
 #[derive(Debug)]
 pub(crate) struct Exchange<'w> {
     process: AgentProcess,
-    supervised: Supervised,
-    watch: &'w dyn HostWatch,
-    /// The calling thread's CPUs, if the agent keeps off all of them.
-    own_cpus: Option<Vec<usize>>,
-    /// Was its last answer a quick one?
+    supervised: SupervisedAgent,
+    monitor: &'w dyn InterferenceMonitor,
+    /// The CPUs of the calling thread, if the agent may use none of them.
+    evaluator_cpus: Option<Vec<usize>>,
+    /// The last answer took less than [`SPIN_TIME`].
     is_quick: bool,
-    /// What the counters said at the last glance.
-    glance: Option<Arc<Glance>>,
+    /// The counters before a recent question.
+    baseline: Option<Arc<Baseline>>,
     /// The message being sent; its memory is reused.
     line: Vec<u8>,
-    cpu: CpuUse,
-    /// How long it may take to exit once it has closed its output, so that its status can be told.
+    cpu: CpuUsage,
+    /// Time to exit after the agent has closed its output, so that its exit status can be reported.
     exit_grace: Duration,
 }
 
-/// A question that waits for its answer.
+/// A question whose answer is pending.
 #[derive(Debug, Clone)]
-pub(crate) struct Sent {
+pub(crate) struct PendingQuestion {
     phase: Phase,
     limit_s: f64,
-    wait: Wait,
-    /// CPU time that the agent used between its last answer and this question.
-    head_start: Duration,
+    wait: AnswerWait,
+    /// CPU time of the agent between its last answer and this question.
+    early_cpu_time: Duration,
 }
 
-/// The line that came back.
+/// An answer of the agent.
 pub(crate) struct Answer {
     pub bytes: Vec<u8>,
-    /// To the answer's last byte.
-    pub waited: Waited,
+    /// The wait until the answer's last byte.
+    pub wait: WaitBreakdown,
 }
 
 impl Answer {
-    /// A fault that this line shows.
-    pub fn shows(&self, fault: AgentFaultKind) -> Trouble {
-        Trouble::Agent {
+    /// The error for an agent fault in this line.
+    pub fn to_error(&self, fault: AgentFaultKind) -> SessionError {
+        SessionError::Agent {
             fault,
             line: Some(quote_line(&self.bytes)),
         }
     }
 }
 
-impl Sent {
-    /// The evaluator could not look for the answer for so long: it saw to another agent.
-    pub fn was_away(&mut self, away: Duration) {
-        self.wait.was_away(away);
+impl PendingQuestion {
+    /// Adds time in which the evaluator could not check for the answer, because it handled another agent.
+    pub fn add_absence(&mut self, absence: Duration) {
+        self.wait.add_absence(absence);
     }
 }
 
@@ -82,11 +83,11 @@ impl<'w> Exchange<'w> {
     pub fn start(
         bundle: &Bundle,
         env: &AgentEnvironment,
-        watch: &'w dyn HostWatch,
-    ) -> Result<Self, Trouble> {
+        monitor: &'w dyn InterferenceMonitor,
+    ) -> Result<Self, SessionError> {
         let manifest = &bundle.manifest;
         let runtime =
-            runtime_of(bundle, env).map_err(|detail| AgentFaultKind::CannotStart { detail })?;
+            find_runtime(bundle, env).map_err(|detail| AgentFaultKind::CannotStart { detail })?;
         let mut variables = bundle
             .image
             .as_ref()
@@ -104,145 +105,145 @@ impl<'w> Exchange<'w> {
         })
         .map_err(|error| match error {
             SpawnError::Agent(fault) => fault.into(),
-            SpawnError::Platform(error) => Trouble::from(error),
+            SpawnError::Platform(error) => SessionError::from(error),
         })?;
-        let own_cpus = affinity::allowed().ok().filter(|own| {
-            !env.agent_cpus.is_empty() && own.iter().all(|cpu| !env.agent_cpus.contains(cpu))
+        let evaluator_cpus = affinity::allowed().ok().filter(|cpus| {
+            !env.agent_cpus.is_empty() && cpus.iter().all(|cpu| !env.agent_cpus.contains(cpu))
         });
         Ok(Self {
-            supervised: Supervised::new(process.killer()?, &env.supervision),
-            cpu: CpuUse::begin(process.cpu_time_s(), env),
+            supervised: SupervisedAgent::new(process.killer()?, &env.supervision),
+            cpu: CpuUsage::new(process.cpu_time_s(), env),
             process,
-            watch,
-            own_cpus,
+            monitor,
+            evaluator_cpus,
             is_quick: false,
-            glance: None,
+            baseline: None,
             line: Vec::with_capacity(4096),
             exit_grace: TimeLimits::duration(env.time.bye_s),
         })
     }
 
-    /// Asks a question without waiting; to write it and to be answered share one limit of `limit_s`.
+    /// Sends a question without waiting. Writing the question and waiting for the answer share the limit `limit_s`.
     pub fn send(
         &mut self,
         message: &Message<'_>,
         phase: Phase,
         limit_s: f64,
-    ) -> Result<Sent, Trouble> {
+    ) -> Result<PendingQuestion, SessionError> {
         message.write_line(&mut self.line);
-        let glance = self.glance(phase);
-        // From here on whatever it takes is the agent's: the calls that follow meet what it can reach.
+        let baseline = self.baseline(phase);
+        // From here on all time counts as the agent's, because the following calls use resources that it can affect.
         let asked = Instant::now();
         let limit = TimeLimits::duration(limit_s);
-        let _busy = self.supervised.busy(self.longest(asked, limit));
-        let sent = self.ask(asked, phase);
-        let sent = sent.map(|head_start| Sent {
+        let _busy = self.supervised.busy(self.latest_end(asked, limit));
+        let sent = self.write_question(asked, phase);
+        let question = sent.map(|early_cpu_time| PendingQuestion {
             phase,
             limit_s,
-            wait: Wait::begin(Some(glance), asked, Instant::now(), limit),
-            head_start,
+            wait: AnswerWait::begin(Some(baseline), asked, Instant::now(), limit),
+            early_cpu_time,
         });
-        self.unless_ended(sent, phase, limit_s, asked)
+        self.prefer_kill_reason(question, phase, limit_s, asked)
     }
 
-    /// Sends the line; returns the agent's head start.
-    fn ask(&mut self, asked: Instant, phase: Phase) -> Result<Duration, Trouble> {
+    /// Sends the line; returns the agent's CPU time since its last answer.
+    fn write_question(&mut self, asked: Instant, phase: Phase) -> Result<Duration, SessionError> {
         self.process.thaw();
-        // During start-up anything counts as an answer: the agent runs before `hello` is sent.
+        // During start-up any output counts as the answer, because the agent runs before `hello` is sent.
         if phase != Phase::StartUp && self.process.has_pending_output()? {
-            return Err(self.early(phase));
+            return Err(self.early_output_error(phase));
         }
-        let head_start = self.cpu.asked(asked, || self.process.cpu_time_s());
+        let early_cpu_time = self.cpu.record_question(asked, || self.process.cpu_time_s());
         match self.process.send_line(&self.line) {
-            Ok(()) => Ok(head_start),
-            Err(WriteError::Closed) => Err(self.closed()),
+            Ok(()) => Ok(early_cpu_time),
+            Err(WriteError::Closed) => Err(self.closed_error()),
             Err(WriteError::Platform(error)) => Err(error.into()),
         }
     }
 
-    /// The latest that all limits of a wait can be over, however often it is extended.
-    fn longest(&self, asked: Instant, limit: Duration) -> Instant {
-        asked + limit * (1 + LONGEST_EXTENSION) + self.exit_grace
+    /// The latest possible end of a wait, after all extensions of its limit.
+    fn latest_end(&self, asked: Instant, limit: Duration) -> Instant {
+        asked + limit * (1 + MAX_EXTENSION) + self.exit_grace
     }
 
-    /// What the supervisor says is what happened: the rest follows from the agent's death.
-    fn unless_ended<T>(
+    /// Replaces the result if the supervisor killed the agent: other errors only follow from the agent's death.
+    fn prefer_kill_reason<T>(
         &self,
-        came: Result<T, Trouble>,
+        result: Result<T, SessionError>,
         phase: Phase,
         limit_s: f64,
         asked: Instant,
-    ) -> Result<T, Trouble> {
-        match self.supervised.ended() {
-            None => came,
-            Some(Ended::Cancelled) => Err(PlatformFault::Cancelled.into()),
-            Some(Ended::Stalled) => Err(Trouble::Late {
+    ) -> Result<T, SessionError> {
+        match self.supervised.kill_reason() {
+            None => result,
+            Some(KillReason::Cancelled) => Err(PlatformFault::Cancelled.into()),
+            Some(KillReason::Stalled) => Err(SessionError::TimedOut {
                 fault: AgentFaultKind::TimedOut { phase, limit_s },
-                waited: Box::new(Waited {
+                wait: Box::new(WaitBreakdown {
                     wall: asked.elapsed(),
-                    host: Duration::ZERO,
-                    head_start: Duration::ZERO,
+                    host_interference: Duration::ZERO,
+                    early_cpu_time: Duration::ZERO,
                     cpu_time_s: None,
                 }),
             }),
         }
     }
 
-    /// The counters before a question, which may be as old as [`GLANCE_LASTS`]: to read them for each of an
-    /// instant agent's questions would cost more than the answer. They are the kernel's: no agent holds one.
-    fn glance(&mut self, phase: Phase) -> Arc<Glance> {
+    /// The counters before a question, at most [`BASELINE_MAX_AGE`] old: reading them for each question to a quick
+    /// agent would cost more than the answer. They are kernel files, so no agent can block the read.
+    fn baseline(&mut self, phase: Phase) -> Arc<Baseline> {
         if phase != Phase::Step {
-            self.process.know_threads();
-            self.glance = None;
+            self.process.track_threads();
+            self.baseline = None;
         }
-        match &self.glance {
-            Some(glance) if glance.at.elapsed() < GLANCE_LASTS => Arc::clone(glance),
+        match &self.baseline {
+            Some(baseline) if baseline.at.elapsed() < BASELINE_MAX_AGE => Arc::clone(baseline),
             _ => {
-                let glance = self.process.glance_at_cpus(self.own_cpus.as_deref());
-                Arc::clone(self.glance.insert(Arc::new(glance)))
+                let baseline = self.process.read_baseline(self.evaluator_cpus.as_deref());
+                Arc::clone(self.baseline.insert(Arc::new(baseline)))
             }
         }
     }
 
-    /// Stops the agent until it is asked again, where the host has something that does.
+    /// Freezes the agent until its next question, if the host can.
     pub fn freeze(&mut self) {
         self.process.freeze();
     }
 
-    /// Can it be stopped?
+    /// Can the host freeze the agent?
     pub fn can_freeze(&self) -> bool {
         self.process.can_freeze()
     }
 
-    /// Waits for the answer until `until`, which may have passed, or until its limit is over; `None` if it
-    /// may still come.
-    pub fn poll(&mut self, sent: &mut Sent, until: Instant) -> Result<Option<Answer>, Trouble> {
-        let (phase, limit_s, asked) = (sent.phase, sent.limit_s, sent.wait.asked);
-        let due = self.longest(asked, TimeLimits::duration(limit_s));
-        let _busy = self.supervised.busy(due);
-        let came = self.await_answer(sent, until);
-        self.unless_ended(came, phase, limit_s, asked)
+    /// Waits for the answer until `until`, which may have passed, or until its limit has passed. `None` if the answer
+    /// is still pending.
+    pub fn poll(&mut self, question: &mut PendingQuestion, until: Instant) -> Result<Option<Answer>, SessionError> {
+        let (phase, limit_s, asked) = (question.phase, question.limit_s, question.wait.asked);
+        let latest_end = self.latest_end(asked, TimeLimits::duration(limit_s));
+        let _busy = self.supervised.busy(latest_end);
+        let result = self.await_answer(question, until);
+        self.prefer_kill_reason(result, phase, limit_s, asked)
     }
 
-    fn await_answer(&mut self, sent: &mut Sent, until: Instant) -> Result<Option<Answer>, Trouble> {
-        if self.own_cpus.is_some() && self.is_quick {
-            self.process.look_out(until.min(sent.wait.asked + QUICK))?;
+    fn await_answer(&mut self, question: &mut PendingQuestion, until: Instant) -> Result<Option<Answer>, SessionError> {
+        if self.evaluator_cpus.is_some() && self.is_quick {
+            self.process.spin_until(until.min(question.wait.asked + SPIN_TIME))?;
         }
         loop {
-            let stop = until.min(sent.wait.wake);
+            let stop = until.min(question.wait.wake);
             match self.process.read_line(MAX_LINE_BYTES, stop)? {
-                // It cannot know yet what it is asked.
+                // The question is not sent completely, so this line cannot be its answer.
                 ReadLine::Line { bytes, .. }
-                    if sent.phase != Phase::StartUp && !self.process.has_taken_all() =>
+                    if question.phase != Phase::StartUp && !self.process.is_all_sent() =>
                 {
-                    return Err(unasked(sent.phase, &bytes));
+                    return Err(unsolicited_line(question.phase, &bytes));
                 }
-                ReadLine::Line { bytes, at } => return Ok(Some(self.answer(sent, bytes, at))),
+                ReadLine::Line { bytes, at } => return Ok(Some(self.answer(question, bytes, at))),
                 ReadLine::TooLong { head } => return Err(too_long(&head)),
-                ReadLine::Closed => return Err(self.closed()),
+                ReadLine::Closed => return Err(self.closed_error()),
                 ReadLine::TimedOut => {
-                    sent.wait.nothing_is_there();
-                    self.look(sent)?;
+                    question.wait.clear_absence();
+                    self.check_wait(question)?;
                 }
             }
             if until <= stop {
@@ -252,35 +253,34 @@ impl<'w> Exchange<'w> {
     }
 
     /// Waits for the answer.
-    pub fn wait(&mut self, sent: &mut Sent) -> Result<Answer, Trouble> {
+    pub fn wait(&mut self, question: &mut PendingQuestion) -> Result<Answer, SessionError> {
         loop {
-            let until = Instant::now() + TimeLimits::LONGEST;
-            if let Some(answer) = self.poll(sent, until)? {
+            let until = Instant::now() + TimeLimits::MAX_WAIT;
+            if let Some(answer) = self.poll(question, until)? {
                 return Ok(answer);
             }
         }
     }
 
-    /// Waits until one of several agents has something for [`Self::poll`], which is due at `until` in any
-    /// case.
-    pub fn wait_for_any(asked: &[(&Self, &Sent)], until: Instant) -> Result<(), PlatformFault> {
-        let _busy: Vec<Busy> = asked
+    /// Waits until [`Self::poll`] has something to do for one of several agents, or until `until`.
+    pub fn wait_for_any(exchanges: &[(&Self, &PendingQuestion)], until: Instant) -> Result<(), PlatformFault> {
+        let _busy: Vec<BusyGuard> = exchanges
             .iter()
-            .map(|(one, sent)| {
-                let limit = TimeLimits::duration(sent.limit_s);
-                one.supervised.busy(one.longest(sent.wait.asked, limit))
+            .map(|(exchange, question)| {
+                let limit = TimeLimits::duration(question.limit_s);
+                exchange.supervised.busy(exchange.latest_end(question.wait.asked, limit))
             })
             .collect();
-        let processes: Vec<&AgentProcess> = asked.iter().map(|(one, _)| &one.process).collect();
-        let until = asked
+        let processes: Vec<&AgentProcess> = exchanges.iter().map(|(exchange, _)| &exchange.process).collect();
+        let until = exchanges
             .iter()
-            .fold(until, |until, (_, sent)| until.min(sent.wait.wake));
+            .fold(until, |until, (_, question)| until.min(question.wait.wake));
         Ok(AgentProcess::wait_for_any(&processes, until)?)
     }
 
-    /// Sends a message that is not answered, without waiting. What the agent leaves no room for costs it
-    /// time at the next question; if it no longer listens, it meets its fault there.
-    pub fn tell(&mut self, message: &Message<'_>) -> Result<(), PlatformFault> {
+    /// Sends a message that has no answer, without blocking. Bytes that do not fit into the agent's input cost it time
+    /// at the next question. If its input is closed, the next question reports the fault.
+    pub fn notify(&mut self, message: &Message<'_>) -> Result<(), PlatformFault> {
         message.write_line(&mut self.line);
         let _busy = self.supervised.busy(Instant::now() + self.exit_grace);
         match self.process.send_line(&self.line) {
@@ -289,64 +289,65 @@ impl<'w> Exchange<'w> {
         }
     }
 
-    fn answer(&mut self, sent: &Sent, bytes: Vec<u8>, at: Instant) -> Answer {
+    fn answer(&mut self, question: &PendingQuestion, bytes: Vec<u8>, at: Instant) -> Answer {
         let used_s = self.process.cpu_time_s();
-        let waited = self.waited(sent, at, used_s, AnswerState::Taken);
-        self.cpu.answered(at, used_s);
-        self.is_quick = waited.wall < QUICK;
-        Answer { bytes, waited }
+        let wait = self.wait_breakdown(question, at, used_s, AnswerState::Received);
+        self.cpu.record_answer(at, used_s);
+        self.is_quick = wait.wall < SPIN_TIME;
+        Answer { bytes, wait }
     }
 
-    /// Nothing has come when the evaluator wanted to be woken.
-    fn look(&mut self, sent: &mut Sent) -> Result<(), Trouble> {
+    /// Handles a wake-up without an answer: checks the limit and samples the counters.
+    fn check_wait(&mut self, question: &mut PendingQuestion) -> Result<(), SessionError> {
         let now = Instant::now();
-        if now >= sent.wait.deadline {
+        if now >= question.wait.deadline {
             let used_s = self.process.cpu_time_s();
-            let waited = self.waited(sent, now, used_s, AnswerState::Pending);
+            let wait = self.wait_breakdown(question, now, used_s, AnswerState::Pending);
             let fault = AgentFaultKind::TimedOut {
-                phase: sent.phase,
-                limit_s: sent.limit_s,
+                phase: question.phase,
+                limit_s: question.limit_s,
             };
-            let (over, waited) = (sent.wait.extend(now, waited.host), Box::new(waited));
-            return match over {
-                Over::No => Ok(()),
-                Over::ByTheAgent => Err(Trouble::Late { fault, waited }),
-                Over::ByTheHost => Err(Trouble::Host { fault, waited }),
+            let extension = question.wait.extend(now, wait.host_interference);
+            let wait = Box::new(wait);
+            return match extension {
+                Extension::Extended => Ok(()),
+                Extension::AgentTimeout => Err(SessionError::TimedOut { fault, wait }),
+                Extension::HostTimeout => Err(SessionError::HostInterference { fault, wait }),
             };
         }
-        let wait = &mut sent.wait;
+        let wait = &mut question.wait;
         if now >= wait.wake {
-            if wait.is_first_look() {
-                // Those that it has begun since are among them, too.
-                self.process.know_threads();
+            if wait.is_first_sample() {
+                // Includes the threads that it has started since the question.
+                self.process.track_threads();
             }
-            wait.look(self.process.read_cpus());
-            // From when it was seen that nothing is there: an evaluator that is held up after that is late.
-            wait.sleep_on(now);
+            wait.add_sample(self.process.sample_cpus());
+            // Counted from the check above: a delay of the evaluator after the check counts as lateness.
+            wait.schedule_wake(now);
         }
         Ok(())
     }
 
-    /// The wait for an answer until `now`, when the agent had used `used_s` of CPU time.
-    fn waited(
+    /// Breakdown of the wait until `now`. `used_s`: the agent's CPU time so far.
+    fn wait_breakdown(
         &self,
-        sent: &Sent,
+        question: &PendingQuestion,
         now: Instant,
         used_s: Option<f64>,
         answer: AnswerState,
-    ) -> Waited {
+    ) -> WaitBreakdown {
         let ran_s = self.cpu.since_question_s(used_s);
-        Waited {
-            wall: now.saturating_duration_since(sent.wait.asked),
-            host: self.taken_by_host(&sent.wait, now, ran_s, answer),
-            head_start: sent.head_start,
+        WaitBreakdown {
+            wall: now.saturating_duration_since(question.wait.asked),
+            host_interference: self.host_interference(&question.wait, now, ran_s, answer),
+            early_cpu_time: question.early_cpu_time,
             cpu_time_s: self.cpu.since_answer_s(used_s),
         }
     }
 
-    fn taken_by_host(
+    fn host_interference(
         &self,
-        wait: &Wait,
+        wait: &AnswerWait,
         now: Instant,
         ran_s: Option<f64>,
         answer: AnswerState,
@@ -354,18 +355,22 @@ impl<'w> Exchange<'w> {
         if !wait.is_late(now) {
             return Duration::ZERO;
         }
-        let taken =
-            self.process
-                .taken_from_it_since(wait.asked, wait.looks(), wait.cpus_before(), answer);
-        let own = self.own_cpus.as_deref().zip(wait.own_before());
-        let evidence = Evidence {
+        let interference = self.process.interference_since(
+            wait.asked,
+            wait.samples(),
+            wait.baseline_cpus(),
+            answer,
+        );
+        let evaluator = self.evaluator_cpus.as_deref().zip(wait.baseline_caller());
+        let counters = WaitCounters {
             now,
-            kept: taken.map(|taken| taken.kept),
-            stolen: taken.map_or(Duration::ZERO, |taken| taken.stolen),
-            agent_ran: ran_s.map(TimeLimits::duration),
-            own_wait: own.map(|(cpus, before)| self.process.own_wait(cpus).since(before)),
+            run_delay: interference.map(|interference| interference.run_delay),
+            stolen: interference.map_or(Duration::ZERO, |interference| interference.stolen),
+            agent_run_time: ran_s.map(TimeLimits::duration),
+            evaluator_run_delay: evaluator
+                .map(|(cpus, before)| self.process.caller_counters(cpus).run_delay_since(before)),
         };
-        wait.taken(self.watch, evidence)
+        wait.interference(self.monitor, counters)
     }
 
     /// Gives the agent `grace` to exit, then kills it; returns the end of its standard error.
@@ -379,28 +384,28 @@ impl<'w> Exchange<'w> {
         Ok(process.finish(grace)?.stderr_tail)
     }
 
-    /// The agent has written before it was asked, or has closed its output.
-    fn early(&mut self, phase: Phase) -> Trouble {
+    /// The error for output before the question, or for a closed output.
+    fn early_output_error(&mut self, phase: Phase) -> SessionError {
         match self.process.read_line(MAX_LINE_BYTES, Instant::now()) {
-            Ok(ReadLine::Line { bytes, .. }) => unasked(phase, &bytes),
-            Ok(ReadLine::TimedOut) => unasked_for(phase).into(),
+            Ok(ReadLine::Line { bytes, .. }) => unsolicited_line(phase, &bytes),
+            Ok(ReadLine::TimedOut) => unsolicited_output(phase).into(),
             Ok(ReadLine::TooLong { head }) => too_long(&head),
-            Ok(ReadLine::Closed) => self.closed(),
+            Ok(ReadLine::Closed) => self.closed_error(),
             Err(error) => error.into(),
         }
     }
 
-    /// The agent's end of a channel is closed: by exit, by a kill, or by itself.
-    fn closed(&mut self) -> Trouble {
+    /// The error for a closed channel: by exit, by a kill, or by the agent itself.
+    fn closed_error(&mut self) -> SessionError {
         match self.process.diagnose_end(self.exit_grace) {
             Ok(end) => end.unwrap_or(AgentFaultKind::ClosedOutput).into(),
-            Err(ours) => ours.into(),
+            Err(error) => error.into(),
         }
     }
 }
 
-/// What the agent sees beside its bundle: its image, or the runtime that it names; or why it cannot be had.
-fn runtime_of(bundle: &Bundle, env: &AgentEnvironment) -> Result<Runtime, String> {
+/// The agent's runtime: its image, or the runtime that its manifest names. The error says why it is not available.
+fn find_runtime(bundle: &Bundle, env: &AgentEnvironment) -> Result<Runtime, String> {
     let name = &bundle.manifest.runtime;
     if let Some(image) = &bundle.image {
         if !env.isolation.enforces(Layer::Namespaces) {
@@ -410,34 +415,34 @@ fn runtime_of(bundle: &Bundle, env: &AgentEnvironment) -> Result<Runtime, String
             );
         }
         if env.images {
-            return Ok(Runtime::of_image(&image.root, image.path()));
+            return Ok(Runtime::from_image(&image.root, image.path()));
         }
     } else if let Some(runtime) = env.runtimes.get(name) {
         return Ok(runtime.clone());
     }
     Err(format!(
         "the runtime {name:?} of agent.toml is not offered here; offered: {}",
-        env.offered().join(", ")
+        env.runtime_names().join(", ")
     ))
 }
 
-fn too_long(head: &[u8]) -> Trouble {
-    Trouble::Agent {
+fn too_long(head: &[u8]) -> SessionError {
+    SessionError::Agent {
         fault: answer::too_long(),
         line: Some(quote_line(head)),
     }
 }
 
-fn unasked_for(phase: Phase) -> AgentFaultKind {
+fn unsolicited_output(phase: Phase) -> AgentFaultKind {
     AgentFaultKind::WrongMessage {
         expected: format!("no output before the next question ({phase})"),
         got: "a line that was not asked for".to_owned(),
     }
 }
 
-fn unasked(phase: Phase, line: &[u8]) -> Trouble {
-    Trouble::Agent {
-        fault: unasked_for(phase),
+fn unsolicited_line(phase: Phase, line: &[u8]) -> SessionError {
+    SessionError::Agent {
+        fault: unsolicited_output(phase),
         line: Some(quote_line(line)),
     }
 }

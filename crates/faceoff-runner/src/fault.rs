@@ -1,85 +1,82 @@
-use crate::waited::Waited;
+use crate::wait_breakdown::WaitBreakdown;
 use faceoff_dataset::RecordingError;
-use faceoff_episode::{NotFinite, RecordError};
+use faceoff_episode::{NonFiniteObservation, RecordError};
 use faceoff_sandbox::SandboxError;
-use faceoff_types::{AgentFaultKind, tells_of_full_disk};
+use faceoff_types::{AgentFaultKind, is_full_disk};
 use std::io;
 
-/// What ended a conversation.
+/// Failure of a session with an agent.
 #[derive(Debug)]
-pub enum Trouble {
+pub enum SessionError {
     /// The agent broke the protocol or a limit.
     Agent {
         fault: AgentFaultKind,
-        /// The offending line, cut, where there was one.
+        /// The offending line, shortened, if there is one.
         line: Option<String>,
     },
-    /// No answer came within a hard limit, and the host does not explain that.
-    Late {
+    /// The agent did not answer within a hard limit, and host interference does not explain that.
+    TimedOut {
         fault: AgentFaultKind,
-        /// Whose time it was.
-        waited: Box<Waited>,
+        wait: Box<WaitBreakdown>,
     },
-    /// No answer came within a hard limit that was extended by what the host took, and the host explains
-    /// it.
-    Host {
-        /// What it is if the try is not played again.
+    /// No answer came within a hard limit that was extended by host interference, which explains the missing answer.
+    HostInterference {
+        /// The agent fault to report if the try is not repeated.
         fault: AgentFaultKind,
-        /// Whose time it was.
-        waited: Box<Waited>,
+        wait: Box<WaitBreakdown>,
     },
     Platform(PlatformFault),
 }
 
-impl From<AgentFaultKind> for Trouble {
+impl From<AgentFaultKind> for SessionError {
     fn from(fault: AgentFaultKind) -> Self {
         Self::Agent { fault, line: None }
     }
 }
 
-impl From<PlatformFault> for Trouble {
+impl From<PlatformFault> for SessionError {
     fn from(fault: PlatformFault) -> Self {
         Self::Platform(fault)
     }
 }
 
-impl From<SandboxError> for Trouble {
+impl From<SandboxError> for SessionError {
     fn from(error: SandboxError) -> Self {
         Self::Platform(error.into())
     }
 }
 
-impl From<NotFinite> for Trouble {
-    fn from(error: NotFinite) -> Self {
+impl From<NonFiniteObservation> for SessionError {
+    fn from(error: NonFiniteObservation) -> Self {
         Self::Platform(error.into())
     }
 }
 
-/// What failed on our side. The shard is to be run again; the agent is never blamed for it.
+/// A platform fault. The job must be run again; the agent is never blamed for it.
 #[derive(Debug, thiserror::Error)]
 pub enum PlatformFault {
     /// The sandbox could not be set up or observed.
     #[error(transparent)]
     Sandbox(#[from] SandboxError),
     /// A file could not be read or written.
-    #[error("{what}: {source}")]
+    #[error("{action}: {source}")]
     Io {
-        what: String,
+        /// The failed action.
+        action: String,
         source: io::Error,
     },
-    /// There was no room for a recording; the text says for what.
+    /// The disk has no space left for a recording; the text names the file.
     #[error("the disk is full: {0}")]
     FullDisk(String),
-    /// A recording could not be made, or is not what was recorded.
+    /// A recording could not be written, or its content is wrong.
     #[error("recording: {0}")]
     Recording(String),
-    /// The simulator's world stopped being finite.
+    /// The simulated state became infinite or NaN.
     #[error(transparent)]
-    Simulation(#[from] NotFinite),
-    /// The host kept an agent from answering, again and again, in a run that is for nothing but a verdict
-    /// on the agent.
-    #[error("the host kept the agent from answering ({0})")]
-    HostBusy(Waited),
+    Simulation(#[from] NonFiniteObservation),
+    /// Host interference repeatedly prevented an agent's answer, in a run that needs a verdict on the agent.
+    #[error("host interference prevented the agent's answer ({0})")]
+    HostBusy(WaitBreakdown),
     /// The observer asked to stop.
     #[error("cancelled")]
     Cancelled,
@@ -88,7 +85,7 @@ pub enum PlatformFault {
 impl From<RecordError> for PlatformFault {
     fn from(error: RecordError) -> Self {
         let recording = error.source.downcast_ref();
-        if matches!(recording, Some(RecordingError::FullDisk(_))) || tells_of_full_disk(&error) {
+        if matches!(recording, Some(RecordingError::FullDisk(_))) || is_full_disk(&error) {
             Self::FullDisk(error.to_string())
         } else {
             Self::Recording(error.to_string())
@@ -100,19 +97,19 @@ impl From<RecordingError> for PlatformFault {
     fn from(error: RecordingError) -> Self {
         match error {
             RecordingError::Io(source) => Self::Io {
-                what: "recording".to_owned(),
+                action: "recording".to_owned(),
                 source,
             },
-            RecordingError::FullDisk(what) => Self::FullDisk(what),
-            RecordingError::Unusable(what) => Self::Recording(what),
+            RecordingError::FullDisk(detail) => Self::FullDisk(detail),
+            RecordingError::Unusable(detail) => Self::Recording(detail),
         }
     }
 }
 
 impl PlatformFault {
-    /// Turns an I/O error into a fault that says what was attempted.
-    pub(crate) fn io(what: impl Into<String>) -> impl FnOnce(io::Error) -> Self {
-        let what = what.into();
-        move |source| Self::Io { what, source }
+    /// Turns an I/O error into a fault that names the failed action.
+    pub(crate) fn io(action: impl Into<String>) -> impl FnOnce(io::Error) -> Self {
+        let action = action.into();
+        move |source| Self::Io { action, source }
     }
 }

@@ -1,9 +1,9 @@
-//! One game between two agents: two sandboxed processes in lock-step → recording and report.
+//! A game between two agents: two sandboxed processes in lock-step → recording and report.
 
-mod commentary;
+mod live_feed;
 mod lock_step;
 mod report;
 mod side_player;
 
-pub use commentary::{Commentary, GameAudience, POSITION_EVERY};
-pub use report::{GameObserver, GameReport, play_game, run_game, run_game_watched};
+pub use live_feed::{LiveFeed, LiveFeedSink, POSITION_INTERVAL};
+pub use report::{GameObserver, GameReport, play_game, run_game, run_game_monitored};

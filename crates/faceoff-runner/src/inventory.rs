@@ -1,4 +1,4 @@
-//! What each runtime holds, told by itself, inside the sandbox in which agents find it.
+//! Inventory of the runtimes: each one reports its content from inside the agents' sandbox.
 
 use crate::config::AgentEnvironment;
 use faceoff_sandbox::{AgentProcess, Isolation, ReadLine, Runtime, SpawnSpec};
@@ -13,45 +13,45 @@ use std::{
 };
 use tempfile::TempDir;
 
-/// Far more than an interpreter takes to start and to list some hundred packages.
-const PATIENCE: Duration = Duration::from_secs(60);
-/// Room for some ten thousand packages.
+/// Far more than an interpreter takes to start and to list a few hundred packages.
+const TIMEOUT: Duration = Duration::from_secs(60);
+/// Enough for about ten thousand packages.
 const MAX_LINE_BYTES: usize = 1 << 20;
-/// The program that is asked for the C library where there is no interpreter.
+/// Dynamic loaders, which print the version of the C library in a runtime without an interpreter.
 const LOADERS: [&str; 2] = ["/lib64/ld-linux-x86-64.so.2", "/lib/ld-linux-aarch64.so.1"];
 /// Prints one line of JSON.
-const QUESTION: &str = include_str!("inventory.py");
+const SCRIPT: &str = include_str!("inventory.py");
 
-/// Asks each runtime of `env`, one after another, on the CPUs and within the limits of an agent. One that does not
-/// answer is [`RuntimeContent::Broken`] and says why. Container images come last, where they are run.
+/// Inspects each runtime of `env`, one after another, on the CPUs and within the limits of an agent. A runtime that
+/// does not answer is [`RuntimeContent::Failed`], with the reason. Container images come last, if they are supported.
 #[must_use]
-pub fn inventory(env: &AgentEnvironment) -> Vec<RuntimeInventory> {
+pub fn take_inventory(env: &AgentEnvironment) -> Vec<RuntimeInventory> {
     let ask = |(name, runtime): (&String, &Runtime)| RuntimeInventory {
         name: name.clone(),
-        content: look_into(env, runtime).unwrap_or_else(|why| RuntimeContent::Broken { why }),
+        content: inspect(env, runtime).unwrap_or_else(|reason| RuntimeContent::Failed { reason }),
     };
-    let image = env.runs_images().then(|| RuntimeInventory {
+    let image = env.supports_images().then(|| RuntimeInventory {
         name: IMAGE_RUNTIME.to_owned(),
         content: RuntimeContent::Image,
     });
     env.runtimes.iter().map(ask).chain(image).collect()
 }
 
-/// What one runtime holds, or why that cannot be told.
-fn look_into(env: &AgentEnvironment, runtime: &Runtime) -> Result<RuntimeContent, String> {
+/// The content of one runtime, or the reason why it is unknown.
+fn inspect(env: &AgentEnvironment, runtime: &Runtime) -> Result<RuntimeContent, String> {
     if let Some(path) = runtime.read_only_paths.iter().find(|path| !path.exists()) {
         return Err(format!("{} does not exist", path.display()));
     }
-    let is_open = env.isolation == Isolation::None;
-    let shown = |path: &Path| {
-        is_open
+    let is_unconfined = env.isolation == Isolation::None;
+    let is_visible = |path: &Path| {
+        is_unconfined
             || runtime
                 .read_only_paths
                 .iter()
                 .any(|root| path.starts_with(root))
     };
-    if runtime.interpreter().is_some_and(|python| shown(&python)) {
-        let line = answer(env, runtime, &["python3", "-c", QUESTION])?;
+    if runtime.interpreter().is_some_and(|python| is_visible(&python)) {
+        let line = first_line(env, runtime, &["python3", "-c", SCRIPT])?;
         return serde_json::from_str::<Answer>(&line)
             .map(|answer| RuntimeContent::Python(answer.into()))
             .map_err(|error| {
@@ -59,13 +59,13 @@ fn look_into(env: &AgentEnvironment, runtime: &Runtime) -> Result<RuntimeContent
             });
     }
     let loader = LOADERS.iter().find(|loader| Path::new(loader).exists());
-    let libc = loader.and_then(|loader| answer(env, runtime, &[loader, "--version"]).ok());
+    let libc = loader.and_then(|loader| first_line(env, runtime, &[loader, "--version"]).ok());
     Ok(RuntimeContent::Native {
         libc: libc.as_deref().and_then(libc_version),
     })
 }
 
-/// As `inventory.py` prints it.
+/// Output of `inventory.py`.
 #[derive(Deserialize)]
 struct Answer {
     implementation: String,
@@ -86,7 +86,7 @@ impl From<Answer> for PythonInventory {
 }
 
 /// The first line that `command` prints in an empty bundle.
-fn answer(env: &AgentEnvironment, runtime: &Runtime, command: &[&str]) -> Result<String, String> {
+fn first_line(env: &AgentEnvironment, runtime: &Runtime, command: &[&str]) -> Result<String, String> {
     let bundle = empty_bundle().map_err(|error| format!("cannot make a folder: {error}"))?;
     let spec = SpawnSpec {
         bundle_dir: bundle.path().to_owned(),
@@ -99,7 +99,7 @@ fn answer(env: &AgentEnvironment, runtime: &Runtime, command: &[&str]) -> Result
     };
     let mut process = AgentProcess::spawn(&spec).map_err(|error| error.to_string())?;
     let line = process
-        .read_line(MAX_LINE_BYTES, Instant::now() + PATIENCE)
+        .read_line(MAX_LINE_BYTES, Instant::now() + TIMEOUT)
         .map_err(|error| error.to_string())?;
     if let ReadLine::Line { bytes, .. } = line {
         return Ok(String::from_utf8_lossy(&bytes).into_owned());
@@ -109,14 +109,14 @@ fn answer(env: &AgentEnvironment, runtime: &Runtime, command: &[&str]) -> Result
     Err(format!("{} gave no answer: {last}", command[0]))
 }
 
-/// A folder that an agent of another user can pass through.
+/// An empty folder that an agent running as another user can enter.
 fn empty_bundle() -> std::io::Result<TempDir> {
     let folder = tempfile::tempdir()?;
     fs::set_permissions(folder.path(), fs::Permissions::from_mode(0o755))?;
     Ok(folder)
 }
 
-/// Of `ld.so (…) stable release version 2.36.`
+/// Version in a line like `ld.so (…) stable release version 2.36.`
 fn libc_version(line: &str) -> Option<String> {
     let (_, version) = line.rsplit_once("version ")?;
     let version = version.trim().trim_end_matches('.');
@@ -130,7 +130,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_loaders_answer_is_understood_or_left() {
+    fn libc_version_is_parsed_or_absent() {
         let debian = "ld.so (Debian GLIBC 2.36-9+deb12u10) stable release version 2.36.";
         assert_eq!(libc_version(debian).as_deref(), Some("2.36"));
         for other in ["", "version", "musl libc (x86_64)", "version x.y."] {

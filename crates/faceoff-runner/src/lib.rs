@@ -1,47 +1,46 @@
 //! Runs one agent over one shard of an evaluation, or two agents through a game: bundle → sandboxed
 //! process ⇄ JSON lines ⇄ simulator → recording and report.
 //!
-//! Two kinds of failure never mix: what the agent does wrong is an
-//! [`AgentFault`](faceoff_types::AgentFault) inside of a report that succeeded, what fails on our
-//! side is a [`PlatformFault`] and yields no report.
+//! Agent faults and platform faults never mix. An agent fault is an
+//! [`AgentFault`](faceoff_types::AgentFault) inside a successful report. A platform fault is a
+//! [`PlatformFault`] and yields no report.
 //!
-//! This crate reads no environment variable and no configuration file, speaks no HTTP and knows no
-//! database. It measures time around the agent's channel, which is its job; all else that it computes
-//! follows from the seeds.
+//! This crate reads no environment variable and no configuration file, speaks no HTTP and uses no
+//! database. It measures time around the agent's channel; all other results follow from the seeds.
 
 mod budget;
 pub mod bundle;
 mod calibration;
 mod config;
-mod cpu_use;
+mod cpu_usage;
 mod exchange;
 mod fault;
 mod game;
-mod host_watch;
+mod host_interference;
 mod inventory;
 mod log;
 mod player;
 mod session;
 mod shard;
-mod smoke;
+mod validation;
 mod supervisor;
-mod waited;
+mod wait_breakdown;
 mod wire_env;
 
 pub use config::AgentEnvironment;
 pub use faceoff_dataset::{Assembled, CLIPS_FILE, ShardReport, assemble, game::GameArchives};
 pub use faceoff_types::TimeLimits;
 pub use faceoff_wire::game::{GameCalibration, GameSpec};
-pub use faceoff_wire::work::{EvaluationMeta, ShardSpec, SmokeSpec};
-pub use fault::{PlatformFault, Trouble};
+pub use faceoff_wire::job::{EvaluationMeta, ShardSpec, ValidationSpec};
+pub use fault::{PlatformFault, SessionError};
 pub use game::{
-    Commentary, GameAudience, GameObserver, GameReport, POSITION_EVERY, play_game, run_game,
-    run_game_watched,
+    LiveFeed, LiveFeedSink, GameObserver, GameReport, POSITION_INTERVAL, play_game, run_game,
+    run_game_monitored,
 };
-pub use host_watch::{Counters, HostWatch};
-pub use inventory::inventory;
+pub use host_interference::{KernelCounters, InterferenceMonitor};
+pub use inventory::take_inventory;
 pub use session::Session;
-pub use shard::{Observer, play_shard, run_shard, run_shard_watched};
-pub use smoke::{SMOKE_STEPS, SmokeDefect, SmokeReport, smoke, smoke_watched};
-pub use supervisor::{Supervision, standing_still};
-pub use waited::Waited;
+pub use shard::{Observer, play_shard, run_shard, run_shard_monitored};
+pub use validation::{VALIDATION_STEPS, ValidationFailure, ValidationReport, validate, validate_monitored};
+pub use supervisor::{Supervision, stuck_threads};
+pub use wait_breakdown::WaitBreakdown;

@@ -1,7 +1,6 @@
-use faceoff_types::harmless;
+use faceoff_types::escape_unprintable;
 
-/// The end of what an agent's processes wrote to standard error, one after the other, harmless to
-/// whoever looks at it.
+/// The end of the standard error of an agent's successive processes, with control characters escaped.
 #[derive(Debug)]
 pub(crate) struct Log {
     text: String,
@@ -9,7 +8,7 @@ pub(crate) struct Log {
 }
 
 impl Log {
-    /// An empty log that keeps its last bytes.
+    /// An empty log that keeps its last `limit_bytes`.
     pub fn new(limit_bytes: u64) -> Self {
         Self {
             text: String::new(),
@@ -17,15 +16,15 @@ impl Log {
         }
     }
 
-    /// Adds what one process wrote, and why it ended, if that was a fault.
+    /// Adds the output of one process, and the fault that ended it, if any.
     pub fn add(&mut self, stderr: &str, fault: Option<&str>) {
-        self.text.push_str(&harmless(stderr));
+        self.text.push_str(&escape_unprintable(stderr));
         if !self.text.is_empty() && !self.text.ends_with('\n') {
             self.text.push('\n');
         }
         if let Some(fault) = fault {
             self.text.push_str("[faceoff] ");
-            self.text.push_str(&harmless(fault));
+            self.text.push_str(&escape_unprintable(fault));
             self.text.push('\n');
         }
         if self.text.len() > self.limit_bytes {
@@ -47,7 +46,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_end_is_kept_and_characters_stay_whole() {
+    fn log_keeps_its_end_and_whole_characters() {
         let mut log = Log::new(10);
         log.add("", None);
         assert_eq!(log.text, "");

@@ -2,51 +2,51 @@ use crate::{
     budget::{EpisodeBudget, ResetBudget},
     bundle::Bundle,
     config::AgentEnvironment,
-    fault::{PlatformFault, Trouble},
-    host_watch::HostWatch,
+    fault::{PlatformFault, SessionError},
+    host_interference::InterferenceMonitor,
     log::Log,
     session::Session,
-    waited::Waited,
+    wait_breakdown::WaitBreakdown,
 };
-use faceoff_episode::{Arena, Course, Question, StepSink};
+use faceoff_episode::{Arena, RunningEpisode, Question, StepSink};
 use faceoff_types::{AgentFaultKind, EpisodeOutcome, Phase, Task};
 use std::time::Instant;
 
-/// Plays episodes of one task with one agent, which is restarted after a fault. An episode that the
-/// host ended is played again, by a new process, which knows nothing of the first try.
+/// Runs episodes of one task with one agent, which is restarted after a fault. An episode that host interference
+/// ended is run again by a new process, which knows nothing of the first try.
 pub(crate) struct Player<'a> {
     bundle: &'a Bundle,
     env: &'a AgentEnvironment,
     task: Task,
     arena: Arena,
-    /// None before the first episode and after a fault.
+    /// `None` before the first episode and after a fault.
     session: Option<Session<'a>>,
     log: Log,
     resets: ResetBudget,
-    watch: &'a dyn HostWatch,
-    replays: Replays,
-    /// The most that the host took of one answer, in seconds.
+    monitor: &'a dyn InterferenceMonitor,
+    reruns: Reruns,
+    /// Longest host interference in one answer, in seconds.
     longest_stall_s: f64,
-    /// Of the last episode: whose time it was that ended it.
-    waited: Option<Waited>,
-    if_the_host_wins: IfTheHostWins,
+    /// The wait that ended the last episode by a timeout.
+    wait: Option<WaitBreakdown>,
+    on_host_interference: OnHostInterference,
 }
 
-/// What becomes of an episode that the host ends again and again.
+/// Handling of an episode that host interference ends in all allowed tries.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum IfTheHostWins {
+pub(crate) enum OnHostInterference {
     /// The last try counts (RULES).
-    LastTryCounts,
-    /// It is a fault of ours: all is to be begun anew, later.
-    OurFault,
+    KeepLastTry,
+    /// It is a platform fault: the whole run must be repeated later.
+    PlatformFault,
 }
 
-/// Tries that were dropped and played again because the host kept the agent from answering.
-struct Replays {
-    played: u32,
-    /// At most so many.
+/// Counts tries that were dropped and repeated because of host interference.
+struct Reruns {
+    count: u32,
+    /// Maximum in total.
     limit: u32,
-    /// At most so many of one episode.
+    /// Maximum per episode.
     per_episode: u32,
 }
 
@@ -56,57 +56,57 @@ struct Try {
     blame: Blame,
 }
 
-/// Whose doing is the end of a try?
+/// Attribution of a try's end.
 #[derive(Debug, Clone, Copy)]
 enum Blame {
-    /// The agent's: by its answers.
+    /// The agent's answers.
     Agent,
-    /// The agent's: by one that did not come.
-    AgentsDelay(Waited),
-    /// The host kept the agent from answering.
-    Host(Waited),
+    /// A timeout of the agent.
+    AgentTimeout(WaitBreakdown),
+    /// Host interference prevented the answer.
+    Host(WaitBreakdown),
 }
 
-/// A fault, and the line that shows it.
-struct Ended {
+/// A fault that ended a try, with the offending line.
+struct TryFault {
     fault: AgentFaultKind,
     line: Option<String>,
     blame: Blame,
 }
 
-impl Ended {
-    /// What is not the platform's.
-    fn by(trouble: Trouble) -> Result<Self, PlatformFault> {
-        let (fault, line, blame) = match trouble {
-            Trouble::Platform(fault) => return Err(fault),
-            Trouble::Agent { fault, line } => (fault, line, Blame::Agent),
-            Trouble::Late { fault, waited } => (fault, None, Blame::AgentsDelay(*waited)),
-            Trouble::Host { fault, waited } => (fault, None, Blame::Host(*waited)),
+impl TryFault {
+    /// Separates agent faults from platform faults.
+    fn new(error: SessionError) -> Result<Self, PlatformFault> {
+        let (fault, line, blame) = match error {
+            SessionError::Platform(fault) => return Err(fault),
+            SessionError::Agent { fault, line } => (fault, line, Blame::Agent),
+            SessionError::TimedOut { fault, wait } => (fault, None, Blame::AgentTimeout(*wait)),
+            SessionError::HostInterference { fault, wait } => (fault, None, Blame::Host(*wait)),
         };
         Ok(Self { fault, line, blame })
     }
 }
 
-/// What ended a process at its start, and what it has left on standard error.
+/// A fault at the start of a process, and its standard error.
 struct StartUpFault {
-    ended: Ended,
+    fault: TryFault,
     stderr: String,
 }
 
-/// An episode under way, wherever it is recorded.
-type CourseTo<'a> = Course<&'a mut dyn StepSink>;
+/// A running episode with any recorder.
+type DynEpisode<'a> = RunningEpisode<&'a mut dyn StepSink>;
 
 impl<'a> Player<'a> {
-    /// The agent is started by the first episode. Of so many `episodes` a part may be played again for
-    /// the host's sake, and they bound the time of all resets.
+    /// The first episode starts the agent. `episodes` determines how many tries may be repeated because of host
+    /// interference, and the total time for resets.
     pub fn new(
         bundle: &'a Bundle,
         env: &'a AgentEnvironment,
         task: Task,
         episodes: u32,
         arena: Arena,
-        watch: &'a dyn HostWatch,
-        if_the_host_wins: IfTheHostWins,
+        monitor: &'a dyn InterferenceMonitor,
+        on_host_interference: OnHostInterference,
     ) -> Self {
         Self {
             bundle,
@@ -116,38 +116,38 @@ impl<'a> Player<'a> {
             session: None,
             log: Log::new(env.limits.stderr_tail_bytes),
             resets: ResetBudget::new(&env.time, episodes),
-            watch,
-            replays: Replays {
-                played: 0,
-                limit: env.time.host_noise_reruns_of(episodes),
+            monitor,
+            reruns: Reruns {
+                count: 0,
+                limit: env.time.max_host_noise_reruns(episodes),
                 per_episode: env.time.host_noise_reruns,
             },
             longest_stall_s: 0.0,
-            waited: None,
-            if_the_host_wins,
+            wait: None,
+            on_host_interference,
         }
     }
 
-    /// Whose time it was that ended the last episode, if that ended by an answer that did not come.
-    pub const fn waited(&self) -> Option<Waited> {
-        self.waited
+    /// The wait for the missing answer, if a timeout ended the last episode.
+    pub const fn last_wait(&self) -> Option<WaitBreakdown> {
+        self.wait
     }
 
-    /// Tries that were dropped so far because the host kept the agent from answering.
+    /// Number of tries dropped so far because of host interference.
     pub const fn host_noise_reruns(&self) -> u32 {
-        self.replays.played
+        self.reruns.count
     }
 
-    /// The most that the host took of one answer, in seconds.
+    /// Longest host interference in one answer, in seconds.
     pub const fn longest_stall_s(&self) -> f64 {
         self.longest_stall_s
     }
 
-    /// Plays one episode of at most `max_steps` control steps, again while the host ends it and the
-    /// limits of re-runs allow; the last try counts.
+    /// Runs one episode of at most `max_steps` control steps. Repeats it while host interference ends it and the limits
+    /// of reruns allow it; the last try counts. `cancelled` is called before each step.
     ///
     /// # Errors
-    /// The platform's alone; an agent's fault is an outcome. `cancelled` is asked before each step.
+    /// Platform faults only; an agent fault is an outcome.
     pub fn play(
         &mut self,
         episode: u32,
@@ -158,24 +158,29 @@ impl<'a> Player<'a> {
         let mut reruns = 0;
         loop {
             let Try { outcome, blame } = self.attempt(episode, max_steps, sink, cancelled)?;
-            self.waited = match blame {
+            self.wait = match blame {
                 Blame::Agent => None,
-                Blame::AgentsDelay(waited) | Blame::Host(waited) => Some(waited),
+                Blame::AgentTimeout(wait) | Blame::Host(wait) => Some(wait),
             };
-            if let Blame::Host(waited) = blame {
-                let replays = &mut self.replays;
-                if reruns < replays.per_episode && replays.played < replays.limit {
+            if let Blame::Host(wait) = blame {
+                let used = &mut self.reruns;
+                if reruns < used.per_episode && used.count < used.limit {
                     reruns += 1;
-                    replays.played += 1;
-                    tracing::warn!(task = %self.task, episode, reruns, %waited, "the host kept the agent from answering: the episode is played again");
-                    self.log.add(
-                        "",
-                        Some("not counted: the host kept the agent from answering; the episode is played again, by a new process"),
+                    used.count += 1;
+                    tracing::warn!(
+                        task = %self.task,
+                        episode,
+                        reruns,
+                        %wait,
+                        "host interference prevented an answer: the episode is run again"
                     );
+                    let note = "not counted: host interference prevented the answer; the episode is run again, by a \
+                                new process";
+                    self.log.add("", Some(note));
                     continue;
                 }
-                if self.if_the_host_wins == IfTheHostWins::OurFault {
-                    return Err(PlatformFault::HostBusy(waited));
+                if self.on_host_interference == OnHostInterference::PlatformFault {
+                    return Err(PlatformFault::HostBusy(wait));
                 }
             }
             sink.end(&outcome, reruns)?;
@@ -195,15 +200,15 @@ impl<'a> Player<'a> {
             None => self.start()?,
         };
         let interpolation = session.as_ref().ok().map(Session::interpolation);
-        let mut course =
-            Course::begin(&self.arena, self.task, episode, interpolation, sink).at_most(max_steps);
+        let mut running =
+            RunningEpisode::begin(&self.arena, self.task, episode, interpolation, sink).with_max_steps(max_steps);
         let mut session = match session {
             Ok(session) => session,
-            Err(StartUpFault { ended, stderr }) => {
-                return Ok(self.failed(course, Phase::StartUp, ended, &stderr));
+            Err(StartUpFault { fault, stderr }) => {
+                return Ok(self.fail(running, Phase::StartUp, fault, &stderr));
             }
         };
-        let (phase, trouble) = match self.converse(&mut session, episode, &mut course, cancelled) {
+        let (phase, error) = match self.run_episode(&mut session, episode, &mut running, cancelled) {
             Ok(outcome) => {
                 self.session = Some(session);
                 return Ok(Try {
@@ -211,10 +216,10 @@ impl<'a> Player<'a> {
                     blame: Blame::Agent,
                 });
             }
-            Err(ended) => ended,
+            Err(failure) => failure,
         };
-        match Ended::by(trouble) {
-            Ok(ended) => Ok(self.failed(course, phase, ended, &session.abort())),
+        match TryFault::new(error) {
+            Ok(fault) => Ok(self.fail(running, phase, fault, &session.abort())),
             Err(fault) => {
                 self.session = Some(session);
                 Err(fault)
@@ -222,14 +227,21 @@ impl<'a> Player<'a> {
         }
     }
 
-    fn failed(&mut self, course: CourseTo<'_>, phase: Phase, ended: Ended, stderr: &str) -> Try {
-        let Ended { fault, line, blame } = ended;
-        let outcome = course.failed(phase, fault, line);
-        self.note(stderr, &outcome, blame);
+    /// Ends the episode with a fault, and logs it.
+    fn fail(
+        &mut self,
+        running: DynEpisode<'_>,
+        phase: Phase,
+        fault: TryFault,
+        stderr: &str,
+    ) -> Try {
+        let TryFault { fault, line, blame } = fault;
+        let outcome = running.outcome_after_fault(phase, fault, line);
+        self.log_fault(stderr, &outcome, blame);
         Try { outcome, blame }
     }
 
-    /// Says goodbye to the agent and returns the log of all its processes.
+    /// Sends `bye` to the agent and returns the log of all its processes.
     pub fn close(mut self) -> Result<String, PlatformFault> {
         if let Some(session) = self.session.take() {
             let stderr = session.finish()?;
@@ -238,7 +250,7 @@ impl<'a> Player<'a> {
         Ok(self.log.into_text())
     }
 
-    /// Ends the agent at once and returns the log of all its processes.
+    /// Kills the agent and returns the log of all its processes.
     pub fn abort(mut self) -> String {
         if let Some(session) = self.session.take() {
             self.log.add(&session.abort(), None);
@@ -247,76 +259,76 @@ impl<'a> Player<'a> {
     }
 
     fn start(&self) -> Result<Result<Session<'a>, StartUpFault>, PlatformFault> {
-        let started = Session::start_watched(self.bundle, self.env, self.task.into(), self.watch);
+        let started = Session::start_monitored(self.bundle, self.env, self.task.into(), self.monitor);
         match started {
             Ok(session) => Ok(Ok(session)),
-            Err((trouble, stderr)) => {
-                let ended = Ended::by(trouble)?;
-                Ok(Err(StartUpFault { ended, stderr }))
+            Err((error, stderr)) => {
+                let fault = TryFault::new(error)?;
+                Ok(Err(StartUpFault { fault, stderr }))
             }
         }
     }
 
-    /// The conversation of one episode; trouble comes with what the agent was asked for.
-    fn converse(
+    /// Runs the exchange of one episode; an error comes with the phase in which it happened.
+    fn run_episode(
         &mut self,
         session: &mut Session<'_>,
         episode: u32,
-        course: &mut CourseTo<'_>,
+        running: &mut DynEpisode<'_>,
         cancelled: &dyn Fn() -> bool,
-    ) -> Result<EpisodeOutcome, (Phase, Trouble)> {
+    ) -> Result<EpisodeOutcome, (Phase, SessionError)> {
         self.reset(session, episode)
-            .map_err(|trouble| (Phase::Reset, trouble))?;
-        self.steps(session, course, cancelled)
+            .map_err(|error| (Phase::Reset, error))?;
+        self.steps(session, running, cancelled)
             .and_then(|outcome| {
                 session.end(episode, outcome.steps)?;
                 Ok(outcome)
             })
-            .map_err(|trouble| (Phase::Step, trouble))
+            .map_err(|error| (Phase::Step, error))
     }
 
-    /// Announces an episode; the wait for the answer, less what the host took, counts also if none came.
-    fn reset(&mut self, session: &mut Session<'_>, episode: u32) -> Result<(), Trouble> {
+    /// Announces an episode. The time until the answer, less host interference, counts even without an answer.
+    fn reset(&mut self, session: &mut Session<'_>, episode: u32) -> Result<(), SessionError> {
         self.resets.check()?;
         let asked = Instant::now();
-        let answered = session.reset(episode);
-        self.resets.spend(match &answered {
-            Ok(answered) => answered.computation_time_s,
-            Err(Trouble::Late { waited, .. } | Trouble::Host { waited, .. }) => {
-                waited.of_the_agent().as_secs_f64()
+        let timing = session.reset(episode);
+        self.resets.spend(match &timing {
+            Ok(timing) => timing.computation_time_s,
+            Err(SessionError::TimedOut { wait, .. } | SessionError::HostInterference { wait, .. }) => {
+                wait.charged().as_secs_f64()
             }
-            Err(Trouble::Agent { .. } | Trouble::Platform(_)) => asked.elapsed().as_secs_f64(),
+            Err(SessionError::Agent { .. } | SessionError::Platform(_)) => asked.elapsed().as_secs_f64(),
         });
-        answered?;
+        timing?;
         Ok(self.resets.check()?)
     }
 
     fn steps(
         &mut self,
         session: &mut Session<'_>,
-        course: &mut CourseTo<'_>,
+        running: &mut DynEpisode<'_>,
         cancelled: &dyn Fn() -> bool,
-    ) -> Result<EpisodeOutcome, Trouble> {
+    ) -> Result<EpisodeOutcome, SessionError> {
         let mut budget = EpisodeBudget::new(&self.env.time);
         loop {
             if cancelled() {
                 return Err(PlatformFault::Cancelled.into());
             }
-            let Question { step, observation } = course.question()?;
-            let answered = session.step(step, observation)?;
-            self.longest_stall_s = self.longest_stall_s.max(answered.host_time_s);
-            if let Some(outcome) = course.answer(session.action(), answered)? {
+            let Question { step, observation } = running.question()?;
+            let timing = session.step(step, observation)?;
+            self.longest_stall_s = self.longest_stall_s.max(timing.host_time_s);
+            if let Some(outcome) = running.answer(session.action(), timing)? {
                 return Ok(outcome);
             }
-            budget.spend(answered.computation_time_s)?;
+            budget.spend(timing.computation_time_s)?;
         }
     }
 
-    /// Notes what an agent has left, and the fault that ended it.
-    fn note(&mut self, stderr: &str, outcome: &EpisodeOutcome, blame: Blame) {
+    /// Logs an agent's standard error, and the fault that ended it.
+    fn log_fault(&mut self, stderr: &str, outcome: &EpisodeOutcome, blame: Blame) {
         let fault = outcome.fault.as_ref().map(|fault| match blame {
             Blame::Agent => fault.to_string(),
-            Blame::AgentsDelay(waited) | Blame::Host(waited) => format!("{fault} ({waited})"),
+            Blame::AgentTimeout(wait) | Blame::Host(wait) => format!("{fault} ({wait})"),
         });
         self.log.add(stderr, fault.as_deref());
     }

@@ -1,37 +1,37 @@
 use crate::{
     bundle::Bundle,
     config::AgentEnvironment,
-    exchange::{Answer, Exchange, Sent},
-    fault::{PlatformFault, Trouble},
-    host_watch::{Counters, HostWatch},
+    exchange::{Answer, Exchange, PendingQuestion},
+    fault::{PlatformFault, SessionError},
+    host_interference::{KernelCounters, InterferenceMonitor},
     wire_env::wire_env,
 };
-use faceoff_episode::Answered;
-use faceoff_types::{AgentFaultKind, Contest, Interpolation, Phase, TimeLimits};
+use faceoff_episode::AnswerTiming;
+use faceoff_types::{AgentFaultKind, AgentTask, Interpolation, Phase, TimeLimits};
 use faceoff_wire::{Message, answer};
 use std::time::{Duration, Instant};
 
-/// One agent process and the conversation with it. Every wait has a deadline. Dropping it kills
+/// An agent process and the protocol session with it. Every wait has a deadline. Dropping it kills
 /// the process tree.
 ///
-/// [`Self::reset`] and [`Self::step`] ask and wait. Who has two agents asks both with `send_…` and
-/// then, in turns, waits for any and looks at each with [`Self::poll`].
+/// [`Self::reset`] and [`Self::step`] send a question and wait. With two agents, send to both with `send_…`, then
+/// alternate between [`Self::wait_for_any`] and [`Self::poll`] on each.
 #[derive(Debug)]
 pub struct Session<'w> {
     exchange: Exchange<'w>,
     time: TimeLimits,
     interpolation: Interpolation,
     startup_s: f64,
-    asked: Option<Asked>,
+    pending: Option<PendingAnswer>,
     /// The last action; its memory is reused.
     action: Vec<f64>,
 }
 
-/// A question whose answer is due.
+/// A question whose answer is pending.
 #[derive(Debug, Clone)]
-struct Asked {
+struct PendingAnswer {
     question: Question,
-    sent: Sent,
+    sent: PendingQuestion,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -44,47 +44,47 @@ impl Session<'static> {
     /// Starts the bundle's command and exchanges `hello` and `ready`.
     ///
     /// # Errors
-    /// What went wrong, and what the agent had written to standard error.
+    /// The failure, and the end of the agent's standard error.
     pub fn start(
         bundle: &Bundle,
         env: &AgentEnvironment,
-        contest: Contest,
-    ) -> Result<Self, (Trouble, String)> {
-        Self::start_watched(bundle, env, contest, &Counters)
+        agent_task: AgentTask,
+    ) -> Result<Self, (SessionError, String)> {
+        Self::start_monitored(bundle, env, agent_task, &KernelCounters)
     }
 }
 
 impl<'w> Session<'w> {
-    /// [`Session::start`] with another judge of what the host takes.
-    pub(crate) fn start_watched(
+    /// [`Session::start`] with another monitor of host interference.
+    pub(crate) fn start_monitored(
         bundle: &Bundle,
         env: &AgentEnvironment,
-        contest: Contest,
-        watch: &'w dyn HostWatch,
-    ) -> Result<Self, (Trouble, String)> {
+        agent_task: AgentTask,
+        monitor: &'w dyn InterferenceMonitor,
+    ) -> Result<Self, (SessionError, String)> {
         let mut exchange =
-            Exchange::start(bundle, env, watch).map_err(|trouble| (trouble, String::new()))?;
+            Exchange::start(bundle, env, monitor).map_err(|error| (error, String::new()))?;
         let stated = bundle.manifest.interpolation;
-        match hello(&mut exchange, contest, stated, env.time.startup_s) {
+        match hello(&mut exchange, agent_task, stated, env.time.startup_s) {
             Ok((interpolation, startup_s)) => Ok(Self {
                 exchange,
                 time: env.time.clone(),
                 interpolation,
                 startup_s,
-                asked: None,
+                pending: None,
                 action: Vec::new(),
             }),
-            Err(trouble) => Err((trouble, abort(exchange))),
+            Err(error) => Err((error, abort(exchange))),
         }
     }
 
-    /// What the agent's actions mean.
+    /// Interpolation of the agent's actions.
     #[must_use]
     pub const fn interpolation(&self) -> Interpolation {
         self.interpolation
     }
 
-    /// How long the agent took to start, less what the host took, in seconds.
+    /// Start-up time of the agent, without host interference, in seconds.
     #[must_use]
     pub const fn startup_s(&self) -> f64 {
         self.startup_s
@@ -93,17 +93,17 @@ impl<'w> Session<'w> {
     /// Announces an episode and waits until the agent is ready.
     ///
     /// # Errors
-    /// The agent's fault or the platform's.
-    pub fn reset(&mut self, episode: u32) -> Result<Answered, Trouble> {
+    /// An agent fault or a platform fault.
+    pub fn reset(&mut self, episode: u32) -> Result<AnswerTiming, SessionError> {
         self.send_reset(episode)?;
         self.wait()
     }
 
-    /// Asks for the action of a step and waits for it.
+    /// Requests the action of a step and waits for it.
     ///
     /// # Errors
-    /// The agent's fault or the platform's.
-    pub fn step(&mut self, step: u32, observation: &[f64]) -> Result<Answered, Trouble> {
+    /// An agent fault or a platform fault.
+    pub fn step(&mut self, step: u32, observation: &[f64]) -> Result<AnswerTiming, SessionError> {
         self.send_step(step, observation)?;
         self.wait()
     }
@@ -117,129 +117,128 @@ impl<'w> Session<'w> {
     /// Announces an episode.
     ///
     /// # Errors
-    /// The agent's fault or the platform's.
-    pub fn send_reset(&mut self, episode: u32) -> Result<(), Trouble> {
+    /// An agent fault or a platform fault.
+    pub fn send_reset(&mut self, episode: u32) -> Result<(), SessionError> {
         self.send(Question::Reset { episode }, &Message::Reset { episode })
     }
 
-    /// Asks for the action of a step; the observation must be finite.
+    /// Requests the action of a step; the observation must be finite.
     ///
     /// # Errors
-    /// The agent's fault or the platform's.
-    pub fn send_step(&mut self, step: u32, observation: &[f64]) -> Result<(), Trouble> {
+    /// An agent fault or a platform fault.
+    pub fn send_step(&mut self, step: u32, observation: &[f64]) -> Result<(), SessionError> {
         debug_assert!(observation.iter().all(|value| value.is_finite()));
         self.send(Question::Step { step }, &Message::step(step, observation))
     }
 
-    fn send(&mut self, question: Question, message: &Message<'_>) -> Result<(), Trouble> {
+    fn send(&mut self, question: Question, message: &Message<'_>) -> Result<(), SessionError> {
         let (phase, limit_s) = match question {
             Question::Reset { .. } => (Phase::Reset, self.time.reset_s),
             Question::Step { .. } => (Phase::Step, self.time.step_s),
         };
-        self.asked = None;
+        self.pending = None;
         let sent = self.exchange.send(message, phase, limit_s)?;
-        self.asked = Some(Asked { question, sent });
+        self.pending = Some(PendingAnswer { question, sent });
         Ok(())
     }
 
-    /// Nobody looked for the answer that is due for so long, since something of ours was seen to: the agent
-    /// is not charged for it if its answer is there at the next look.
-    pub fn was_not_looked_at(&mut self, away: Duration) {
-        if let Some(asked) = &mut self.asked {
-            asked.sent.was_away(away);
+    /// Adds time in which the evaluator was busy elsewhere and did not check for the pending answer. The agent is not
+    /// charged for it if its answer is available at the next check.
+    pub fn add_absence(&mut self, absence: Duration) {
+        if let Some(pending) = &mut self.pending {
+            pending.sent.add_absence(absence);
         }
     }
 
-    /// Stops the agent until it is asked again, where the host has something that does.
+    /// Freezes the agent until its next question, if the host can.
     pub fn freeze(&mut self) {
         self.exchange.freeze();
     }
 
-    /// Does the host have something that stops the agent until it is asked again?
+    /// Can the host freeze the agent?
     #[must_use]
     pub fn can_freeze(&self) -> bool {
         self.exchange.can_freeze()
     }
 
-    /// Is an answer due?
+    /// Is an answer pending?
     #[must_use]
-    pub const fn is_asked(&self) -> bool {
-        self.asked.is_some()
+    pub const fn is_pending(&self) -> bool {
+        self.pending.is_some()
     }
 
-    /// Waits until one of the agents whose answer is due has written something or has met its limit,
-    /// or until `until`. [`Self::poll`] with a time that has passed tells what it was, if anything.
+    /// Waits until one of the agents with a pending answer has written output or reached its limit, or until `until`.
+    /// [`Self::poll`] with an expired deadline then returns the result, if any.
     ///
     /// # Errors
-    /// The platform's alone.
+    /// Platform faults only.
     pub fn wait_for_any(sessions: &[&Self], until: Instant) -> Result<(), PlatformFault> {
         let due: Vec<_> = sessions
             .iter()
-            .filter_map(|session| Some((&session.exchange, &session.asked.as_ref()?.sent)))
+            .filter_map(|session| Some((&session.exchange, &session.pending.as_ref()?.sent)))
             .collect();
         Exchange::wait_for_any(&due, until)
     }
 
-    /// Waits for the answer that is due, at most until `until`, which may have passed, and takes it;
-    /// an action is then in [`Self::action`]. `None` while it has not come, and when none is due.
+    /// Waits for the pending answer until `until`, which may have passed, and takes it; an action is then in
+    /// [`Self::action`]. `None` if the answer has not arrived, or none is pending.
     ///
     /// # Errors
-    /// The agent's fault, which may be that its time is over, or the platform's.
-    pub fn poll(&mut self, until: Instant) -> Result<Option<Answered>, Trouble> {
-        let Some(Asked { question, mut sent }) = self.asked.take() else {
+    /// An agent fault, e.g. a timeout, or a platform fault.
+    pub fn poll(&mut self, until: Instant) -> Result<Option<AnswerTiming>, SessionError> {
+        let Some(PendingAnswer { question, mut sent }) = self.pending.take() else {
             return Ok(None);
         };
         match self.exchange.poll(&mut sent, until)? {
-            Some(answer) => self.take(question, &answer).map(Some),
+            Some(answer) => self.parse_answer(question, &answer).map(Some),
             None => {
-                self.asked = Some(Asked { question, sent });
+                self.pending = Some(PendingAnswer { question, sent });
                 Ok(None)
             }
         }
     }
 
-    /// Waits for the answer that is due as long as its limit allows.
-    fn wait(&mut self) -> Result<Answered, Trouble> {
+    /// Waits for the pending answer until its limit.
+    fn wait(&mut self) -> Result<AnswerTiming, SessionError> {
         loop {
-            if let Some(answered) = self.poll(Instant::now() + TimeLimits::LONGEST)? {
+            if let Some(answered) = self.poll(Instant::now() + TimeLimits::MAX_WAIT)? {
                 return Ok(answered);
             }
         }
     }
 
-    fn take(&mut self, question: Question, answer: &Answer) -> Result<Answered, Trouble> {
+    fn parse_answer(&mut self, question: Question, answer: &Answer) -> Result<AnswerTiming, SessionError> {
         match question {
             Question::Reset { episode } => answer::parse_reset_ready(&answer.bytes, episode),
             Question::Step { step } => {
                 answer::parse_act(&answer.bytes, step, self.interpolation, &mut self.action)
             }
         }
-        .map_err(|fault| answer.shows(fault))?;
-        let waited = &answer.waited;
-        Ok(Answered {
-            computation_time_s: waited.of_the_agent().as_secs_f64(),
-            host_time_s: waited.host.as_secs_f64(),
-            cpu_time_s: waited.cpu_time_s,
+        .map_err(|fault| answer.to_error(fault))?;
+        let wait = &answer.wait;
+        Ok(AnswerTiming {
+            computation_time_s: wait.charged().as_secs_f64(),
+            host_time_s: wait.host_interference.as_secs_f64(),
+            cpu_time_s: wait.cpu_time_s,
         })
     }
 
-    /// Tells that an episode is over. An agent that no longer listens meets its fault at the next
-    /// question.
+    /// Sends the end of an episode. If the agent's input is closed, the next question reports the fault.
     ///
     /// # Errors
-    /// The platform's alone.
+    /// Platform faults only.
     pub fn end(&mut self, episode: u32, steps: u32) -> Result<(), PlatformFault> {
         let end = Message::End { episode, steps };
-        self.exchange.tell(&end)
+        self.exchange.notify(&end)
     }
 
-    /// Says goodbye, waits for the exit, kills what is left, and returns the end of the agent's
-    /// standard error.
+    /// Sends `bye`, waits for the exit, kills the remaining processes, and returns the end of the agent's standard
+    /// error.
     ///
     /// # Errors
-    /// The platform's alone: how an agent exits is its own affair by now.
+    /// Platform faults only: the agent's exit status does not matter any more.
     pub fn finish(mut self) -> Result<String, PlatformFault> {
-        self.exchange.tell(&Message::Bye)?;
+        self.exchange.notify(&Message::Bye)?;
         self.exchange.finish(TimeLimits::duration(self.time.bye_s))
     }
 
@@ -249,28 +248,29 @@ impl<'w> Session<'w> {
     }
 }
 
-/// What the agent's first answer says, and how long that took; `stated` is the interpolation that `agent.toml` promises.
+/// Exchanges `hello` and `ready`; returns the interpolation and the start-up time in seconds. `stated`: the
+/// interpolation in `agent.toml`.
 fn hello(
     exchange: &mut Exchange<'_>,
-    contest: Contest,
+    agent_task: AgentTask,
     stated: Option<i64>,
     limit_s: f64,
-) -> Result<(Interpolation, f64), Trouble> {
-    let hello = Message::hello(contest, wire_env(contest));
-    // Its time begins when its sandbox stands: what that took was ours.
+) -> Result<(Interpolation, f64), SessionError> {
+    let hello = Message::hello(agent_task, wire_env(agent_task));
+    // The agent's time begins when its sandbox exists; the set-up is the platform's time.
     let mut sent = exchange.send(&hello, Phase::StartUp, limit_s)?;
     let answer = exchange.wait(&mut sent)?;
-    let ready = answer::parse_ready(&answer.bytes).map_err(|fault| answer.shows(fault))?;
+    let ready = answer::parse_ready(&answer.bytes).map_err(|fault| answer.to_error(fault))?;
     match stated {
         Some(stated) if ready.interpolation.code() != Some(stated) => {
-            Err(answer.shows(AgentFaultKind::WrongMessage {
+            Err(answer.to_error(AgentFaultKind::WrongMessage {
                 expected: format!("ready with interpolation {stated}, as agent.toml says"),
                 got: format!("ready with interpolation {}", ready.interpolation),
             }))
         }
         _ => Ok((
             ready.interpolation,
-            answer.waited.of_the_agent().as_secs_f64(),
+            answer.wait.charged().as_secs_f64(),
         )),
     }
 }

@@ -3,34 +3,34 @@ use crate::{
     calibration::Calibration,
     config::AgentEnvironment,
     fault::PlatformFault,
-    host_watch::{Counters, HostWatch},
-    player::{IfTheHostWins, Player},
+    host_interference::{KernelCounters, InterferenceMonitor},
+    player::{OnHostInterference, Player},
 };
 use faceoff_dataset::{Recorder, ShardFolder, ShardReport};
 use faceoff_episode::{Arena, StepSink};
-use faceoff_sandbox::affinity::PinnedElsewhere;
+use faceoff_sandbox::affinity::AffinityGuard;
 use faceoff_types::EpisodeOutcome;
-use faceoff_wire::work::ShardSpec;
+use faceoff_wire::job::ShardSpec;
 use std::path::Path;
 
-/// Follows a shard as it runs, and can stop it.
+/// Observes a running shard, and can stop it.
 pub trait Observer {
     /// An episode is over.
-    fn episode_done(&mut self, outcome: &EpisodeOutcome);
-    /// The end of the agent's standard error with its faults, once, however the shard ends: also
-    /// when it was cancelled or the platform failed, and there is no report.
+    fn on_episode_end(&mut self, outcome: &EpisodeOutcome);
+    /// The end of the agent's standard error with its faults. Called exactly once, even if there is no report because
+    /// the shard was cancelled or the platform failed.
     fn log(&mut self, _log: &str) {}
-    /// Is the shard to stop? Asked before each step, so it must be cheap.
+    /// Should the shard stop? Called before each step, so it must be cheap.
     fn cancelled(&self) -> bool;
 }
 
-/// Plays a shard and records it in the folder `out`, which is created: `steps.parquet`,
+/// Runs a shard and records it in the folder `out`, which is created: `steps.parquet`,
 /// `episodes.parquet`, `agent.log`, `report.json` (the returned report) and last, with the hashes
-/// of the others, `shard.json`. A folder without `shard.json` is no recording.
+/// of the others, `shard.json`. A folder without `shard.json` is not a recording.
 ///
 /// # Errors
-/// The platform's alone: the agent's faults are in the report. [`PlatformFault::Cancelled`] when
-/// the observer said so.
+/// Platform faults only: agent faults are in the report. [`PlatformFault::Cancelled`] if the observer
+/// cancelled the shard.
 pub fn run_shard(
     spec: &ShardSpec,
     bundle: &Bundle,
@@ -38,30 +38,30 @@ pub fn run_shard(
     out: &Path,
     observer: &mut dyn Observer,
 ) -> Result<ShardReport, PlatformFault> {
-    run_shard_watched(spec, bundle, env, out, observer, &Counters)
+    run_shard_monitored(spec, bundle, env, out, observer, &KernelCounters)
 }
 
-/// [`run_shard`] with another judge of what the host takes.
+/// [`run_shard`] with another monitor of host interference.
 ///
 /// # Errors
 /// As [`run_shard`].
-pub fn run_shard_watched(
+pub fn run_shard_monitored(
     spec: &ShardSpec,
     bundle: &Bundle,
     env: &AgentEnvironment,
     out: &Path,
     observer: &mut dyn Observer,
-    watch: &dyn HostWatch,
+    monitor: &dyn InterferenceMonitor,
 ) -> Result<ShardReport, PlatformFault> {
     let folder = ShardFolder::create(out)?;
     let mut recorder = Recorder::create(&folder, spec.task)?;
-    let report = play_shard(spec, bundle, env, &mut recorder, observer, watch)?;
+    let report = play_shard(spec, bundle, env, &mut recorder, observer, monitor)?;
     recorder.finish()?;
     folder.commit(spec, &report)?;
     Ok(report)
 }
 
-/// Plays a shard and tells `sink` of its steps.
+/// Runs a shard and sends its steps to `sink`.
 ///
 /// # Errors
 /// As [`run_shard`].
@@ -71,24 +71,24 @@ pub fn play_shard(
     env: &AgentEnvironment,
     sink: &mut dyn StepSink,
     observer: &mut dyn Observer,
-    watch: &dyn HostWatch,
+    monitor: &dyn InterferenceMonitor,
 ) -> Result<ShardReport, PlatformFault> {
-    let _pinned = PinnedElsewhere::than(&env.agent_cpus);
+    let _pinned = AffinityGuard::avoid(&env.agent_cpus);
     let mut calibration = Calibration::start(&env.agent_cpus)?;
     let mut player = Player::new(
         bundle,
         env,
         spec.task,
         spec.episodes.end.saturating_sub(spec.episodes.start),
-        Arena::by(
+        Arena::with_ruleset(
             spec.ruleset,
             spec.profile,
             &spec.perturbations,
             spec.seed,
             spec.mismatch_seed,
         ),
-        watch,
-        IfTheHostWins::LastTryCounts,
+        monitor,
+        OnHostInterference::KeepLastTry,
     );
     let played = play(spec, &mut player, sink, observer, &mut calibration);
     let (outcomes, stopped_by_faults) = match played {
@@ -113,7 +113,7 @@ pub fn play_shard(
     })
 }
 
-/// Plays the episodes; tells also whether faults ended them early.
+/// Runs the episodes; also returns whether faults stopped the shard early.
 fn play(
     spec: &ShardSpec,
     player: &mut Player<'_>,
@@ -131,7 +131,7 @@ fn play(
             observer.cancelled()
         })?;
         calibration.between_episodes()?;
-        observer.episode_done(&outcome);
+        observer.on_episode_end(&outcome);
         faults += u32::from(outcome.fault.is_some());
         outcomes.push(outcome);
         if faults > spec.max_faults {

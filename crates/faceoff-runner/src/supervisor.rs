@@ -1,8 +1,8 @@
-//! A thread that ends agents whose evaluator makes no progress: the last line, for what nobody has thought of.
+//! A watchdog thread that kills agents whose evaluator makes no progress: the last defence, against unknown causes.
 //!
-//! The evaluator's own deadlines hold as long as its thread runs. Should a call of its ever wait for something
-//! that an agent holds, no deadline of that thread can end it; the death of the agent does. The same thread ends
-//! agents of jobs that were cancelled, so that nobody waits for an answer that nobody wants.
+//! The evaluator's own deadlines work as long as its thread runs. If one of its calls ever blocks on something that
+//! an agent holds, no deadline of that thread can end the call, but the death of the agent does. The same thread
+//! kills agents of cancelled jobs, so that no evaluator waits for an answer that is not needed any more.
 
 use faceoff_sandbox::{Killer, affinity};
 use std::{
@@ -15,16 +15,16 @@ use std::{
     time::{Duration, Instant},
 };
 
-/// How often the thread looks; what was cancelled ends no later than that.
-const LOOK_EVERY: Duration = Duration::from_millis(250);
-/// A look that comes later says nothing about evaluators: this host, or the process, stood still.
-const LATE_LOOK: Duration = Duration::from_secs(1);
-/// For how long past the sum of a job's limits its evaluator may make no progress.
+/// Interval of the checks; a cancelled job ends within it.
+const CHECK_INTERVAL: Duration = Duration::from_millis(250);
+/// A check after a longer pause proves nothing about evaluators: the host, or this process, was stopped.
+const LATE_CHECK: Duration = Duration::from_secs(1);
+/// Time without progress that an evaluator may take beyond the sum of its job's limits.
 const SLACK: Duration = Duration::from_secs(10);
-/// A thread that is held for so long after the agent's death stands still: something else holds it.
-const HELD_AFTER_DEATH: Duration = Duration::from_secs(5);
+/// A thread that is still blocked this long after the agent's death is stuck: something else blocks it.
+const STUCK_AFTER_DEATH: Duration = Duration::from_secs(5);
 
-/// How a job is looked after while it waits for its agents.
+/// Supervision of a job while its evaluator waits for agents.
 #[derive(Clone)]
 pub struct Supervision {
     cancelled: Arc<dyn Fn() -> bool + Send + Sync>,
@@ -32,16 +32,16 @@ pub struct Supervision {
 }
 
 impl Supervision {
-    /// Of a job that may be cancelled, as `cancelled` tells, which is asked a few times a second.
+    /// Supervision of a job that can be cancelled. `cancelled` is called a few times a second.
     #[must_use]
-    pub fn of(cancelled: impl Fn() -> bool + Send + Sync + 'static) -> Self {
+    pub fn new(cancelled: impl Fn() -> bool + Send + Sync + 'static) -> Self {
         Self {
             cancelled: Arc::new(cancelled),
             slack: SLACK,
         }
     }
 
-    /// For tests, which do not want to wait.
+    /// Replaces the slack, for faster tests.
     #[must_use]
     pub fn with_slack(self, slack: Duration) -> Self {
         Self { slack, ..self }
@@ -50,7 +50,7 @@ impl Supervision {
 
 impl Default for Supervision {
     fn default() -> Self {
-        Self::of(|| false)
+        Self::new(|| false)
     }
 }
 
@@ -62,30 +62,30 @@ impl fmt::Debug for Supervision {
     }
 }
 
-/// Why an agent was ended.
+/// Why the supervisor killed an agent.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Ended {
+pub(crate) enum KillReason {
     /// The evaluator made no progress with it.
     Stalled,
     /// Its job was cancelled.
     Cancelled,
 }
 
-/// One agent under supervision, for as long as this lives.
+/// One agent under supervision, until dropped.
 #[derive(Debug)]
-pub(crate) struct Supervised(Arc<Agent>);
+pub(crate) struct SupervisedAgent(Arc<Agent>);
 
 #[derive(Debug)]
 struct Agent {
     killer: Killer,
     supervision: Supervision,
     thread: String,
-    /// Until when the evaluator may be busy with the agent, in nanoseconds since [`EPOCH`]; 0 while it is not.
+    /// Deadline of the evaluator's current call, in nanoseconds since [`EPOCH`]; 0 if there is none.
     due_ns: AtomicU64,
-    /// 0, or an [`Ended`].
-    ended: AtomicU8,
-    ended_ns: AtomicU64,
-    /// What was overdue at the last look.
+    /// 0, or 1 + the [`KillReason`].
+    kill_reason: AtomicU8,
+    killed_ns: AtomicU64,
+    /// The deadline that had passed at the last check, or 0.
     overdue_ns: AtomicU64,
 }
 
@@ -97,15 +97,15 @@ fn nanoseconds(at: Instant) -> u64 {
     u64::try_from(since).unwrap_or(u64::MAX).max(1)
 }
 
-impl Supervised {
+impl SupervisedAgent {
     pub(crate) fn new(killer: Killer, supervision: &Supervision) -> Self {
         let agent = Arc::new(Agent {
             killer,
             supervision: supervision.clone(),
             thread: thread::current().name().unwrap_or("unnamed").to_owned(),
             due_ns: AtomicU64::new(0),
-            ended: AtomicU8::new(0),
-            ended_ns: AtomicU64::new(0),
+            kill_reason: AtomicU8::new(0),
+            killed_ns: AtomicU64::new(0),
             overdue_ns: AtomicU64::new(0),
         });
         let supervisor = &*SUPERVISOR;
@@ -114,81 +114,82 @@ impl Supervised {
         Self(agent)
     }
 
-    /// The calling thread is busy with the agent until the guard is gone, by its own limits no longer than `until`.
-    pub(crate) fn busy(&self, until: Instant) -> Busy {
+    /// Marks the calling thread as busy with the agent until the guard is dropped. By its own limits it is busy until
+    /// `until` at most.
+    pub(crate) fn busy(&self, until: Instant) -> BusyGuard {
         let due = nanoseconds(until + self.0.supervision.slack);
         self.0.due_ns.store(due, Ordering::Relaxed);
-        Busy(Arc::clone(&self.0))
+        BusyGuard(Arc::clone(&self.0))
     }
 
-    /// Was it ended from here?
-    pub(crate) fn ended(&self) -> Option<Ended> {
-        self.0.ended()
+    /// Why the supervisor killed the agent; `None` if it did not.
+    pub(crate) fn kill_reason(&self) -> Option<KillReason> {
+        self.0.kill_reason()
     }
 }
 
-/// As long as it lives, the evaluator is busy with an agent.
+/// Marks the evaluator as busy with an agent, until dropped.
 #[derive(Debug)]
-pub(crate) struct Busy(Arc<Agent>);
+pub(crate) struct BusyGuard(Arc<Agent>);
 
-impl Drop for Busy {
+impl Drop for BusyGuard {
     fn drop(&mut self) {
         self.0.due_ns.store(0, Ordering::Relaxed);
     }
 }
 
 impl Agent {
-    fn ended(&self) -> Option<Ended> {
-        match self.ended.load(Ordering::Acquire) {
+    fn kill_reason(&self) -> Option<KillReason> {
+        match self.kill_reason.load(Ordering::Acquire) {
             0 => None,
-            1 => Some(Ended::Stalled),
-            _ => Some(Ended::Cancelled),
+            1 => Some(KillReason::Stalled),
+            _ => Some(KillReason::Cancelled),
         }
     }
 
-    /// `in_time`: the last look was not long ago.
-    fn look(&self, now: Instant, in_time: bool) {
+    /// `in_time`: the last check was recent enough.
+    fn check(&self, now: Instant, in_time: bool) {
         let due_ns = self.due_ns.load(Ordering::Relaxed);
-        if due_ns == 0 || self.ended().is_some() {
+        if due_ns == 0 || self.kill_reason().is_some() {
             return;
         }
         let is_overdue = in_time && nanoseconds(now) > due_ns;
-        // Twice in a row: what kept the evaluator from going on may have been a host that stood still.
-        let seen = if is_overdue { due_ns } else { 0 };
-        let was_overdue = self.overdue_ns.swap(seen, Ordering::Relaxed) == due_ns;
-        let why = if (self.supervision.cancelled)() {
-            Ended::Cancelled
+        // Two overdue checks in a row are required: a stopped host may have delayed the evaluator before the first.
+        let overdue_now = if is_overdue { due_ns } else { 0 };
+        let was_overdue = self.overdue_ns.swap(overdue_now, Ordering::Relaxed) == due_ns;
+        let reason = if (self.supervision.cancelled)() {
+            KillReason::Cancelled
         } else if is_overdue && was_overdue {
             tracing::error!(
                 thread = self.thread,
-                "an agent holds its evaluator: it is ended"
+                "an agent blocks its evaluator: the agent is killed"
             );
-            Ended::Stalled
+            KillReason::Stalled
         } else {
             return;
         };
-        self.ended_ns.store(nanoseconds(now), Ordering::Relaxed);
-        // Before the kill: whoever goes on by it looks for the reason.
-        self.ended.store(1 + why as u8, Ordering::Release);
+        self.killed_ns.store(nanoseconds(now), Ordering::Relaxed);
+        // Stored before the kill: the evaluator continues after the kill and reads the reason.
+        self.kill_reason.store(1 + reason as u8, Ordering::Release);
         self.killer.kill();
     }
 
-    fn stands_still(&self, now: Instant) -> bool {
-        let dead_for = nanoseconds(now).saturating_sub(self.ended_ns.load(Ordering::Relaxed));
-        self.ended().is_some()
+    fn is_stuck(&self, now: Instant) -> bool {
+        let dead_for = nanoseconds(now).saturating_sub(self.killed_ns.load(Ordering::Relaxed));
+        self.kill_reason().is_some()
             && self.due_ns.load(Ordering::Relaxed) != 0
-            && u128::from(dead_for) > HELD_AFTER_DEATH.as_nanos()
+            && u128::from(dead_for) > STUCK_AFTER_DEATH.as_nanos()
     }
 }
 
-/// The threads that are still held by something after their agent's death, by name.
+/// Names of the threads that are still blocked after their agent's death.
 #[must_use]
-pub fn standing_still() -> Vec<String> {
+pub fn stuck_threads() -> Vec<String> {
     let now = Instant::now();
     let agents = SUPERVISOR.agents().clone();
     let agents = agents.iter().filter_map(Weak::upgrade);
     agents
-        .filter(|agent| agent.stands_still(now))
+        .filter(|agent| agent.is_stuck(now))
         .map(|agent| agent.thread.clone())
         .collect()
 }
@@ -200,7 +201,7 @@ struct Supervisor {
 
 impl Supervisor {
     fn start() -> Self {
-        // Without it nothing is worse than it was: the evaluator's own deadlines hold.
+        // Without a supervisor, the evaluator's own deadlines still apply.
         let started = thread::Builder::new()
             .name("supervisor".into())
             .spawn(|| SUPERVISOR.run());
@@ -218,9 +219,10 @@ impl Supervisor {
     }
 
     fn run(&self) {
-        // Started by the first slot, which keeps to CPUs of its own: should it be held there, this must not be.
-        affinity::as_the_process();
-        let mut last_look = Instant::now();
+        // The first slot starts this thread and may be pinned to its own CPUs. If that slot blocks its CPUs, the
+        // supervisor must still run.
+        affinity::reset_to_process();
+        let mut last_check = Instant::now();
         loop {
             let mut agents = self.agents();
             agents.retain(|agent| agent.strong_count() > 0);
@@ -233,12 +235,12 @@ impl Supervisor {
             let all = agents.clone();
             drop(agents);
             let now = Instant::now();
-            let in_time = now.saturating_duration_since(last_look) < LATE_LOOK;
-            last_look = now;
+            let in_time = now.saturating_duration_since(last_check) < LATE_CHECK;
+            last_check = now;
             for agent in all.iter().filter_map(Weak::upgrade) {
-                agent.look(now, in_time);
+                agent.check(now, in_time);
             }
-            thread::sleep(LOOK_EVERY);
+            thread::sleep(CHECK_INTERVAL);
         }
     }
 }

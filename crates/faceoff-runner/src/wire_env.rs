@@ -1,15 +1,15 @@
 use faceoff_sim::{EPISODE_STEPS, EnvInfo, env_info, env_info_for};
-use faceoff_types::{Contest, GAME_WINDOWS, RULESET, Task, WINDOW_STEPS};
+use faceoff_types::{AgentTask, GAME_WINDOWS, RULESET, Task, WINDOW_STEPS};
 use faceoff_wire::{
     Env,
     message::{DiscEnv, RobotEnv, TableEnv},
 };
 
 /// The simulator's constants under the protocol's names.
-pub(crate) fn wire_env(contest: Contest) -> Env {
-    let (info, episode_steps) = match contest {
-        Contest::Task(task) => (env_info(task), EPISODE_STEPS),
-        Contest::Game { side } => (env_info_for(2, side.index()), GAME_WINDOWS * WINDOW_STEPS),
+pub(crate) fn wire_env(agent_task: AgentTask) -> Env {
+    let (info, episode_steps) = match agent_task {
+        AgentTask::Qualifying(task) => (env_info(task), EPISODE_STEPS),
+        AgentTask::Game { side } => (env_info_for(2, side.index()), GAME_WINDOWS * WINDOW_STEPS),
     };
     let EnvInfo {
         n_agents,
@@ -27,9 +27,9 @@ pub(crate) fn wire_env(contest: Contest) -> Env {
         base_frame,
         dt,
     } = info;
-    let opponent: &[usize] = match contest {
-        Contest::Task(Task::Hit) | Contest::Game { .. } => &Env::OPPONENT_EE_IDS,
-        Contest::Task(Task::Defend | Task::Prepare) => &[],
+    let opponent: &[usize] = match agent_task {
+        AgentTask::Qualifying(Task::Hit) | AgentTask::Game { .. } => &Env::OPPONENT_EE_IDS,
+        AgentTask::Qualifying(Task::Defend | Task::Prepare) => &[],
     };
     Env {
         dt,
@@ -76,7 +76,7 @@ mod tests {
     use serde_json::json;
 
     #[test]
-    fn hello_states_the_rules_constants() {
+    fn hello_contains_the_rules_constants() {
         let env = serde_json::to_value(wire_env(Task::Hit.into())).unwrap();
         assert_eq!(env["dt"], 0.02);
         assert_eq!(env["episode_steps"], 500);
@@ -100,10 +100,10 @@ mod tests {
     }
 
     #[test]
-    fn hello_of_a_game_states_the_side_and_its_own_frame_first() {
+    fn game_hello_has_the_side_and_its_own_frame_first() {
         for (side, agent_id, own_x) in [(Side::First, 1, -1.51), (Side::Second, 2, 1.51)] {
-            let contest = Contest::Game { side };
-            let hello = Message::hello(contest, wire_env(contest));
+            let agent_task = AgentTask::Game { side };
+            let hello = Message::hello(agent_task, wire_env(agent_task));
             let hello = serde_json::to_value(hello).unwrap();
             assert_eq!(hello["task"], "tournament");
             assert_eq!(hello["agent_id"], agent_id);
@@ -119,13 +119,13 @@ mod tests {
     }
 
     #[test]
-    fn the_hello_of_the_document_is_the_real_one() {
+    fn documented_hello_matches_the_code() {
         let document = include_str!("../../../docs/robot.md");
         let (_, rest) = document.split_once("```json\n").expect("a block of JSON");
         let (quoted, _) = rest.split_once("```").expect("the block's end");
         let quoted: serde_json::Value = serde_json::from_str(quoted).expect("JSON");
-        let contest = Contest::Task(Task::Defend);
-        let hello = Message::hello(contest, wire_env(contest));
+        let agent_task = AgentTask::Qualifying(Task::Defend);
+        let hello = Message::hello(agent_task, wire_env(agent_task));
         assert_eq!(quoted, serde_json::to_value(hello).unwrap());
     }
 }

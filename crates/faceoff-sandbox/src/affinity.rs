@@ -1,5 +1,4 @@
-//! Which CPUs a thread may run on, and who gives way there. It changes how evenly time is kept, never what
-//! is computed.
+//! CPU affinity and priority of threads. They change how even the timing is, never the results.
 
 use rustix::{
     process::{getpriority_process, setpriority_process},
@@ -7,33 +6,33 @@ use rustix::{
 };
 use std::io;
 
-/// The CPUs that the calling thread may use: a container, a service manager or a pinning may have
-/// taken some away.
+/// The CPUs that the calling thread may use. A container, a service manager or earlier pinning may have
+/// removed some.
 ///
 /// # Errors
-/// When the kernel does not tell.
+/// When the kernel does not report them.
 pub fn allowed() -> io::Result<Vec<usize>> {
-    Ok(numbers(&sched_getaffinity(None)?))
+    Ok(cpu_numbers(&sched_getaffinity(None)?))
 }
 
-/// The CPUs that this process may use, whatever the calling thread is pinned to: those of its main thread.
-pub(crate) fn of_process() -> io::Result<Vec<usize>> {
-    Ok(numbers(&sched_getaffinity(
+/// The CPUs that this process may use (those of its main thread), whatever the calling thread is pinned to.
+pub(crate) fn process_cpus() -> io::Result<Vec<usize>> {
+    Ok(cpu_numbers(&sched_getaffinity(
         Some(rustix::process::getpid()),
     )?))
 }
 
-fn numbers(set: &CpuSet) -> Vec<usize> {
+fn cpu_numbers(set: &CpuSet) -> Vec<usize> {
     (0..CpuSet::MAX_CPU)
         .filter(|cpu| set.is_set(*cpu))
         .collect()
 }
 
-/// Keeps the calling thread, and the threads that it starts from now on, on these CPUs; with none
-/// given it stays where it is.
+/// Pins the calling thread, and the threads that it starts from now on, to these CPUs. An empty list changes
+/// nothing.
 ///
 /// # Errors
-/// When none of them is there for this process.
+/// When this process may use none of them.
 pub fn pin_current_thread(cpus: &[usize]) -> io::Result<()> {
     if !cpus.is_empty() {
         sched_setaffinity(None, &cpu_set(cpus))?;
@@ -41,68 +40,70 @@ pub fn pin_current_thread(cpus: &[usize]) -> io::Result<()> {
     Ok(())
 }
 
-/// Lets the calling thread run wherever the process's main thread may, whatever it has inherited. Where the host does not
-/// allow that it stays where it is.
-pub fn as_the_process() {
+/// Gives the calling thread the affinity of the process's main thread, whatever it has inherited. If the host
+/// does not allow that, nothing changes.
+pub fn reset_to_process() {
     let main_thread = rustix::process::getpid();
     if let Ok(set) = sched_getaffinity(Some(main_thread)) {
         let _ = sched_setaffinity(None, &set);
     }
 }
 
-/// By how much the nice value is raised of what gives way on CPUs that are no agent's: beside a simulator that is never idle it
-/// has a third of a CPU. A simulator's time costs nobody points; with less, whoever looks on waits for ten milliseconds and more
-/// at each of a request's turns.
-const WAY_GIVEN: i32 = 3;
-/// … and where agents may run: a tenth, which keeps a server answering and its leases alive.
-const WAY_GIVEN_TO_AGENTS: i32 = 10;
+/// Raise of the nice value on CPUs without agents. Beside a simulator that is never idle, the thread gets a
+/// third of a CPU. A simulator's time costs no points, and with a smaller share each time slice of a request
+/// would wait ten milliseconds or more.
+const NICE_BESIDE_SIMULATORS: i32 = 3;
+/// Raise of the nice value on CPUs where agents may run. The thread gets a tenth of a CPU, which is enough for a
+/// server to answer and to renew its leases.
+const NICE_BESIDE_AGENTS: i32 = 10;
 
-/// Has the calling thread, and the threads that it starts from now on, stay on these CPUs, none of them an agent's, and give way to
-/// other threads there; with none given it stays where it is, and gives way to agents. There is no way back.
+/// Pins the calling thread, and the threads that it starts from now on, to these CPUs, which no agent uses, and
+/// lowers its priority. With an empty list its affinity stays, and its priority is lowered in favour of agents.
+/// This cannot be undone.
 ///
 /// # Errors
-/// When none of the CPUs is there for this process.
-pub fn give_way(cpus: &[usize]) -> io::Result<()> {
+/// When this process may use none of the CPUs.
+pub fn lower_priority(cpus: &[usize]) -> io::Result<()> {
     pin_current_thread(cpus)?;
-    let given = if cpus.is_empty() {
-        WAY_GIVEN_TO_AGENTS
+    let increment = if cpus.is_empty() {
+        NICE_BESIDE_AGENTS
     } else {
-        WAY_GIVEN
+        NICE_BESIDE_SIMULATORS
     };
-    // To Linux a priority is a thread's.
-    Ok(setpriority_process(None, niceness()? + given)?)
+    // On Linux a nice value belongs to a thread, not to the process.
+    Ok(setpriority_process(None, niceness()? + increment)?)
 }
 
 /// The nice value of the calling thread.
 ///
 /// # Errors
-/// When the kernel does not tell.
+/// When the kernel does not report it.
 pub fn niceness() -> io::Result<i32> {
     Ok(getpriority_process(None)?)
 }
 
-/// Keeps the calling thread off some CPUs for as long as this lives, which is not to be sent to
-/// another thread: a simulator and its agent do not share one.
+/// Keeps the calling thread off some CPUs until dropped, so that a simulator and its agent do not share one. It
+/// cannot be sent to another thread.
 #[derive(Debug)]
-pub struct PinnedElsewhere {
+pub struct AffinityGuard {
     before: Option<CpuSet>,
-    /// It must be dropped where it was made.
+    /// Makes the guard `!Send`: the thread that created it must drop it.
     _this_thread: std::marker::PhantomData<*const ()>,
 }
 
-impl PinnedElsewhere {
-    /// Does nothing where no other CPU is left, or the host does not allow it: pinning makes times
-    /// fairer, and nothing wrong.
+impl AffinityGuard {
+    /// Keeps the thread off `cpus`. Does nothing if no other CPU is left, or the host does not allow it: without
+    /// pinning, times are less even, and no result is wrong.
     #[must_use]
-    pub fn than(cpus: &[usize]) -> Self {
+    pub fn avoid(cpus: &[usize]) -> Self {
         Self {
-            before: leave(cpus),
+            before: avoid_cpus(cpus),
             _this_thread: std::marker::PhantomData,
         }
     }
 }
 
-impl Drop for PinnedElsewhere {
+impl Drop for AffinityGuard {
     fn drop(&mut self) {
         if let Some(before) = &self.before
             && let Err(error) = sched_setaffinity(None, before)
@@ -112,14 +113,14 @@ impl Drop for PinnedElsewhere {
     }
 }
 
-/// What the thread was allowed before it left these CPUs, if it did.
-fn leave(cpus: &[usize]) -> Option<CpuSet> {
+/// Moves the thread off these CPUs; returns its earlier affinity, if it changed.
+fn avoid_cpus(cpus: &[usize]) -> Option<CpuSet> {
     if cpus.is_empty() {
         return None;
     }
     let before = sched_getaffinity(None).ok()?;
     let mut rest = before;
-    for cpu in within_the_interface(cpus) {
+    for cpu in representable(cpus) {
         rest.unset(cpu);
     }
     if rest.count() == 0 {
@@ -137,14 +138,14 @@ fn leave(cpus: &[usize]) -> Option<CpuSet> {
 /// The set of these CPU numbers.
 pub(crate) fn cpu_set(cpus: &[usize]) -> CpuSet {
     let mut set = CpuSet::new();
-    for cpu in within_the_interface(cpus) {
+    for cpu in representable(cpus) {
         set.set(cpu);
     }
     set
 }
 
-/// Numbers beyond what the kernel's interface holds name no CPU.
-fn within_the_interface(cpus: &[usize]) -> impl Iterator<Item = usize> {
+/// Drops numbers that a `CpuSet` cannot hold, since they name no CPU.
+fn representable(cpus: &[usize]) -> impl Iterator<Item = usize> {
     cpus.iter().copied().filter(|&cpu| cpu < CpuSet::MAX_CPU)
 }
 
@@ -165,14 +166,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_thread_leaves_and_returns() {
+    fn affinity_guard_restores_the_affinity() {
         let all = allowed().unwrap();
         let (first, rest) = all.split_first().unwrap();
         {
-            let _elsewhere = PinnedElsewhere::than(&[*first]);
-            let left = allowed().unwrap();
-            // where there is but one CPU, it stays
-            assert_eq!(left, if rest.is_empty() { &all[..] } else { rest });
+            let _guard = AffinityGuard::avoid(&[*first]);
+            let remaining = allowed().unwrap();
+            // With only one CPU the affinity stays.
+            assert_eq!(remaining, if rest.is_empty() { &all[..] } else { rest });
         }
         assert_eq!(allowed().unwrap(), all);
         pin_current_thread(&[*first, usize::MAX]).unwrap();

@@ -1,9 +1,9 @@
-//! Which user an agent is on the host.
+//! The host user of an agent.
 //!
-//! An ordinary user's agents are that user, confined to a user namespace. A root service must not run
-//! agents as root, and two agents should not share what the kernel accounts by user (processes, keys,
-//! pipes), so each gets a number of its own from a range that distributions leave unused
-//! (0x7000_0000 to 0x7fff_ffff; systemd's list of user ids names it so).
+//! Agents of an unprivileged service run as the service's user, confined to a user namespace. A root service
+//! must not run agents as root. Two agents must not share what the kernel accounts per user (processes, keys,
+//! pipes). So each agent of a root service gets its own user id from a range that distributions leave unused
+//! (0x7000_0000 to 0x7fff_ffff, unused according to systemd's list of user ids).
 
 use crate::{Layer, SandboxError, error::IoContext};
 use rustix::{fs, process, thread};
@@ -12,11 +12,11 @@ use std::sync::atomic::{AtomicU32, Ordering};
 const RANGE_START: u32 = 0x7000_0000;
 /// Ids per service process: its pid (22 bits) and these 6 bits fill the range.
 const SLOTS: u32 = 64;
-/// The last resort in a container that maps few ids.
+/// Fallback in a container that maps few ids.
 const NOBODY: u32 = 65_534;
 static NEXT_SLOT: AtomicU32 = AtomicU32::new(0);
 
-/// The host user that an agent becomes.
+/// The host user of one agent.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct AgentUser {
     /// User and group id in the service's own user namespace.
@@ -42,15 +42,15 @@ impl AgentUser {
             .map(|id| Some(Self { id }))
             .ok_or_else(|| SandboxError::Unavailable {
                 layer: Layer::Namespaces,
-                why: format!(
+                reason: format!(
                     "the service runs as root of a user namespace that maps neither id {own} nor {NOBODY}, \
                      so its agents would be root too; run it as an ordinary user, or map more ids"
                 ),
             })
     }
 
-    /// Becomes this user for good. Called between fork and exec, where only system calls are allowed.
-    pub(crate) fn assume(self) -> rustix::io::Result<()> {
+    /// Switches to this user irrevocably. Called between fork and exec, where only system calls are allowed.
+    pub(crate) fn switch_to(self) -> rustix::io::Result<()> {
         let (uid, gid) = (fs::Uid::from_raw(self.id), fs::Gid::from_raw(self.id));
         thread::set_thread_groups(&[])?;
         thread::set_thread_res_gid(gid, gid, gid)?;
@@ -62,7 +62,7 @@ fn read_map(path: &str) -> Result<String, SandboxError> {
     std::fs::read_to_string(path).context(format_args!("cannot read {path}"))
 }
 
-/// `map` is the text of a `uid_map`: first inside id, first outside id, count.
+/// `map` is the text of a `uid_map`; its columns are first inside id, first outside id, count.
 fn is_mapped(map: &str, id: u32) -> bool {
     map.lines().any(|line| {
         let mut numbers = line.split_whitespace().map(str::parse::<u64>);
@@ -80,7 +80,7 @@ mod tests {
     use super::is_mapped;
 
     #[test]
-    fn a_full_map_holds_every_id_and_a_container_map_only_its_own() {
+    fn id_map_lookup_respects_its_ranges() {
         let full = "         0          0 4294967295\n";
         let container = "0 1000 1\n1 100000 65536\n";
         assert!(is_mapped(full, 0x7000_0000));

@@ -1,4 +1,4 @@
-//! Finds bubblewrap and writes its command line.
+//! Finds bubblewrap and builds its command line.
 
 use crate::{
     Layer, SandboxError, SpawnSpec,
@@ -21,15 +21,15 @@ use std::{
 const CANDIDATES: [&str; 3] = ["/usr/bin/bwrap", "/usr/local/bin/bwrap", "/bin/bwrap"];
 pub(crate) const CURE_INSTALL: &str = "apt-get install bubblewrap";
 
-/// User and group id inside; nobody special.
+/// User and group id inside the sandbox, without any meaning.
 const INNER_ID: &str = "1000";
 const PASSWD: &str = "agent:x:1000:1000:agent:/tmp:/bin/sh\n";
 const GROUP: &str = "agent:x:1000:\n";
 
-/// Settings and counters of the whole host (asynchronous input, terminals, open files …), and terminals
-/// themselves, whose number all agents share.
+/// Hidden because they show settings and counters of the whole host (asynchronous I/O, terminals, open files …),
+/// and terminals, whose number all agents share.
 const HIDDEN_FOLDERS: [&str; 4] = ["/proc/sys", "/proc/pressure", "/proc/fs", "/dev/pts"];
-/// Counters of the whole host, locks among them.
+/// Hidden because they show counters of the whole host, including file locks.
 const HIDDEN_FILES: [&str; 17] = [
     "/proc/locks",
     "/proc/vmstat",
@@ -50,9 +50,9 @@ const HIDDEN_FILES: [&str; 17] = [
     "/proc/swaps",
 ];
 
-/// What ordinary libraries read of the host's counters: agents see them as they were before the first agent,
-/// for they also count what agents do (the processes that were ever started, say). Of CPUs they tell those that
-/// are the agent's.
+/// Counters of the host that ordinary libraries read. Agents see a snapshot from before the first agent, because
+/// the live counters also count what agents do (the number of started processes, say). They list only the agent's
+/// CPUs.
 const FROZEN_FILES: [&str; 5] = [
     "/proc/stat",
     "/proc/cpuinfo",
@@ -61,18 +61,18 @@ const FROZEN_FILES: [&str; 5] = [
     "/proc/uptime",
 ];
 
-/// An installed bubblewrap and what it can do.
+/// An installed bubblewrap and its features.
 #[derive(Debug, Clone)]
 pub(crate) struct Bubblewrap {
     pub program: PathBuf,
-    /// e.g. `bubblewrap 0.8.0`
+    /// Version line, e.g. `bubblewrap 0.8.0`.
     pub version: String,
-    /// Forbids further user namespaces inside, beside the filter.
+    /// It can forbid nested user namespaces, in addition to the seccomp filter.
     disables_user_namespaces: bool,
 }
 
 impl Bubblewrap {
-    /// The host's bubblewrap; asked once per process.
+    /// The host's bubblewrap, probed once per process.
     pub(crate) fn find() -> Result<&'static Self, SandboxError> {
         static FOUND: OnceLock<Bubblewrap> = OnceLock::new();
         if let Some(found) = FOUND.get() {
@@ -84,7 +84,7 @@ impl Bubblewrap {
             .find(|path| path.is_file())
             .ok_or_else(|| SandboxError::Unavailable {
                 layer: Layer::Namespaces,
-                why: format!(
+                reason: format!(
                     "bubblewrap is not installed ({}); install it: {CURE_INSTALL}",
                     CANDIDATES.join(", ")
                 ),
@@ -108,7 +108,7 @@ impl Bubblewrap {
             if !help.contains(option) {
                 return Err(SandboxError::Unavailable {
                     layer: Layer::Namespaces,
-                    why: format!(
+                    reason: format!(
                         "{} lacks {}; bubblewrap 0.8 or newer is needed",
                         program.display(),
                         option.trim()
@@ -125,8 +125,8 @@ impl Bubblewrap {
         }))
     }
 
-    /// The command line for `spec`, with what the child needs for it. `private_mounts`: bubblewrap runs
-    /// as a user who may be unable to reach the files by name.
+    /// The command line for `spec`, with the descriptors and mounts that the child needs. `private_mounts`:
+    /// bubblewrap runs as a user that may be unable to reach the files by path.
     pub(crate) fn command(
         &self,
         spec: &SpawnSpec,
@@ -158,8 +158,8 @@ impl Bubblewrap {
         if self.disables_user_namespaces {
             line.args(["--disable-userns"]);
         }
-        // The agent is its namespace's first process: when it ends, all it left behind ends with it. And
-        // no helper of bubblewrap, which no filter binds, is inside to be taken over.
+        // The agent is its namespace's first process: when it ends, the kernel kills all its remaining processes.
+        // And no helper process of bubblewrap, which no filter restricts, is inside for an agent to take over.
         line.args([
             "--as-pid-1",
             "--die-with-parent",
@@ -171,7 +171,7 @@ impl Bubblewrap {
         line.fd("--json-status-fd", status);
         let root = spec.runtime.root();
         if let Some(root) = root {
-            check_own_places(root)?;
+            check_mount_points(root)?;
             line.read_only(root, Path::new("/"))?;
         }
         for path in mount_order(&spec.runtime.read_only_paths) {
@@ -179,9 +179,9 @@ impl Bubblewrap {
         }
         line.args(["--proc", "/proc", "--dev", "/dev"]);
         line.hide_counters();
-        let cpus = CpuView::of(&spec.cpus, &spec.limits);
+        let cpus = CpuView::new(&spec.cpus, &spec.limits);
         line.freeze_counters(&cpus)?;
-        // Nothing can be made in a root of the agent's own.
+        // An image's root is read-only, so the folder for the CPU lists must be a new file system.
         if root.is_some() {
             line.args(["--perms", "0755", "--size", "65536", "--tmpfs", "/sys"]);
         }
@@ -223,7 +223,7 @@ impl Bubblewrap {
         line.args(["--"]);
         line.args(spec.command.iter().map(String::as_str));
         let mut command = Command::new(&self.program);
-        // bubblewrap itself sees nothing of the bundle's variables: LD_PRELOAD would work on it outside.
+        // bubblewrap itself gets none of the bundle's variables: LD_PRELOAD would affect it outside the sandbox.
         command.args(line.args).env_clear().current_dir("/");
         Ok(Invocation {
             command,
@@ -233,7 +233,7 @@ impl Bubblewrap {
     }
 }
 
-/// bubblewrap's command, and what its process needs before the exec.
+/// bubblewrap's command, and the descriptors and mounts that its process needs before the exec.
 #[derive(Debug)]
 pub(crate) struct Invocation {
     pub command: Command,
@@ -241,7 +241,7 @@ pub(crate) struct Invocation {
     pub mounts: Option<PrivateMounts>,
 }
 
-/// The agent's variables; the bundle's own come last, and may replace all others.
+/// The agent's environment variables; the bundle's own may replace all others.
 pub(crate) fn environment(spec: &SpawnSpec, home: &str) -> Vec<(String, String)> {
     let mut variables = std::collections::BTreeMap::from([
         ("PATH".to_owned(), spec.runtime.path.clone()),
@@ -250,10 +250,10 @@ pub(crate) fn environment(spec: &SpawnSpec, home: &str) -> Vec<(String, String)>
         ("USER".to_owned(), "agent".to_owned()),
         ("LOGNAME".to_owned(), "agent".to_owned()),
         ("LANG".to_owned(), "C.UTF-8".to_owned()),
-        // A thread of ONNX Runtime's would report to its makers, try again and again, and take the agent's time.
+        // A thread of ONNX Runtime would send telemetry, retry without end, and use the agent's CPU time.
         ("ORT_DISABLE_TELEMETRY".to_owned(), "1".to_owned()),
     ]);
-    variables.extend(CpuView::of(&spec.cpus, &spec.limits).variables());
+    variables.extend(CpuView::new(&spec.cpus, &spec.limits).variables());
     variables.extend(spec.env.clone());
     variables.into_iter().collect()
 }
@@ -275,7 +275,7 @@ impl CommandLine {
         self.inherit.push(fd);
     }
 
-    /// Covers what tells of the host as a whole, or of other agents, and is of no use to an agent.
+    /// Covers files that show the whole host or other agents, and that no agent needs.
     fn hide_counters(&mut self) {
         for folder in HIDDEN_FOLDERS.into_iter().filter(|path| is_there(path)) {
             let cover = ["--perms", "0555", "--size", "4096", "--tmpfs", folder];
@@ -293,12 +293,12 @@ impl CommandLine {
             FROZEN_FILES.into_iter().filter_map(read).collect()
         });
         for (path, content) in frozen {
-            self.cover(path, &cpus.of_file(path, content))?;
+            self.cover(path, &cpus.filter_file(path, content))?;
         }
         Ok(())
     }
 
-    /// Has a file that is there say something else.
+    /// Mounts `content` over an existing file.
     fn cover(&mut self, inside: &str, content: &[u8]) -> Result<(), SandboxError> {
         let fd = memory_file(content)?;
         self.args(["--perms", "0444"]);
@@ -315,7 +315,7 @@ impl CommandLine {
         Ok(())
     }
 
-    /// Shows `host` as `inside`: a link as the same link, all else as a read-only mount.
+    /// Shows `host` at `inside`: a link as the same link, anything else as a read-only mount.
     fn read_only(&mut self, host: &Path, inside: &Path) -> Result<(), SandboxError> {
         if host == inside
             && let Ok(target) = fs::read_link(host)
@@ -336,17 +336,17 @@ impl CommandLine {
     }
 }
 
-/// What a root of the agent's own must have, for the sandbox covers it. bubblewrap follows a link where it
-/// mounts, and would do so on the host: whoever made the root has taken care that none is one, and it is looked
-/// at again here.
-fn check_own_places(root: &Path) -> Result<(), SandboxError> {
-    let check = |place: &str, kind: &str, is_right: fn(&fs::Metadata) -> bool| {
-        let what = format!("the agent's root has no {kind} /{place}");
-        let meta = fs::symlink_metadata(root.join(place)).context(&what)?;
-        if is_right(&meta) {
+/// Checks the paths of an image's root over which the sandbox mounts. bubblewrap follows a link at a mount
+/// point, and would follow it on the host. The code that unpacked the root leaves no link there; this is a second
+/// check.
+fn check_mount_points(root: &Path) -> Result<(), SandboxError> {
+    let check = |path: &str, kind: &str, is_expected: fn(&fs::Metadata) -> bool| {
+        let action = format!("the agent's root has no {kind} /{path}");
+        let meta = fs::symlink_metadata(root.join(path)).context(&action)?;
+        if is_expected(&meta) {
             return Ok(());
         }
-        Err(SandboxError::other(what, "it is something else"))
+        Err(SandboxError::other(action, "it is something else"))
     };
     for folder in ["agent", "dev", "etc", "proc", "sys", "tmp"] {
         check(folder, "folder", fs::Metadata::is_dir)?;
@@ -361,7 +361,7 @@ fn is_there(path: &str) -> bool {
     path.starts_with("/dev/") || Path::new(path).exists()
 }
 
-/// Parents before what is inside them, and nothing that an earlier mount shows already.
+/// Sorted paths without duplicates and without paths inside others, which a mount of the outer path shows already.
 pub(crate) fn mount_order(paths: &[PathBuf]) -> Vec<PathBuf> {
     let mut sorted = paths.to_vec();
     sorted.sort();
@@ -375,7 +375,7 @@ pub(crate) fn mount_order(paths: &[PathBuf]) -> Vec<PathBuf> {
     mounts
 }
 
-/// A file without a name, at its start.
+/// An anonymous file in memory, positioned at its start.
 fn memory_file(content: &[u8]) -> Result<OwnedFd, SandboxError> {
     let make = || -> io::Result<OwnedFd> {
         let mut file = fs::File::from(memfd_create("faceoff", MemfdFlags::CLOEXEC)?);
@@ -391,7 +391,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_path_inside_a_mounted_one_is_not_mounted_again() {
+    fn path_inside_a_mounted_path_is_not_mounted_again() {
         let paths = ["/usr/lib/python3", "/usr/lib", "/usr/lib64", "/usr/lib"].map(PathBuf::from);
         assert_eq!(
             mount_order(&paths),

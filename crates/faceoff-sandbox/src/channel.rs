@@ -1,16 +1,18 @@
-//! What passes between service and agent: questions, answers, and the agent's log.
+//! The channel between service and agent: questions, answers, and the agent's log.
 //!
-//! All three are stream sockets, never pipes. A pipe has one lock, which is held by whoever is inside a call on
-//! it, and an agent can stay inside for as long as it likes: in a `splice` from an empty socket, or in a `write`
-//! of memory whose page fault waits for another of its threads. Reading, writing, closing, and even asking how
-//! much there is, would wait for that lock, whether the pipe blocks or not. The two ends of a pair of sockets
-//! have a lock each, under which nobody sleeps. What one end does can still be made dear for the other (each piece that is
-//! read wakes all who poll for room), which is why no read takes much, and all of it is on the agent's time.
+//! All three are stream sockets, never pipes. A pipe has a single lock, held by the thread that is inside a call
+//! on it. An agent can stay inside a call as long as it likes: in a `splice` from an empty socket, or in a `write`
+//! of memory whose page fault waits for another of its threads. Reading, writing, closing, and even querying the
+//! number of bytes would wait for that lock, even on a non-blocking pipe.
 //!
-//! Neither end can be opened by name through `/proc/*/fd`, by itself or a child, and the room for a question is
-//! the writer's to decide, so that no agent can make it smaller.
+//! Each end of a socket pair has its own lock, and no thread sleeps while it holds one. An agent can still make
+//! the service's calls expensive: each read wakes all threads that poll the other end for space. Therefore reads
+//! are small, and their time counts as the agent's time.
+//!
+//! Neither the agent nor a child of it can reopen an end by path through `/proc/*/fd`. The writer's buffer
+//! determines the space for a question, so no agent can make it smaller.
 
-use crate::{SandboxError, error::IoContext, line_socket::LineSocket, passed_files};
+use crate::{SandboxError, error::IoContext, line_socket::LineSocket, fd_passing};
 use rustix::{
     fs::fstat,
     net::{
@@ -23,45 +25,45 @@ use std::{
     os::fd::{AsFd, OwnedFd},
 };
 
-/// Room for questions: none is longer, and `end` with the `reset` after it fits as well.
-const ROOM_BYTES: usize = 64 << 10;
-/// Room for a log that nobody has read yet: what lies there is read at one go, byte by byte if need be.
+/// Buffer size for questions: no question is longer, and an `end` followed by a `reset` fits as well.
+const QUESTION_BYTES: usize = 64 << 10;
+/// Buffer size for unread log. One read may take all of it, and an agent may have written it byte by byte.
 const LOG_BYTES: usize = 16 << 10;
 
-/// Our ends and the agent's.
+/// The service's ends and the agent's ends.
 pub(crate) struct Channel {
     pub lines: LineSocket,
     pub log: OwnedFd,
     /// The agent's standard input, output and error.
-    pub agents: [OwnedFd; 3],
+    pub agent_fds: [OwnedFd; 3],
     /// How `/proc/*/fd` names the agent's end of its output.
     pub output_name: String,
 }
 
 impl Channel {
     pub(crate) fn new() -> Result<Self, SandboxError> {
-        const WHAT: &str = "cannot make a channel to the agent";
-        let (stdin, input) = sockets().context(WHAT)?;
-        let (output, stdout) = sockets().context(WHAT)?;
-        let (log, stderr) = sockets().context(WHAT)?;
-        set_socket_send_buffer_size(&input, 2 * ROOM_BYTES).context(WHAT)?;
-        let room = socket_send_buffer_size(&input).context(WHAT)?;
-        if room < ROOM_BYTES {
-            let why = format!("it holds {room} bytes, {ROOM_BYTES} are needed");
-            return Err(SandboxError::other(WHAT, why));
+        const ACTION: &str = "cannot make a channel to the agent";
+        let (stdin, input) = sockets().context(ACTION)?;
+        let (output, stdout) = sockets().context(ACTION)?;
+        let (log, stderr) = sockets().context(ACTION)?;
+        set_socket_send_buffer_size(&input, 2 * QUESTION_BYTES).context(ACTION)?;
+        let size = socket_send_buffer_size(&input).context(ACTION)?;
+        if size < QUESTION_BYTES {
+            let reason = format!("it holds {size} bytes, {QUESTION_BYTES} are needed");
+            return Err(SandboxError::other(ACTION, reason));
         }
-        set_socket_send_buffer_size(&stderr, LOG_BYTES).context(WHAT)?;
-        // What an agent writes to its standard input would lie there unread. (The other two ways stay open in
-        // both directions: programs that watch their output for a hang-up would see one.)
-        shutdown(&input, Shutdown::Read).context(WHAT)?;
-        for ours in [&output, &log] {
-            passed_files::refuse(ours.as_fd());
+        set_socket_send_buffer_size(&stderr, LOG_BYTES).context(ACTION)?;
+        // Without this, bytes that an agent writes to its standard input would stay unread in the socket. The other
+        // two sockets stay open in both directions: programs that poll their output for a hang-up would see one.
+        shutdown(&input, Shutdown::Read).context(ACTION)?;
+        for end in [&output, &log] {
+            fd_passing::disable(end.as_fd());
         }
-        let output_name = name(&stdout).context(WHAT)?;
+        let output_name = name(&stdout).context(ACTION)?;
         Ok(Self {
             lines: LineSocket::new(input, output),
             log,
-            agents: [stdin, stdout, stderr],
+            agent_fds: [stdin, stdout, stderr],
             output_name,
         })
     }
@@ -76,8 +78,8 @@ fn sockets() -> io::Result<(OwnedFd, OwnedFd)> {
     )?)
 }
 
-fn name(end: impl AsFd) -> io::Result<String> {
-    Ok(format!("socket:[{}]", fstat(end)?.st_ino))
+fn name(socket: impl AsFd) -> io::Result<String> {
+    Ok(format!("socket:[{}]", fstat(socket)?.st_ino))
 }
 
 #[cfg(test)]
@@ -88,15 +90,15 @@ mod tests {
     use std::time::{Duration, Instant};
 
     #[test]
-    fn a_long_question_follows_as_it_is_read() {
+    fn long_question_is_sent_as_the_agent_reads() {
         let Channel {
             mut lines,
-            agents: [stdin, stdout, _],
+            agent_fds: [stdin, stdout, _],
             output_name,
             ..
         } = Channel::new().unwrap();
         assert!(output_name.starts_with("socket:["));
-        let question: Vec<u8> = (0..16 * ROOM_BYTES)
+        let question: Vec<u8> = (0..16 * QUESTION_BYTES)
             .map(|i| b'a' + (i % 23) as u8)
             .collect();
         lines.send(&question).unwrap().unwrap();
@@ -107,25 +109,25 @@ mod tests {
             lines.read_line(10, now).unwrap(),
             ReadLine::TimedOut
         ));
-        let mut came = Vec::new();
-        while came.last() != Some(&b'\n') {
-            let mut some = [0; 10_000];
-            let count = read(&stdin, &mut some).unwrap();
-            came.extend_from_slice(&some[..count]);
-            let until = Instant::now();
+        let mut received = Vec::new();
+        while received.last() != Some(&b'\n') {
+            let mut buffer = [0; 10_000];
+            let count = read(&stdin, &mut buffer).unwrap();
+            received.extend_from_slice(&buffer[..count]);
+            let deadline = Instant::now();
             assert!(matches!(
-                lines.read_line(10, until).unwrap(),
+                lines.read_line(10, deadline).unwrap(),
                 ReadLine::TimedOut
             ));
         }
         assert!(lines.is_all_sent());
-        assert_eq!(came[..question.len()], question);
+        assert_eq!(received[..question.len()], question);
         write(&stdout, b"yes\n").unwrap();
-        let until = Instant::now() + Duration::from_secs(600);
+        let deadline = Instant::now() + Duration::from_secs(600);
         assert!(
-            matches!(lines.read_line(10, until).unwrap(), ReadLine::Line { bytes, .. } if bytes == b"yes")
+            matches!(lines.read_line(10, deadline).unwrap(), ReadLine::Line { bytes, .. } if bytes == b"yes")
         );
-        // Nobody reads any more, with something unread.
+        // The agent's end closes with unread bytes.
         lines.send(b"lost").unwrap().unwrap();
         drop(stdin);
         assert!(lines.send(b"gone").unwrap().is_err());
@@ -133,8 +135,8 @@ mod tests {
 
     #[test]
     fn standard_input_cannot_be_written_to() {
-        let Channel { agents, .. } = Channel::new().unwrap();
+        let Channel { agent_fds, .. } = Channel::new().unwrap();
         // Rust's programs ignore the signal that comes with it.
-        assert_eq!(write(&agents[0], b"x"), Err(Errno::PIPE));
+        assert_eq!(write(&agent_fds[0], b"x"), Err(Errno::PIPE));
     }
 }

@@ -1,4 +1,4 @@
-//! What the child does between fork and exec.
+//! Set-up of the child between fork and exec.
 
 use crate::{Limits, agent_user::AgentUser, private_mounts::PrivateMounts, seccomp::Filters};
 use rustix::{
@@ -14,25 +14,25 @@ use std::{
     process::Command,
 };
 
-/// Everything that is prepared before the fork, because afterwards only system calls are allowed.
+/// The inputs of the set-up. They are allocated before the fork, because afterwards only system calls are allowed.
 #[derive(Debug, Default)]
 pub(crate) struct ChildSetup {
     /// `cgroup.procs` files to enter by writing `0`.
     pub cgroup_procs: Vec<OwnedFd>,
     pub cpus: Option<CpuSet>,
     pub rlimits: Vec<(Resource, Rlimit)>,
-    /// Files to show to that user, bound while the child is still root.
+    /// Files made reachable for `user`, mounted while the child is still root.
     pub mounts: Option<PrivateMounts>,
     pub user: Option<AgentUser>,
     /// Descriptors that survive the exec.
     pub inherit: Vec<OwnedFd>,
-    /// Filters to install here, when no bubblewrap does it.
+    /// Filters that the child installs itself; used without bubblewrap.
     pub filters: Option<Filters>,
-    /// Make the agent the first victim when the whole host runs out of memory.
-    pub yield_memory: bool,
+    /// Makes the agent the first victim of the OOM killer when the host runs out of memory.
+    pub raise_oom_score: bool,
 }
 
-/// The step that failed, sent as one byte.
+/// A step of the set-up. The child reports a failed one as one byte.
 #[derive(Debug, Clone, Copy)]
 enum Step {
     CloseDescriptors,
@@ -59,7 +59,7 @@ impl Step {
         Self::InstallFilters,
     ];
 
-    fn what(self) -> &'static str {
+    fn description(self) -> &'static str {
         match self {
             Self::CloseDescriptors => {
                 "cannot close what the service has open (close_range, Linux 5.11, is needed)"
@@ -67,8 +67,8 @@ impl Step {
             Self::EnterCgroup => "cannot enter the agent's cgroup",
             Self::SetCpus => "cannot bind the agent to its CPUs",
             Self::MakeMounts => {
-                "cannot show files to the agent's user in a mount namespace (a root service needs \
-                 CAP_SYS_ADMIN for it; without, run it as an ordinary user)"
+                "cannot mount files for the agent's user in a mount namespace (a root service needs \
+                 CAP_SYS_ADMIN; without it, run the service as an ordinary user)"
             }
             Self::SetRlimits => "cannot set the agent's resource limits",
             Self::BecomeUser => "cannot become the agent's user",
@@ -79,24 +79,24 @@ impl Step {
     }
 }
 
-/// Tells which step failed when the spawn did.
+/// Reports which step failed, after a failed spawn.
 #[derive(Debug)]
 pub(crate) struct StepReport(OwnedFd);
 
 impl StepReport {
-    /// The failed step in words; `None` if it was the exec itself.
+    /// Description of the failed step; `None` if the exec itself failed.
     pub(crate) fn failed_step(self) -> Option<&'static str> {
         let mut byte = [0];
         std::fs::File::from(self.0).read_exact(&mut byte).ok()?;
         Step::ALL
             .iter()
             .find(|step| **step as u8 == byte[0])
-            .map(|step| step.what())
+            .map(|step| step.description())
     }
 }
 
 impl ChildSetup {
-    /// Arranges for `command` to do all this in the child.
+    /// Makes `command` run this set-up in its child.
     pub(crate) fn install(mut self, command: &mut Command) -> io::Result<StepReport> {
         let (reader, writer) = pipe_with(PipeFlags::CLOEXEC)?;
         let parent = process::getpid();
@@ -126,8 +126,8 @@ impl ChildSetup {
         if let Some(cpus) = &self.cpus {
             sched_setaffinity(None, cpus).map_err(|error| (Step::SetCpus, error))?;
         }
-        if self.yield_memory {
-            // A courtesy to the host, not a limit: some containers hide the file.
+        if self.raise_oom_score {
+            // Best effort, since it protects the host and is no limit: some containers hide the file.
             let file = open(
                 c"/proc/self/oom_score_adj",
                 OFlags::WRONLY | OFlags::CLOEXEC,
@@ -136,19 +136,19 @@ impl ChildSetup {
             let _ = file.and_then(|file| write(&file, b"800"));
         }
         if let Some(mounts) = &mut self.mounts {
-            mounts.make().map_err(|error| (Step::MakeMounts, error))?;
+            mounts.mount_all().map_err(|error| (Step::MakeMounts, error))?;
         }
         for &(resource, limit) in &self.rlimits {
             process::setrlimit(resource, limit).map_err(|error| (Step::SetRlimits, error))?;
         }
         if let Some(user) = self.user {
-            user.assume().map_err(|error| (Step::BecomeUser, error))?;
+            user.switch_to().map_err(|error| (Step::BecomeUser, error))?;
         }
         for fd in &self.inherit {
             fcntl_setfd(fd, FdFlags::empty()).map_err(|error| (Step::Inherit, error))?;
         }
-        // After the change of user, which clears it. If the service died before this, nobody would tell
-        // us: then our parent is another one by now.
+        // After the change of user, which clears the signal. If the service died before this call, no signal
+        // comes; the parent is then another process.
         process::set_parent_process_death_signal(Some(Signal::KILL))
             .map_err(|error| (Step::DieWithParent, error))?;
         if process::getppid() != Some(parent) {
@@ -164,11 +164,12 @@ impl ChildSetup {
     }
 }
 
-/// Whatever the service was started with, or a library opened carelessly, is not for the agent.
+/// Agents must not inherit descriptors that the service was started with or that a library opened without
+/// `CLOEXEC`.
 fn close_rest_on_exec() -> Result<(), Errno> {
     const FIRST: libc::c_uint = 3;
     #[expect(unsafe_code, reason = "rustix has no close_range")]
-    // SAFETY: takes three numbers; marks descriptors and closes none, so nobody's descriptor goes away.
+    // SAFETY: takes three numbers; it marks descriptors and closes none, so no open descriptor becomes invalid.
     let result = unsafe {
         libc::syscall(
             libc::SYS_close_range,
@@ -193,14 +194,15 @@ fn errno_of(error: &seccompiler::Error) -> Errno {
     }
 }
 
-/// The resource limits of an agent; each is also lowered to what the service itself may have at most.
+/// The resource limits of an agent, each capped at the service's own hard limit.
 pub(crate) fn rlimits(limits: &Limits, own_user: bool) -> Vec<(Resource, Rlimit)> {
     const LOCKED_BYTES: u64 = 8 << 20;
     const STACK_BYTES: u64 = 8 << 20;
-    /// Queued signals. Each timer of `timer_create` holds one, so this bounds what can expire at one instant.
+    /// Queued signals. Each timer of `timer_create` holds one, so this bounds the timers that can expire at one
+    /// instant.
     const PENDING_SIGNALS: u64 = 256;
-    /// Not 0: a host whose core dumps go to a program starts it, as root, even at 0, but not at 1, which no
-    /// dump fits either.
+    /// Not 0: a host that pipes core dumps to a program starts it, as root, even at 0, but not at 1. No dump fits
+    /// into 1 byte either.
     const CORE_BYTES: u64 = 1;
     let mut wanted = vec![
         (Resource::Nofile, u64::from(limits.open_files)),
@@ -213,8 +215,8 @@ pub(crate) fn rlimits(limits: &Limits, own_user: bool) -> Vec<(Resource, Rlimit)
         (Resource::Rtprio, 0),
     ];
     if own_user {
-        // Counted by user, so of use only where each agent has its own. A little above the cgroup's
-        // limit, which is to be met first, because it is counted and reported.
+        // The kernel counts this limit per user, so it is useful only if each agent has its own user. It is a
+        // little above the cgroup's limit, which must be reached first because it is counted and reported.
         wanted.push((Resource::Nproc, u64::from(limits.pids) + 8));
     }
     wanted

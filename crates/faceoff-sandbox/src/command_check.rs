@@ -1,4 +1,4 @@
-//! Looks at the bundle's command before anything is started, so that the usual mistakes get a clear word.
+//! Checks the bundle's command before the start, so that common mistakes get a clear message.
 
 use faceoff_types::AgentFaultKind;
 use rustix::{
@@ -7,13 +7,13 @@ use rustix::{
 };
 use std::{collections::BTreeMap, path::Path};
 
-/// Far below what the kernel takes (128 KiB and 2 MiB), so that it is never our command line that is too
-/// long.
+/// Far below the kernel's limits (128 KiB and 2 MiB), so that bubblewrap's longer command line never exceeds
+/// them.
 const MAX_WORD_BYTES: usize = 32 << 10;
 const MAX_TOTAL_BYTES: usize = 256 << 10;
 
-/// Refuses an empty command, what cannot be passed to a program, and a program of the bundle that is
-/// missing or not executable. A program of the runtime is looked up inside the sandbox only.
+/// Refuses an empty command, arguments or variables that no program can be given, and a program of the bundle
+/// that is missing or not executable. A program of the runtime is looked up inside the sandbox only.
 pub(crate) fn check_command(
     bundle_dir: &Path,
     command: &[String],
@@ -51,12 +51,12 @@ pub(crate) fn check_command(
     if climbs_out(in_bundle) {
         return refuse(format!("`{program}` leads out of the bundle"));
     }
-    let found = match look_beneath(bundle_dir, in_bundle) {
+    let found = match stat_beneath(bundle_dir, in_bundle) {
         Ok(found) => found,
         Err(Errno::NOENT | Errno::NOTDIR | Errno::NAMETOOLONG) => {
             return refuse(format!("`{program}` is not in the bundle"));
         }
-        // A link leads out, or the kernel does not look for us: where the agent runs will tell.
+        // A link leads out of the bundle, or the kernel lacks the call: the start in the sandbox decides.
         Err(_) => return Ok(()),
     };
     match FileType::from_raw_mode(found.st_mode) {
@@ -69,7 +69,7 @@ pub(crate) fn check_command(
     }
 }
 
-/// Does a relative path go above where it starts?
+/// Does a relative path leave its starting folder?
 fn climbs_out(path: &str) -> bool {
     let mut depth = 0_usize;
     for part in path.split('/').filter(|part| !matches!(*part, "" | ".")) {
@@ -82,9 +82,9 @@ fn climbs_out(path: &str) -> bool {
     false
 }
 
-/// What is at a path of the bundle. Never looks at anything outside of it, whatever its links say: that
-/// would tell an agent of the host's files. The last part is not followed if it is a link.
-fn look_beneath(bundle_dir: &Path, path: &str) -> Result<Stat, Errno> {
+/// Metadata of a path in the bundle. Never resolves outside of the bundle, whatever its links say: that would
+/// reveal the host's files to an agent. The last part is not followed if it is a link.
+fn stat_beneath(bundle_dir: &Path, path: &str) -> Result<Stat, Errno> {
     let folder = open(
         bundle_dir,
         OFlags::PATH | OFlags::DIRECTORY | OFlags::CLOEXEC,
@@ -117,12 +117,12 @@ mod tests {
     }
 
     #[test]
-    fn nothing_is_told_of_what_is_outside_of_the_bundle() {
+    fn command_check_reveals_nothing_outside_the_bundle() {
         let host = tempfile::tempdir().unwrap();
         let bundle = host.path().join("bundle");
         fs::create_dir_all(bundle.join("bin")).unwrap();
         fs::write(bundle.join("agent"), "").unwrap();
-        // One that exists, not executable and of a telling mode, and one that does not.
+        // An existing file with an unusual mode, and a missing one, must get the same answer.
         fs::write(host.path().join("secret"), "").unwrap();
         fs::set_permissions(
             host.path().join("secret"),
@@ -144,12 +144,12 @@ mod tests {
             "host/",
             "/agent/host/",
         ] {
-            let told = ["secret", "missing", "secret/x"].map(|name| {
-                let told = check(&bundle, &format!("{place}{name}"));
-                told.map(|told| told.replace(name, "NAME"))
+            let messages = ["secret", "missing", "secret/x"].map(|name| {
+                let message = check(&bundle, &format!("{place}{name}"));
+                message.map(|message| message.replace(name, "NAME"))
             });
-            assert_eq!(told[0], told[1], "{place}");
-            assert_eq!(told[0], told[2], "{place}");
+            assert_eq!(messages[0], messages[1], "{place}");
+            assert_eq!(messages[0], messages[2], "{place}");
         }
         let absolute = host.path().join("secret").display().to_string();
         for program in [&*absolute, "/etc/shadow", "//agent/../etc/shadow", "./link"] {
@@ -164,14 +164,14 @@ mod tests {
     }
 
     #[test]
-    fn mistakes_inside_the_bundle_are_named() {
+    fn command_check_names_mistakes_in_the_bundle() {
         let bundle = tempfile::tempdir().unwrap();
         fs::create_dir(bundle.path().join("bin")).unwrap();
         fs::write(bundle.path().join("bin/agent"), "").unwrap();
-        let told = |program: &str| check(bundle.path(), program).unwrap();
-        assert!(told("./bin").ends_with("is a folder"));
-        assert!(told("bin/../bin/agent").ends_with("is not executable (mode 644)"));
-        assert!(told("bin/agent/x").ends_with("is not in the bundle"));
+        let message = |program: &str| check(bundle.path(), program).unwrap();
+        assert!(message("./bin").ends_with("is a folder"));
+        assert!(message("bin/../bin/agent").ends_with("is not executable (mode 644)"));
+        assert!(message("bin/agent/x").ends_with("is not in the bundle"));
         let agent = bundle.path().join("bin/agent");
         fs::set_permissions(agent, fs::Permissions::from_mode(0o755)).unwrap();
         assert_eq!(check(bundle.path(), "/agent/bin/agent"), None);

@@ -1,10 +1,10 @@
-//! CPU time by the processes' own clocks: of a tree that no cgroup accounts for, and where the cgroup's lags behind.
+//! CPU time by the processes' own clocks: for a tree without a cgroup, and where the cgroup's counter lags behind.
 
 use rustix::process::Pid;
 use std::{cell::RefCell, collections::BTreeMap, fs, time::Duration};
 
-/// The CPU time of every process of a tree that was ever seen, in nanoseconds. What a process used
-/// after the last look at it, or one that came and went between two looks, is missed.
+/// CPU time of every process ever seen in a tree, in nanoseconds. It misses the time that a process used after
+/// its last reading, and processes that started and ended between two readings.
 #[derive(Debug)]
 pub(crate) struct TreeClock {
     root: Pid,
@@ -19,7 +19,7 @@ impl TreeClock {
         }
     }
 
-    /// Seconds so far; `None` where the host tells nothing.
+    /// Seconds so far; `None` if the host does not report it.
     pub(crate) fn cpu_time_s(&self) -> Option<f64> {
         let mut seen = self.seen.borrow_mut();
         let mut open = vec![self.root.as_raw_nonzero().get()];
@@ -35,15 +35,15 @@ impl TreeClock {
     }
 }
 
-/// CPU time of these processes up to now, also of what runs at this moment, as far as they still are.
-pub(crate) fn run_time_of(processes: &[Pid]) -> Duration {
+/// CPU time of the living processes among these up to now, including the time slices that run at this moment.
+pub(crate) fn total_run_time(processes: &[Pid]) -> Duration {
     let each = processes
         .iter()
         .filter_map(|process| process_clock_ns(process.as_raw_nonzero().get()));
     Duration::from_nanos(each.sum())
 }
 
-/// The children of all threads of a process; none where the kernel does not list them.
+/// The children of all threads of a process; none if the kernel does not list them.
 fn children(pid: i32) -> Vec<i32> {
     let threads = fs::read_dir(format!("/proc/{pid}/task"))
         .into_iter()
@@ -68,11 +68,11 @@ fn process_clock_ns(pid: i32) -> Option<u64> {
     };
     #[expect(unsafe_code, reason = "rustix knows only the caller's own clocks")]
     // SAFETY: both calls write to the variable whose address they are given, and to nothing else.
-    let told = unsafe {
+    let is_read = unsafe {
         libc::clock_getcpuclockid(pid, &raw mut clock) == 0
             && libc::clock_gettime(clock, &raw mut time) == 0
     };
     let seconds = u64::try_from(time.tv_sec).ok()?;
     let nanoseconds = u64::try_from(time.tv_nsec).ok()?;
-    told.then_some(seconds * 1_000_000_000 + nanoseconds)
+    is_read.then_some(seconds * 1_000_000_000 + nanoseconds)
 }

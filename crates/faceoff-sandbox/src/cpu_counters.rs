@@ -1,18 +1,18 @@
-//! The kernel's counters of run time, as its files have them.
+//! Parsers of the kernel's run time counters.
 
 use std::{fs::File, os::unix::fs::FileExt, time::Duration};
 
-/// `USER_HZ` of every architecture that the seccomp filter knows.
+/// 1 / `USER_HZ`, the same on every architecture that the seccomp filter supports.
 const TICK: Duration = Duration::from_millis(10);
 
-/// What one CPU did since the host's start, in ticks.
+/// Counters of one CPU since the host's start, in ticks.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub(crate) struct Ticks {
-    /// In user mode, the same with a nice value, in the kernel; interrupts are not among them.
+    /// User mode, user mode with a nice value, kernel mode; without interrupts.
     pub busy: [u64; 3],
-    /// Idle, and idle with a disk at work.
+    /// Idle, and idle while waiting for I/O.
     pub idle: [u64; 2],
-    /// Held up by the machine below a virtual one.
+    /// Steal time: the hypervisor ran something else.
     pub stolen: u64,
 }
 
@@ -20,16 +20,16 @@ pub(crate) fn ticks(count: u64) -> Duration {
     TICK * u32::try_from(count).unwrap_or(u32::MAX)
 }
 
-/// A counter file's content; they are short.
-pub(crate) fn text(file: &File) -> Option<String> {
+/// Content of a counter file; such files are short.
+pub(crate) fn read_text(file: &File) -> Option<String> {
     let mut bytes = vec![0; 16 << 10];
     let count = file.read_at(&mut bytes, 0).ok()?;
     bytes.truncate(count);
     String::from_utf8(bytes).ok()
 }
 
-/// The sum of some CPUs of `cpuacct.usage_percpu`.
-pub(crate) fn of_cpus(text: &str, cpus: &[usize]) -> Option<Duration> {
+/// Sum over `cpus` in `cpuacct.usage_percpu`.
+pub(crate) fn sum_of_cpus(text: &str, cpus: &[usize]) -> Option<Duration> {
     let each: Vec<&str> = text.split_ascii_whitespace().collect();
     let sum = cpus
         .iter()
@@ -38,8 +38,8 @@ pub(crate) fn of_cpus(text: &str, cpus: &[usize]) -> Option<Duration> {
     Some(Duration::from_nanos(sum))
 }
 
-/// The lines of some CPUs of `/proc/stat`.
-pub(crate) fn ticks_of(stat: &str, cpus: &[usize]) -> Option<Vec<Ticks>> {
+/// The counters of `cpus` in `/proc/stat`.
+pub(crate) fn parse_ticks(stat: &str, cpus: &[usize]) -> Option<Vec<Ticks>> {
     let one = |cpu: &usize| {
         let name = format!("cpu{cpu} ");
         let line = stat.lines().find_map(|line| line.strip_prefix(&name))?;
@@ -59,15 +59,15 @@ pub(crate) fn ticks_of(stat: &str, cpus: &[usize]) -> Option<Vec<Ticks>> {
     cpus.iter().map(one).collect()
 }
 
-/// `cpu.stat` of either version.
-pub(crate) fn throttled(stat: &str) -> Option<Duration> {
+/// Throttled time in `cpu.stat` of either cgroup version.
+pub(crate) fn parse_throttled(stat: &str) -> Option<Duration> {
     keyed(stat, "throttled_usec")
         .map(Duration::from_micros)
         .or_else(|| keyed(stat, "throttled_time").map(Duration::from_nanos))
 }
 
-/// Run time of a whole cgroup, by `cpu.stat` of version 2.
-pub(crate) fn usage(stat: &str) -> Option<Duration> {
+/// Run time of a whole cgroup in `cpu.stat` of cgroup version 2.
+pub(crate) fn parse_usage(stat: &str) -> Option<Duration> {
     keyed(stat, "usage_usec").map(Duration::from_micros)
 }
 
@@ -81,7 +81,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn counters_are_found_in_the_kernels_files() {
+    fn counters_are_parsed_from_kernel_files() {
         let stat =
             "cpu  9 9 9 9 9 9 9 9 0 0\ncpu1 1 2 3 4 5 6 7 8 0 0\ncpu10 0 0 0 0 0 0 0 0\nintr 5\n";
         let found = Ticks {
@@ -90,19 +90,19 @@ mod tests {
             stolen: 8,
         };
         assert_eq!(
-            ticks_of(stat, &[1, 10]),
+            parse_ticks(stat, &[1, 10]),
             Some(vec![found, Ticks::default()])
         );
-        assert_eq!(ticks_of(stat, &[0]), None);
+        assert_eq!(parse_ticks(stat, &[0]), None);
         assert_eq!(
-            of_cpus("10 20 30 \n", &[0, 2]),
+            sum_of_cpus("10 20 30 \n", &[0, 2]),
             Some(Duration::from_nanos(40))
         );
-        assert_eq!(of_cpus("10\n", &[1]), None);
+        assert_eq!(sum_of_cpus("10\n", &[1]), None);
         let v1 = "nr_periods 4\nnr_throttled 2\nthrottled_time 1500\n";
-        assert_eq!(throttled(v1), Some(Duration::from_nanos(1500)));
+        assert_eq!(parse_throttled(v1), Some(Duration::from_nanos(1500)));
         let v2 = "usage_usec 70\nnr_throttled 1\nthrottled_usec 3\n";
-        assert_eq!(throttled(v2), Some(Duration::from_micros(3)));
-        assert_eq!(usage(v2), Some(Duration::from_micros(70)));
+        assert_eq!(parse_throttled(v2), Some(Duration::from_micros(3)));
+        assert_eq!(parse_usage(v2), Some(Duration::from_micros(70)));
     }
 }

@@ -1,21 +1,21 @@
-//! The CPUs as an agent sees them: those that it may run on, and no others, wherever it looks.
+//! The CPUs that an agent sees: exactly those that it may run on, in every interface.
 //!
-//! Libraries count CPUs in `/sys`, in `/proc`, by affinity or by a variable, and start a thread for each; where
-//! these disagree, threads wait for each other on one CPU, or bind themselves to CPUs that are not theirs and fail.
+//! Libraries count CPUs in `/sys`, in `/proc`, by affinity or by a variable, and start a thread for each. If
+//! these disagree, threads wait for each other on one CPU, or try to bind to forbidden CPUs and fail.
 
 use crate::{
     Limits,
     affinity::{self, cpu_list},
 };
 
-/// Where libraries read which CPUs there are.
+/// Files in which libraries read the list of CPUs.
 const CPU_LISTS: [&str; 3] = [
     "/sys/devices/system/cpu/online",
     "/sys/devices/system/cpu/possible",
     "/sys/devices/system/cpu/present",
 ];
 
-/// What numerical libraries read for their number of threads.
+/// Variables from which numerical libraries take their number of threads.
 pub(crate) const THREAD_VARIABLES: [&str; 6] = [
     "OMP_NUM_THREADS",
     "OPENBLAS_NUM_THREADS",
@@ -33,11 +33,11 @@ pub(crate) struct CpuView {
 }
 
 impl CpuView {
-    /// Of an agent that is bound to `cpus`; to none: it runs where this process may.
-    pub(crate) fn of(cpus: &[usize], limits: &Limits) -> Self {
+    /// View of an agent bound to `cpus`. If the list is empty, the agent has the affinity of this process.
+    pub(crate) fn new(cpus: &[usize], limits: &Limits) -> Self {
         let cpus = match cpus {
-            // A host that does not even tell this has one CPU at least.
-            [] => affinity::of_process().unwrap_or_else(|_| vec![0]),
+            // A host that does not report its CPUs has at least one.
+            [] => affinity::process_cpus().unwrap_or_else(|_| vec![0]),
             own => own.to_vec(),
         };
         let quota = limits.cpus.ceil().max(1.0) as usize;
@@ -47,7 +47,7 @@ impl CpuView {
         }
     }
 
-    /// The lists of CPUs, each with its path.
+    /// The CPU list files: path and content.
     pub(crate) fn lists(&self) -> impl Iterator<Item = (&'static str, Vec<u8>)> {
         let list = format!("{}\n", cpu_list(&self.cpus));
         CPU_LISTS
@@ -55,7 +55,7 @@ impl CpuView {
             .into_iter()
     }
 
-    /// As many threads as there are CPUs, or as the CPU time allows if that is less.
+    /// The thread count variables: the number of CPUs, or the CPU quota rounded up if that is less.
     pub(crate) fn variables(&self) -> impl Iterator<Item = (String, String)> {
         let threads = self.threads.to_string();
         THREAD_VARIABLES
@@ -63,17 +63,17 @@ impl CpuView {
             .into_iter()
     }
 
-    /// What the host's file `path` says, without the CPUs that are not the agent's.
-    pub(crate) fn of_file(&self, path: &str, content: &[u8]) -> Vec<u8> {
+    /// The content of the host's file `path` without the CPUs that the agent may not use.
+    pub(crate) fn filter_file(&self, path: &str, content: &[u8]) -> Vec<u8> {
         let text = || String::from_utf8_lossy(content);
         match path {
-            "/proc/stat" => self.of_stat(&text()).into_bytes(),
-            "/proc/cpuinfo" => self.of_cpuinfo(&text()).into_bytes(),
+            "/proc/stat" => self.filter_stat(&text()).into_bytes(),
+            "/proc/cpuinfo" => self.filter_cpuinfo(&text()).into_bytes(),
             _ => content.to_vec(),
         }
     }
 
-    fn of_stat(&self, text: &str) -> String {
+    fn filter_stat(&self, text: &str) -> String {
         let is_shown = |line: &&str| {
             let name = line.split(' ').next().unwrap_or_default();
             match name.strip_prefix("cpu").map(str::parse) {
@@ -84,7 +84,7 @@ impl CpuView {
         text.split_inclusive('\n').filter(is_shown).collect()
     }
 
-    fn of_cpuinfo(&self, text: &str) -> String {
+    fn filter_cpuinfo(&self, text: &str) -> String {
         let is_shown = |block: &&str| {
             let number = block.lines().find_map(|line| {
                 let (name, value) = line.split_once(':')?;
@@ -105,11 +105,11 @@ mod tests {
             cpus: quota,
             ..Limits::default()
         };
-        CpuView::of(cpus, &limits)
+        CpuView::new(cpus, &limits)
     }
 
     #[test]
-    fn there_are_as_many_threads_as_cpus_unless_the_time_is_less() {
+    fn thread_count_is_limited_by_cpus_and_quota() {
         for (cpus, quota, threads) in [
             (&[3][..], 1.0, "1"),
             (&[3], 4.0, "1"),
@@ -128,19 +128,19 @@ mod tests {
     }
 
     #[test]
-    fn other_cpus_are_in_no_file() {
+    fn cpu_files_list_only_the_agents_cpus() {
         let view = view(&[1, 10], 2.0);
         let stat = "cpu  9 9\ncpu0 1 1\ncpu1 2 2\ncpu10 3 3\ncpu11 4 4\nintr 5\nctxt 6\n";
-        let shown = String::from_utf8(view.of_file("/proc/stat", stat.as_bytes())).unwrap();
+        let shown = String::from_utf8(view.filter_file("/proc/stat", stat.as_bytes())).unwrap();
         assert_eq!(shown, "cpu  9 9\ncpu1 2 2\ncpu10 3 3\nintr 5\nctxt 6\n");
         let info = "processor\t: 0\nmodel name\t: x\n\nprocessor\t: 1\nmodel name\t: x\n\n\
                     processor\t: 10\nflags\t\t: fpu\n\nHardware\t: board\n";
-        let shown = String::from_utf8(view.of_file("/proc/cpuinfo", info.as_bytes())).unwrap();
+        let shown = String::from_utf8(view.filter_file("/proc/cpuinfo", info.as_bytes())).unwrap();
         assert_eq!(
             shown,
             "processor\t: 1\nmodel name\t: x\n\nprocessor\t: 10\nflags\t\t: fpu\n\nHardware\t: board\n"
         );
-        assert_eq!(view.of_file("/proc/uptime", b"1 2\n"), b"1 2\n");
+        assert_eq!(view.filter_file("/proc/uptime", b"1 2\n"), b"1 2\n");
         let lists: Vec<_> = view.lists().map(|(_, list)| list).collect();
         assert_eq!(lists, [b"1,10\n", b"1,10\n", b"1,10\n"]);
     }

@@ -2,73 +2,72 @@ use crate::Layer;
 use faceoff_types::AgentFaultKind;
 use std::{fmt, io};
 
-/// Our fault: the sandbox could not be set up or observed.
+/// A platform fault: the sandbox could not be set up or observed.
 #[derive(Debug, thiserror::Error)]
 pub enum SandboxError {
     /// A system call that should work did not.
-    #[error("{what}: {source}")]
+    #[error("{action}: {source}")]
     Io {
-        /// What was being done, lower-case, without the reason.
-        what: String,
+        /// The failed action, lower-case, without the reason.
+        action: String,
         source: io::Error,
     },
-    /// The host lacks a layer that the organiser has not given up.
-    #[error("this host cannot provide the layer {layer}: {why}")]
+    /// The host lacks a layer that the organiser has not disabled.
+    #[error("this host cannot provide the layer {layer}: {reason}")]
     Unavailable {
-        /// The layer that is missing.
         layer: Layer,
-        /// What is missing and, where known, what cures it.
-        why: String,
+        /// The missing feature and, if known, the fix.
+        reason: String,
     },
 }
 
 impl SandboxError {
-    /// Wraps an I/O error with what was being done.
-    pub(crate) fn io(what: impl Into<String>, source: impl Into<io::Error>) -> Self {
+    /// Wraps an I/O error with the failed action.
+    pub(crate) fn io(action: impl Into<String>, source: impl Into<io::Error>) -> Self {
         Self::Io {
-            what: what.into(),
+            action: action.into(),
             source: source.into(),
         }
     }
 
-    /// A failure that no system call reports as such.
-    pub(crate) fn other(what: impl Into<String>, why: impl Into<String>) -> Self {
+    /// A failure without an error of a system call.
+    pub(crate) fn other(action: impl Into<String>, reason: impl Into<String>) -> Self {
         Self::Io {
-            what: what.into(),
-            source: io::Error::other(why.into()),
+            action: action.into(),
+            source: io::Error::other(reason.into()),
         }
     }
 }
 
-/// Says of an I/O error what was being done: lower-case, without the reason.
+/// Adds the failed action to an I/O error: lower-case, without the reason.
 pub(crate) trait IoContext<T> {
-    fn context(self, what: impl fmt::Display) -> Result<T, SandboxError>;
+    fn context(self, action: impl fmt::Display) -> Result<T, SandboxError>;
 }
 
 impl<T, E: Into<io::Error>> IoContext<T> for Result<T, E> {
-    fn context(self, what: impl fmt::Display) -> Result<T, SandboxError> {
-        self.map_err(|source| SandboxError::io(what.to_string(), source))
+    fn context(self, action: impl fmt::Display) -> Result<T, SandboxError> {
+        self.map_err(|source| SandboxError::io(action.to_string(), source))
     }
 }
 
-/// Why no agent is running.
+/// Failure to start an agent.
 #[derive(Debug, thiserror::Error)]
 pub enum SpawnError {
-    /// The bundle's command cannot be started: the team's doing.
+    /// Agent fault: the bundle's command cannot be started.
     #[error("{0}")]
     Agent(AgentFaultKind),
-    /// The sandbox cannot be set up: ours.
+    /// Platform fault: the sandbox cannot be set up.
     #[error(transparent)]
     Platform(#[from] SandboxError),
 }
 
-/// Why a line could not be written.
+/// Failure to write a line.
 #[derive(Debug, thiserror::Error)]
 pub enum WriteError {
-    /// Nobody reads the agent's standard input any more.
+    /// The agent's end of its standard input is closed.
     #[error("the agent closed its standard input")]
     Closed,
-    /// The pipe or the sandbox failed.
+    /// The socket or the sandbox failed.
     #[error(transparent)]
     Platform(#[from] SandboxError),
 }

@@ -7,7 +7,7 @@ use std::fmt;
 pub enum Layer {
     /// bubblewrap: no network, own processes, own files, no capabilities.
     Namespaces,
-    /// System calls that an agent has no use for are refused.
+    /// Refuses system calls that an agent does not need.
     Seccomp,
     /// Memory of the whole tree, swap and scratch included.
     CgroupMemory,
@@ -52,13 +52,13 @@ impl fmt::Display for Layer {
 /// Which isolation to apply.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Isolation {
-    /// All layers but the ones named.
+    /// All layers except those given up.
     Sandboxed {
-        /// What is not enforced because the organiser said so. Empty = everything is.
+        /// Layers that the organiser has disabled. Empty: all layers are enforced.
         given_up: Vec<Layer>,
     },
-    /// A developer's own agent: no namespaces, no seccomp, no cgroup, no resource limits and the
-    /// environment of the caller; still an own process group, deadlines, line caps and reaping.
+    /// A developer's own agent: no namespaces, no seccomp, no cgroup, no resource limits, and the caller's
+    /// environment. Its process group, deadlines, line caps and reaping remain.
     None,
 }
 

@@ -1,12 +1,12 @@
-//! Runs one agent as a child process that can do nothing but think: spawn, talk in lines, kill, measure.
+//! Runs one agent as an isolated child process: spawn, exchange lines, kill, measure.
 //!
-//! The layers, each of which an organiser may give up by name ([`Isolation`]), none silently:
+//! An organiser can disable each layer by name ([`Isolation`]); no layer is skipped silently. The layers:
 //! bubblewrap (namespaces, read-only files, no capabilities), a seccomp filter, cgroup limits on
 //! memory, processes and CPU time (v1 and v2, also side by side), and resource limits.
 //! When the service is root, an agent never is: it gets a user id of its own.
 //!
-//! What this crate refuses to do: it does not parse what an agent says, it decides no verdict, and it
-//! never turns a failure of the host into a fault of the agent or the other way round
+//! This crate does not parse an agent's output and does not decide a verdict. It never turns a platform
+//! fault into an agent fault or the other way round
 //! ([`SandboxError`] and [`faceoff_types::AgentFaultKind`] are different types on purpose).
 
 pub mod affinity;
@@ -18,21 +18,21 @@ mod child_setup;
 mod command_check;
 mod cpu_clock;
 mod cpu_counters;
-mod cpu_evidence;
+mod cpu_accounting;
 mod cpu_view;
-mod cpu_waits;
-mod end;
+mod thread_waits;
+mod exit_cause;
 mod error;
 mod isolation;
 mod killer;
 mod line_socket;
 mod memory_image;
-mod next_look;
-mod output_holders;
-mod own_wait;
+mod poll_interval;
+mod inherited_descriptors;
+mod caller_counters;
 mod owner;
-mod passed_files;
-mod prepared;
+mod fd_passing;
+mod launch;
 mod private_mounts;
 mod probe;
 mod process;
@@ -46,15 +46,15 @@ mod status_pipe;
 mod stderr_tail;
 mod sweep;
 
-pub use cpu_evidence::{CpuReading, Glance, Looks, Taken};
-pub use cpu_waits::AnswerState;
+pub use cpu_accounting::{CpuReading, Baseline, CpuSamples, HostInterference};
+pub use thread_waits::AnswerState;
 pub use error::{SandboxError, SpawnError, WriteError};
 pub use faceoff_types::ResourceLimits as Limits;
 pub use isolation::{Isolation, Layer};
 pub use killer::Killer;
 pub use line_socket::ReadLine;
-pub use memory_image::{MEMORY, MemoryImage, NoImage};
-pub use own_wait::OwnWait;
+pub use memory_image::{MEMORY, MemoryImage, MemoryImageError};
+pub use caller_counters::CallerCounters;
 pub use probe::{HostFeature, probe_host};
 pub use process::{AgentProcess, Usage};
 pub use runtime::{Runtime, RuntimeFiles};

@@ -1,6 +1,7 @@
-//! Lines to and from the agent: capped, deadline-bounded, answers stamped right after their last byte.
-//! What the agent leaves no room for is kept, and follows while an answer is waited for: a write never
-//! waits, so that no time passes unseen.
+//! Lines to and from the agent: capped, with deadlines, answers timestamped right after their last byte.
+//!
+//! A write never blocks, so that all waiting time is measured. Bytes that do not fit into the agent's input
+//! buffer are kept and sent while the service waits for the answer.
 
 use memchr::memchr;
 use rustix::{
@@ -14,10 +15,10 @@ use std::{
     time::Instant,
 };
 
-/// One read: nearly every answer, so that it costs one system call. A read goes on as long as an agent adds bytes one
-/// by one, so it must not take many.
+/// Size of one read. Nearly every answer fits, and costs one system call. A larger read could take long, since it
+/// continues while an agent adds bytes one by one.
 const READ_BYTES: usize = 16 << 10;
-/// How much of an oversized line is handed back.
+/// Returned part of a line that is too long.
 const HEAD_BYTES: usize = 1024;
 
 /// Outcome of waiting for a line.
@@ -26,36 +27,36 @@ pub enum ReadLine {
     Line {
         /// Without the newline.
         bytes: Vec<u8>,
-        /// When its last byte had been read.
+        /// Time at which its last byte had been read.
         at: Instant,
     },
-    /// More than the cap came without a newline. The stream is out of step: end the agent.
+    /// The line exceeds the cap. The stream is out of step: end the agent.
     TooLong {
         /// The first bytes of the line, at most 1 KiB.
         head: Vec<u8>,
     },
-    /// The deadline passed; what has come of the line so far is kept.
+    /// The deadline has passed; the received part of the line is kept.
     TimedOut,
-    /// End of output; the exit status follows from `diagnose_end()`.
+    /// End of output; `diagnose_end()` returns the exit status.
     Closed,
 }
 
-/// Nobody reads the other end any more.
+/// The agent's end is closed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Closed;
 
-/// Both ends that the service holds.
+/// The service's ends of the agent's input and output.
 #[derive(Debug)]
 pub(crate) struct LineSocket {
     input: OwnedFd,
-    /// The agent has been told that nothing more will come.
+    /// The agent's input has been shut down.
     is_shut: bool,
-    /// What there was no room for yet.
+    /// Bytes that did not fit into the socket yet.
     unsent: Vec<u8>,
     output: OwnedFd,
-    /// What one read brings.
+    /// Buffer of one read.
     chunk: Box<[u8]>,
-    /// What has been read and not yet been handed out, from `start` on.
+    /// From `start` on: bytes that have been read and not returned yet.
     buffer: Vec<u8>,
     start: usize,
     /// `buffer[start..searched]` holds no newline.
@@ -78,7 +79,8 @@ impl LineSocket {
         }
     }
 
-    /// Ends the agent's standard input. The socket itself stays until the agent is dead: to close one may be work.
+    /// Ends the agent's standard input. The socket stays open until the agent is dead, because closing it may take
+    /// long.
     pub(crate) fn end_input(&mut self) {
         self.is_shut = true;
         self.unsent.clear();
@@ -87,7 +89,7 @@ impl LineSocket {
         }
     }
 
-    /// Writes what there is room for; the rest follows while an answer is waited for.
+    /// Writes what fits without blocking; [`Self::read_line`] sends the rest.
     pub(crate) fn send(&mut self, bytes: &[u8]) -> io::Result<Result<(), Closed>> {
         if !self.unsent.is_empty() {
             self.unsent.extend_from_slice(bytes);
@@ -97,7 +99,7 @@ impl LineSocket {
         Ok(sent.map(|count| self.unsent.extend_from_slice(&bytes[count..])))
     }
 
-    /// Has everything been taken by the socket?
+    /// Has the socket accepted all bytes?
     pub(crate) const fn is_all_sent(&self) -> bool {
         self.unsent.is_empty()
     }
@@ -107,7 +109,7 @@ impl LineSocket {
         Ok(sent.map(|count| drop(self.unsent.drain(..count))))
     }
 
-    /// Writes until there is no room; returns the number of bytes that were taken.
+    /// Writes until the socket is full; returns the number of written bytes.
     fn write(&self, bytes: &[u8]) -> io::Result<Result<usize, Closed>> {
         if self.is_shut {
             return Ok(Err(Closed));
@@ -135,45 +137,45 @@ impl LineSocket {
         max_bytes: usize,
         deadline: Instant,
     ) -> io::Result<ReadLine> {
-        // An agent on the CPU that asked it has often answered when that comes back: to look is cheaper than to
-        // ask first whether there is something.
-        let mut may_be_there = self.is_all_sent();
+        // An agent on the same CPU has often answered by the time the evaluator runs again. Then reading at once is
+        // cheaper than polling first.
+        let mut may_be_ready = self.is_all_sent();
         loop {
             if let Some(outcome) = self.take_line(max_bytes) {
                 return Ok(outcome);
             }
-            let ready = if may_be_there {
+            let ready = if may_be_ready {
                 true
             } else if self.is_all_sent() {
                 wait_for(self.output.as_fd(), PollFlags::IN, deadline)?
             } else {
                 wait_for_any(&mut self.awaited(), deadline)?
             };
-            may_be_there = false;
+            may_be_ready = false;
             if !ready {
                 return Ok(ReadLine::TimedOut);
             }
             if !self.fill()? {
                 return Ok(ReadLine::Closed);
             }
-            // A line that was there before the rest is handed out before: it answers something else.
-            if self.holds_line() {
+            // Return a complete line before sending the rest of the question: it cannot be the answer to it.
+            if self.has_line() {
                 continue;
             }
             if !self.is_all_sent() && self.send_rest()? == Err(Closed) {
                 return Ok(ReadLine::Closed);
             }
-            // A dribbling agent always has something to read: the deadline holds all the same.
+            // An agent that writes byte by byte always has something to read; the deadline applies nevertheless.
             if Instant::now() >= deadline {
                 return Ok(self.take_line(max_bytes).unwrap_or(ReadLine::TimedOut));
             }
         }
     }
 
-    /// Takes what comes until `until`, without sleeping: to be woken takes longer than many an answer.
-    pub(crate) fn look_out(&mut self, until: Instant) -> io::Result<()> {
-        while self.is_all_sent() && !self.holds_line() {
-            // Also of an agent that writes without end no more is taken than comes until then.
+    /// Busy-polls for output until `until`: waking up from sleep takes longer than many answers.
+    pub(crate) fn spin_until(&mut self, until: Instant) -> io::Result<()> {
+        while self.is_all_sent() && !self.has_line() {
+            // The time bounds the loop, too, if an agent writes without end.
             if !self.fill()? || self.last_read_at >= until {
                 break;
             }
@@ -181,21 +183,21 @@ impl LineSocket {
         Ok(())
     }
 
-    /// What there is to wait for: output, and room for what was not sent yet.
+    /// The poll conditions: output, and space for unsent bytes.
     pub(crate) fn awaited(&self) -> Vec<PollFd<'_>> {
-        let room = (!self.is_all_sent()).then(|| PollFd::new(&self.input, PollFlags::OUT));
+        let writable = (!self.is_all_sent()).then(|| PollFd::new(&self.input, PollFlags::OUT));
         std::iter::once(PollFd::new(&self.output, PollFlags::IN))
-            .chain(room)
+            .chain(writable)
             .collect()
     }
 
-    /// Is there unread output, in the buffer or in the socket?
+    /// Is there unread output in the buffer or in the socket?
     pub(crate) fn has_pending_output(&self) -> io::Result<bool> {
         Ok(self.start < self.buffer.len() || ioctl_fionread(&self.output)? > 0)
     }
 
-    /// Has a whole line been read that has not been handed out?
-    pub(crate) fn holds_line(&self) -> bool {
+    /// Does the buffer contain a complete line?
+    pub(crate) fn has_line(&self) -> bool {
         memchr(b'\n', &self.buffer[self.searched..]).is_some()
     }
 
@@ -228,7 +230,7 @@ impl LineSocket {
         self.searched = self.start;
     }
 
-    /// Reads what is there; false at the end of output.
+    /// Reads the available bytes; `false` at the end of output.
     fn fill(&mut self) -> io::Result<bool> {
         if self.start > 0 {
             self.buffer.drain(..self.start);
@@ -239,11 +241,11 @@ impl LineSocket {
         self.last_read_at = Instant::now();
         match result {
             Ok((count, _)) => {
-                // Bounded: `take_line` refuses before more than the cap and one read have gathered.
+                // Bounded: `take_line` refuses a line before the buffer holds more than the cap and one read.
                 self.buffer.extend_from_slice(&self.chunk[..count]);
                 Ok(count > 0)
             }
-            // It closed its end with something of ours unread.
+            // The agent closed its end without reading all its input.
             Err(Errno::CONNRESET) => Ok(false),
             Err(Errno::AGAIN | Errno::INTR) => Ok(true),
             Err(error) => Err(error.into()),
@@ -251,7 +253,7 @@ impl LineSocket {
     }
 }
 
-/// Waits until `fd` is ready (or hung up) or `deadline` has passed; an expired deadline still asks once.
+/// Waits until `fd` is ready (or hung up) or `deadline` has passed; with an expired deadline it polls once.
 pub(crate) fn wait_for(
     fd: BorrowedFd<'_>,
     flags: PollFlags,
@@ -282,7 +284,7 @@ mod tests {
     use super::*;
     use std::{io::Write as _, os::unix::net::UnixStream, thread, time::Duration};
 
-    /// The service's ends, and the agent's output.
+    /// The service's ends, and the agent's end of its output.
     fn line_socket() -> (LineSocket, UnixStream) {
         let (_agents_input, input) = UnixStream::pair().unwrap();
         let (output, agents_output) = UnixStream::pair().unwrap();
@@ -290,28 +292,28 @@ mod tests {
     }
 
     #[test]
-    fn looking_out_ends_with_the_line_with_the_output_and_with_its_time() {
+    fn spinning_ends_with_line_deadline_or_end_of_output() {
         let far = || Instant::now() + Duration::from_secs(3600);
         let (mut lines, mut agent) = line_socket();
         agent.write_all(b"here\n").unwrap();
-        lines.look_out(far()).unwrap();
+        lines.spin_until(far()).unwrap();
         let line = lines.read_line(100, Instant::now()).unwrap();
         assert!(matches!(line, ReadLine::Line { bytes, .. } if bytes == b"here"));
-        lines.look_out(Instant::now()).unwrap();
-        assert!(!lines.holds_line());
+        lines.spin_until(Instant::now()).unwrap();
+        assert!(!lines.has_line());
         drop(agent);
-        lines.look_out(far()).unwrap();
+        lines.spin_until(far()).unwrap();
         let end = lines.read_line(100, far()).unwrap();
         assert!(matches!(end, ReadLine::Closed));
     }
 
     #[test]
-    fn looking_out_for_a_line_that_never_ends_ends() {
+    fn spinning_on_an_endless_line_ends() {
         let (mut lines, mut agent) = line_socket();
         let flood = thread::spawn(move || while agent.write_all(&[b'x'; 4096]).is_ok() {});
         for _ in 0..10 {
             lines
-                .look_out(Instant::now() + Duration::from_micros(50))
+                .spin_until(Instant::now() + Duration::from_micros(50))
                 .unwrap();
         }
         let line = lines.read_line(100, Instant::now() + Duration::from_secs(3600));

@@ -1,12 +1,12 @@
-//! The runtimes' files, copied into memory once, so that they have nothing to tell.
+//! A copy of the runtimes' files in memory, which closes a covert channel between agents.
 //!
-//! Agents share these files. On a disk each leaves traces in what the kernel keeps of them: the pages that
-//! it read, the names that it looked up, and another finds out by the time that the same costs it. Of a
-//! file system in memory all pages and all names are there at all times.
+//! Agents share these files. On a disk, an agent leaves traces in the kernel's caches: the pages that it read and
+//! the names that it looked up. Another agent can find them by timing its own accesses. In a file system in memory,
+//! all pages and names are cached at all times.
 
 use crate::{
     Runtime, RuntimeFiles, SandboxError, bubblewrap::mount_order, error::IoContext, owner::Owner,
-    runtime::inside,
+    runtime::path_in_image,
 };
 use rustix::fs::{StatVfs, statvfs};
 use std::{
@@ -18,29 +18,29 @@ use std::{
 
 /// A file system in memory that every Linux host has.
 pub const MEMORY: &str = "/dev/shm";
-/// Images begin with this.
+/// Prefix of the image folders.
 pub(crate) const IMAGE_PREFIX: &str = "faceoff-runtime-";
-/// What a file takes at least.
+/// Minimum memory of a file.
 const PAGE_BYTES: u64 = 4096;
 
-/// The copy, for as long as this lives.
+/// The copy; removed on drop.
 #[derive(Debug)]
 pub struct MemoryImage {
     folder: tempfile::TempDir,
     pub bytes: u64,
 }
 
-/// Why there is none. Agents then use the host's files.
+/// Failure to create an image. Agents then use the host's files.
 #[derive(Debug, thiserror::Error)]
-pub enum NoImage {
-    /// The files are larger than was allowed.
+pub enum MemoryImageError {
+    /// The files exceed the allowed size.
     #[error("the runtimes' files are larger than {limit_bytes} bytes")]
     TooLarge {
         limit_bytes: u64,
     },
-    /// The host's memory is smaller.
-    #[error("the runtimes' files have {bytes} bytes, and {MEMORY} has room for {free_bytes}")]
-    NoRoom {
+    /// The host has too little free memory.
+    #[error("the runtimes' files have {bytes} bytes, and {MEMORY} has {free_bytes} bytes free")]
+    NotEnoughMemory {
         bytes: u64,
         free_bytes: u64,
     },
@@ -50,23 +50,23 @@ pub enum NoImage {
 }
 
 impl MemoryImage {
-    /// Copies the files of all `runtimes`, at most `limit_bytes`, and has agents use the copy.
+    /// Copies the files of all `runtimes`, at most `limit_bytes`, and makes the runtimes refer to the copy.
     ///
     /// # Errors
-    /// [`NoImage`]; nothing has changed then.
+    /// [`MemoryImageError`]; nothing has changed then.
     pub fn make(
         runtimes: &mut BTreeMap<String, Runtime>,
         limit_bytes: u64,
-    ) -> Result<Self, NoImage> {
+    ) -> Result<Self, MemoryImageError> {
         let bytes = Self::size(runtimes, limit_bytes)?;
         let folder = tempfile::Builder::new()
-            .prefix(&Owner::this_process().name(IMAGE_PREFIX))
+            .prefix(&Owner::this_process().name_prefix(IMAGE_PREFIX))
             .tempdir_in(MEMORY)
             .context("cannot make a folder in memory")?;
         for path in paths(runtimes) {
-            let place = inside(folder.path(), &path);
-            let copied = fs::create_dir_all(place.parent().unwrap_or(folder.path()))
-                .and_then(|()| copy(&path, &place));
+            let target = path_in_image(folder.path(), &path);
+            let copied = fs::create_dir_all(target.parent().unwrap_or(folder.path()))
+                .and_then(|()| copy(&path, &target));
             copied.context(format_args!("cannot copy {} into memory", path.display()))?;
         }
         for runtime in runtimes.values_mut() {
@@ -77,11 +77,11 @@ impl MemoryImage {
         Ok(Self { folder, bytes })
     }
 
-    /// What the copy would take, in bytes.
+    /// Size of the copy, in bytes, without making it.
     ///
     /// # Errors
-    /// [`NoImage`], as [`Self::make`] would say.
-    pub fn size(runtimes: &BTreeMap<String, Runtime>, limit_bytes: u64) -> Result<u64, NoImage> {
+    /// [`MemoryImageError`], as [`Self::make`] would say.
+    pub fn size(runtimes: &BTreeMap<String, Runtime>, limit_bytes: u64) -> Result<u64, MemoryImageError> {
         let mut bytes = 0;
         for path in paths(runtimes) {
             add_size(&path, limit_bytes, &mut bytes)
@@ -92,9 +92,9 @@ impl MemoryImage {
         } = statvfs(MEMORY).context(format_args!("cannot look at {MEMORY}"))?;
         let free_bytes = f_bavail.saturating_mul(f_frsize);
         if bytes > limit_bytes {
-            Err(NoImage::TooLarge { limit_bytes })
+            Err(MemoryImageError::TooLarge { limit_bytes })
         } else if bytes > free_bytes {
-            Err(NoImage::NoRoom { bytes, free_bytes })
+            Err(MemoryImageError::NotEnoughMemory { bytes, free_bytes })
         } else {
             Ok(bytes)
         }
@@ -106,13 +106,13 @@ impl MemoryImage {
     }
 }
 
-/// All paths of all runtimes, none inside another.
+/// All paths of all runtimes, without paths inside others.
 fn paths(runtimes: &BTreeMap<String, Runtime>) -> Vec<PathBuf> {
     let all = runtimes.values().flat_map(|one| &one.read_only_paths);
     mount_order(&all.cloned().collect::<Vec<_>>())
 }
 
-/// Adds what is below `path`, until it is more than `limit_bytes`.
+/// Adds the size of the files below `path`; stops once the sum exceeds `limit_bytes`.
 fn add_size(path: &Path, limit_bytes: u64, bytes: &mut u64) -> io::Result<()> {
     let Some(meta) = readable(fs::symlink_metadata(path))? else {
         return Ok(());
@@ -153,7 +153,7 @@ fn copy(from: &Path, to: &Path) -> io::Result<()> {
     )
 }
 
-/// What is missing, or is closed to us, is so for agents as well.
+/// `None` for missing and unreadable files: agents cannot read them either.
 fn readable<T>(found: io::Result<T>) -> io::Result<Option<T>> {
     match found {
         Err(error)
@@ -173,7 +173,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn an_image_holds_what_the_runtimes_show_and_goes_with_its_owner() {
+    fn memory_image_copies_files_and_is_removed_on_drop() {
         let host = tempfile::tempdir().unwrap();
         let at = |name: &str| host.path().join(name);
         fs::create_dir_all(at("lib/inner")).unwrap();
@@ -191,14 +191,14 @@ mod tests {
             ("two".to_owned(), runtime(&["lib", "lib/inner", "program"])),
         ]);
         let refused = MemoryImage::make(&mut runtimes, 8000).unwrap_err();
-        assert!(matches!(refused, NoImage::TooLarge { limit_bytes: 8000 }));
+        assert!(matches!(refused, MemoryImageError::TooLarge { limit_bytes: 8000 }));
         assert_eq!(runtimes["one"].files, RuntimeFiles::Host);
 
         let image = MemoryImage::make(&mut runtimes, 1 << 20).unwrap();
         assert!((12_000..100_000).contains(&image.bytes), "{}", image.bytes);
         let folder = image.folder().to_owned();
         assert_eq!(runtimes["two"].files, RuntimeFiles::Copy(folder.clone()));
-        let copied = |name: &str| inside(&folder, &at(name));
+        let copied = |name: &str| path_in_image(&folder, &at(name));
         assert_eq!(fs::read_to_string(copied("lib/link")).unwrap(), "content");
         assert_eq!(
             fs::read_link(copied("lib/link")).unwrap(),

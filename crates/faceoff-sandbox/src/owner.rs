@@ -1,9 +1,9 @@
-//! Which service made something that outlives a process: a cgroup, a folder.
+//! Owner of resources that outlive a process (cgroups, folders), encoded in their names.
 
 use std::fs;
 
-/// A service process: its pid, when it started, because pids are used again, and in which namespace of
-/// pids. As text `<pid>-<start time>-<namespace>`.
+/// A service process: its pid, its start time (because pids are reused) and its pid namespace.
+/// As text `<pid>-<start time>-<namespace>`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Owner {
     pid: u32,
@@ -21,8 +21,8 @@ impl Owner {
         }
     }
 
-    /// The owner in a name `<prefix><pid>-<start time>-<namespace>-…`; `None` for a name that is not ours.
-    pub(crate) fn of_name(name: &str, prefix: &str) -> Option<Self> {
+    /// The owner in a name `<prefix><pid>-<start time>-<namespace>-…`; `None` for any other name.
+    pub(crate) fn parse(name: &str, prefix: &str) -> Option<Self> {
         let mut parts = name.strip_prefix(prefix)?.split('-');
         Some(Self {
             pid: parts.next()?.parse().ok()?,
@@ -31,21 +31,21 @@ impl Owner {
         })
     }
 
-    /// The beginning of a name that [`Self::of_name`] reads.
-    pub(crate) fn name(self, prefix: &str) -> String {
+    /// The prefix of a name that [`Self::parse`] reads.
+    pub(crate) fn name_prefix(self, prefix: &str) -> String {
         format!("{prefix}{}-{}-{}-", self.pid, self.start, self.namespace)
     }
 
-    /// Is it dead for certain? Of services in other containers we cannot tell, nor of any where `/proc` is
-    /// hidden, so they count as alive.
+    /// Is it certainly dead? Services in other containers, or on a host where `/proc` is hidden, count as alive,
+    /// because their state is unknown.
     pub(crate) fn is_dead(self) -> bool {
-        let us = Self::this_process();
-        let can_tell = us.start != 0 && us.namespace == self.namespace;
-        can_tell && start_time(self.pid) != Some(self.start)
+        let this = Self::this_process();
+        let is_known = this.start != 0 && this.namespace == self.namespace;
+        is_known && start_time(self.pid) != Some(self.start)
     }
 }
 
-/// The number of this process's namespace of pids; 0 where it cannot be told.
+/// The id of this process's pid namespace; 0 if unknown.
 fn pid_namespace() -> u64 {
     let link = fs::read_link("/proc/self/ns/pid").unwrap_or_default();
     let digits: String = link
@@ -56,11 +56,11 @@ fn pid_namespace() -> u64 {
     digits.parse().unwrap_or(0)
 }
 
-/// When process `pid` started, in clock ticks since boot; `None` if there is none, or a dead one.
+/// Start time of process `pid`, in clock ticks since boot; `None` if it does not exist or is dead.
 fn start_time(pid: u32) -> Option<u64> {
     let stat = fs::read_to_string(format!("/proc/{pid}/stat")).ok()?;
-    // The command's name, in parentheses, may hold anything; the fields after it are plain. State is the
-    // first, the start time the 20th.
+    // The command's name, in parentheses, may contain anything; the fields after it are plain. The state is the
+    // first of them, the start time the 20th.
     let mut fields = stat.rsplit_once(')')?.1.split_whitespace();
     let state = fields.next()?;
     if matches!(state, "Z" | "X") {
@@ -74,46 +74,46 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_living_service_is_told_from_one_whose_pid_was_used_again() {
-        let us = Owner::this_process();
-        assert!(!us.is_dead());
+    fn owner_with_a_reused_pid_is_dead() {
+        let this = Owner::this_process();
+        assert!(!this.is_dead());
         assert!(
             Owner {
-                start: us.start + 1,
-                ..us
+                start: this.start + 1,
+                ..this
             }
             .is_dead()
         );
         assert!(
             Owner {
                 pid: u32::MAX,
-                ..us
+                ..this
             }
             .is_dead()
         );
     }
 
     #[test]
-    fn a_service_in_another_container_is_left_alone() {
-        let us = Owner::this_process();
+    fn owner_in_another_pid_namespace_counts_as_alive() {
+        let this = Owner::this_process();
         assert!(
             !Owner {
-                start: us.start + 1,
-                namespace: us.namespace + 1,
-                ..us
+                start: this.start + 1,
+                namespace: this.namespace + 1,
+                ..this
             }
             .is_dead()
         );
     }
 
     #[test]
-    fn a_name_tells_its_owner_and_other_names_tell_nothing() {
-        let us = Owner::this_process();
+    fn owner_is_parsed_from_its_own_names_only() {
+        let this = Owner::this_process();
         assert_eq!(
-            Owner::of_name(&format!("{}7", us.name("agent-")), "agent-"),
-            Some(us)
+            Owner::parse(&format!("{}7", this.name_prefix("agent-")), "agent-"),
+            Some(this)
         );
-        assert_eq!(Owner::of_name("agent-12-345", "agent-"), None);
-        assert_eq!(Owner::of_name("somebody-12-345-6-0", "agent-"), None);
+        assert_eq!(Owner::parse("agent-12-345", "agent-"), None);
+        assert_eq!(Owner::parse("other-12-345-6-0", "agent-"), None);
     }
 }

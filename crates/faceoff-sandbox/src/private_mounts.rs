@@ -1,8 +1,8 @@
-//! Shows files to an agent's user that it could not reach by name.
+//! Makes files reachable for an agent's user that cannot reach them by path.
 //!
-//! A root service keeps bundles in a folder of its own, and bubblewrap, which runs as the agent's user,
-//! looks its sources up by name. So the child, while it is still root, binds them below `/tmp` of a
-//! mount namespace of its own, where nobody else sees them and whose end is theirs.
+//! A root service keeps bundles in a folder closed to other users. bubblewrap runs as the agent's user and
+//! looks its sources up by path. So the child, while it is still root, bind-mounts them below `/tmp` of a
+//! private mount namespace. No other process sees these mounts, and they end with the namespace.
 
 use crate::{SandboxError, error::IoContext};
 use rustix::{
@@ -21,10 +21,10 @@ use std::{
     path::Path,
 };
 
-/// Any folder that every host has; the namespace's own, so nothing of the host's is hidden from anybody.
+/// A folder that every host has. It is covered in the private namespace only, so the host keeps its own.
 const FOLDER: &CStr = c"/tmp";
 
-/// What one agent's bubblewrap is to find.
+/// The bind mounts for one agent's bubblewrap.
 #[derive(Debug, Default)]
 pub(crate) struct PrivateMounts {
     sources: Vec<Source>,
@@ -33,18 +33,18 @@ pub(crate) struct PrivateMounts {
 #[derive(Debug)]
 struct Source {
     path: CString,
-    place: CString,
+    mount_point: CString,
     is_folder: bool,
-    /// In the child: the file or folder, on its way from the one to the other.
+    /// In the child: the detached mount of `path`, until it is moved to `mount_point`.
     tree: Option<OwnedFd>,
 }
 
 impl PrivateMounts {
-    /// Adds `path` and returns the name under which bubblewrap will find it.
+    /// Adds `path` and returns the path at which bubblewrap will find it.
     pub(crate) fn add(&mut self, path: &Path) -> Result<OsString, SandboxError> {
         let failure = format!("cannot show {} to the agent", path.display());
         let path = fs::canonicalize(path).context(&failure)?;
-        let place = format!("/tmp/{}", self.sources.len());
+        let mount_point = format!("/tmp/{}", self.sources.len());
         let text = |bytes: &[u8]| {
             CString::new(bytes)
                 .map_err(io::Error::other)
@@ -52,15 +52,15 @@ impl PrivateMounts {
         };
         self.sources.push(Source {
             path: text(path.as_os_str().as_bytes())?,
-            place: text(place.as_bytes())?,
+            mount_point: text(mount_point.as_bytes())?,
             is_folder: fs::metadata(&path).context(&failure)?.is_dir(),
             tree: None,
         });
-        Ok(place.into())
+        Ok(mount_point.into())
     }
 
-    /// Makes the mounts. Called between fork and exec, as root: system calls only.
-    pub(crate) fn make(&mut self) -> Result<(), Errno> {
+    /// Makes all mounts. Called between fork and exec, as root: system calls only.
+    pub(crate) fn mount_all(&mut self) -> Result<(), Errno> {
         #[expect(
             unsafe_code,
             reason = "rustix marks all unsharing unsafe for the sake of shared descriptors"
@@ -69,12 +69,12 @@ impl PrivateMounts {
         unsafe {
             unshare_unsafe(UnshareFlags::NEWNS)?;
         }
-        // Nothing that is mounted from here on reaches the host.
+        // Mounts made from here on do not propagate to the host.
         mount_change(
             c"/",
             MountPropagationFlags::DOWNSTREAM | MountPropagationFlags::REC,
         )?;
-        // All are taken before the folder is covered, for some may be in it.
+        // Detach all sources before the folder is covered, since some may be inside it.
         let take = OpenTreeFlags::OPEN_TREE_CLONE
             | OpenTreeFlags::OPEN_TREE_CLOEXEC
             | OpenTreeFlags::AT_RECURSIVE;
@@ -85,17 +85,17 @@ impl PrivateMounts {
         mount(c"tmpfs", FOLDER, c"tmpfs", flags, c"mode=0755,size=64k")?;
         for source in &mut self.sources {
             if source.is_folder {
-                mkdir(&source.place, Mode::from_raw_mode(0o755))?;
+                mkdir(&source.mount_point, Mode::from_raw_mode(0o755))?;
             } else {
                 let make = OFlags::CREATE | OFlags::WRONLY | OFlags::CLOEXEC;
-                drop(open(&source.place, make, Mode::from_raw_mode(0o644))?);
+                drop(open(&source.mount_point, make, Mode::from_raw_mode(0o644))?);
             }
             if let Some(tree) = source.tree.take() {
                 move_mount(
                     tree,
                     c"",
                     CWD,
-                    &source.place,
+                    &source.mount_point,
                     MoveMountFlags::MOVE_MOUNT_F_EMPTY_PATH,
                 )?;
             }

@@ -1,4 +1,4 @@
-//! Finds out what the host can do by doing it: one small process per layer, with that layer alone.
+//! Probes the host's features: starts one small process per layer, with only that layer enabled.
 
 use crate::{
     AgentProcess, Isolation, Layer, Limits, ReadLine, Runtime, SandboxError, SpawnError, SpawnSpec,
@@ -13,25 +13,25 @@ use std::{
     time::{Duration, Instant},
 };
 
-/// How long a probe may take on a loaded host.
-const PATIENCE: Duration = Duration::from_secs(120);
+/// Limit of a probe on a loaded host.
+const TIMEOUT: Duration = Duration::from_secs(120);
 /// Recognisable in `/proc/self/limits`.
 const PROBE_OPEN_FILES: u32 = 61;
 
-/// One feature of the host and what it means.
+/// Result of probing one layer.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct HostFeature {
-    /// The layer that needs it.
+    /// The probed layer.
     pub layer: Layer,
-    /// Did it work just now?
+    /// The probe succeeded.
     pub available: bool,
-    /// What was found, or what went wrong.
+    /// The found feature, or the error.
     pub found: String,
-    /// What to do about it, as a command where there is one; `None` when it is available.
+    /// How to provide the layer, as a command if possible; `None` if it is available.
     pub cure: Option<String>,
 }
 
-/// Probes the host for real (starts a probe process for each layer). Used by `doctor` and at start-up.
+/// Probes the host: starts a process for each layer. Used by `doctor` and at start-up.
 pub fn probe_host() -> Vec<HostFeature> {
     Layer::ALL.into_iter().map(probe).collect()
 }
@@ -39,14 +39,14 @@ pub fn probe_host() -> Vec<HostFeature> {
 fn probe(layer: Layer) -> HostFeature {
     let result = match layer {
         Layer::Namespaces => namespaces(),
-        Layer::Seccomp => shown(layer, "/proc/self/status", |text| {
+        Layer::Seccomp => probe_file(layer, "/proc/self/status", |text| {
             let mode = field(text, "Seccomp:")?;
             (mode == "2").then(|| "a filter was installed and is active".to_owned())
         }),
         Layer::CgroupMemory => cgroup(layer, "memory"),
         Layer::CgroupPids => cgroup(layer, "pids"),
         Layer::CgroupCpu => cgroup(layer, "cpu"),
-        Layer::Rlimits => shown(layer, "/proc/self/limits", |text| {
+        Layer::Rlimits => probe_file(layer, "/proc/self/limits", |text| {
             let value = field(text, "Max open files")?;
             (value == PROBE_OPEN_FILES.to_string()).then(|| "limits hold across exec".to_owned())
         }),
@@ -58,11 +58,11 @@ fn probe(layer: Layer) -> HostFeature {
             found,
             cure: None,
         },
-        Err(why) => HostFeature {
+        Err(error) => HostFeature {
             layer,
             available: false,
-            cure: Some(cure(layer, &why)),
-            found: why,
+            cure: Some(cure(layer, &error)),
+            found: error,
         },
     }
 }
@@ -75,7 +75,7 @@ fn field<'a>(text: &'a str, name: &str) -> Option<&'a str> {
 
 fn namespaces() -> Result<String, String> {
     let bubblewrap = Bubblewrap::find().map_err(|error| error.to_string())?;
-    // Inside, the process is number one, has no capability left and sees no network but its own.
+    // Inside, the process is number one, has no capabilities, and sees only its own network.
     let status = run(Layer::Namespaces, "/proc/self/status")?;
     if field(&status, "Pid:") != Some("1") || field(&status, "CapBnd:") != Some("0000000000000000")
     {
@@ -116,7 +116,7 @@ fn cgroup(layer: Layer, controller: &str) -> Result<String, String> {
                 names if names.split(',').any(|name| name == controller) => "v1",
                 _ => return None,
             };
-            // On a hybrid host the unified line is there too, but the agent is not in it.
+            // A hybrid host also has the unified line, but the agent is not in that hierarchy.
             path.contains("/agent-").then(|| {
                 format!(
                     "cgroup {version}, limits accepted{}",
@@ -125,12 +125,12 @@ fn cgroup(layer: Layer, controller: &str) -> Result<String, String> {
             })
         })
     };
-    shown(layer, "/proc/self/cgroup", own)
+    probe_file(layer, "/proc/self/cgroup", own)
 }
 
-/// What stops an agent is no layer, but told with the one beside which it matters: without it a game needs CPUs apart.
+/// The freezer is no layer; it is reported with the CPU layer, because without it a game needs CPUs for each side.
 fn freezer(layer: Layer, version: &str, own_cgroups: &str) -> &'static str {
-    let in_one = |line: &str| {
+    let is_frozen_here = |line: &str| {
         let mut parts = line.splitn(3, ':').skip(1);
         let named = parts
             .next()
@@ -138,27 +138,27 @@ fn freezer(layer: Layer, version: &str, own_cgroups: &str) -> &'static str {
         named && parts.next().is_some_and(|path| path.contains("/agent-"))
     };
     match layer {
-        Layer::CgroupCpu if version == "v2" || own_cgroups.lines().any(in_one) => {
+        Layer::CgroupCpu if version == "v2" || own_cgroups.lines().any(is_frozen_here) => {
             "; agents can be frozen"
         }
         Layer::CgroupCpu => {
-            "; agents cannot be frozen, so games need CPUs for each side: hand the service a cgroup of the freezer, too"
+            "; agents cannot be frozen, so games need CPUs for each side: give the service a cgroup of the freezer, too"
         }
         _ => "",
     }
 }
 
-fn shown(
+fn probe_file(
     layer: Layer,
     file: &str,
-    judge: impl Fn(&str) -> Option<String>,
+    evaluate: impl Fn(&str) -> Option<String>,
 ) -> Result<String, String> {
     let text = run(layer, file)?;
-    judge(&text)
+    evaluate(&text)
         .ok_or_else(|| format!("it was applied without an error, but {file} does not show it"))
 }
 
-/// Starts `cat file` with `layer` alone and returns what it printed.
+/// Starts `cat file` with only `layer` enabled, and returns its output.
 fn run(layer: Layer, file: &str) -> Result<String, String> {
     let cat = ["/usr/bin/cat", "/bin/cat"]
         .into_iter()
@@ -185,10 +185,10 @@ fn run(layer: Layer, file: &str) -> Result<String, String> {
         cpus: Vec::new(),
     };
     let mut agent = AgentProcess::spawn(&spec).map_err(|error| match error {
-        SpawnError::Platform(SandboxError::Unavailable { why, .. }) => why,
+        SpawnError::Platform(SandboxError::Unavailable { reason, .. }) => reason,
         other => other.to_string(),
     })?;
-    let deadline = Instant::now() + PATIENCE;
+    let deadline = Instant::now() + TIMEOUT;
     let mut text = String::new();
     loop {
         match agent
@@ -201,10 +201,10 @@ fn run(layer: Layer, file: &str) -> Result<String, String> {
             }
             ReadLine::Closed => break,
             ReadLine::TimedOut => return Err("the probe did not end in time".into()),
-            ReadLine::TooLong { .. } => return Err("the probe printed rubbish".into()),
+            ReadLine::TooLong { .. } => return Err("the probe printed too long a line".into()),
         }
     }
-    match agent.finish(PATIENCE).map_err(|error| error.to_string())? {
+    match agent.finish(TIMEOUT).map_err(|error| error.to_string())? {
         usage if usage.exit.is_none() => Ok(text),
         usage => Err(format!(
             "the probe failed: {:?}; {}",
@@ -214,8 +214,8 @@ fn run(layer: Layer, file: &str) -> Result<String, String> {
     }
 }
 
-/// An empty bundle. With namespaces it lies, as real ones do, in a folder that only the service may enter;
-/// the other layers are tried without them.
+/// An empty bundle. With namespaces it is, like real bundles, in a folder that only the service may enter. The other
+/// layers are probed without namespaces, so their bundle must be reachable.
 fn bundle(layer: Layer) -> io::Result<(tempfile::TempDir, PathBuf)> {
     let outer = tempfile::Builder::new()
         .prefix("faceoff-probe-")
@@ -232,9 +232,9 @@ fn bundle(layer: Layer) -> io::Result<(tempfile::TempDir, PathBuf)> {
     Ok((outer, bundle))
 }
 
-fn cure(layer: Layer, why: &str) -> String {
+fn cure(layer: Layer, error: &str) -> String {
     match layer {
-        Layer::Namespaces => cure_namespaces(why),
+        Layer::Namespaces => cure_namespaces(error),
         Layer::Seccomp => {
             "use a kernel with CONFIG_SECCOMP_FILTER=y (every distribution's since 2014)".into()
         }
@@ -248,7 +248,7 @@ fn cure(layer: Layer, why: &str) -> String {
     }
 }
 
-/// Version 2 can be handed to an ordinary user by systemd; version 1 only by root.
+/// systemd can delegate cgroups of version 2 to an ordinary user; version 1 needs root.
 fn cure_cgroups() -> String {
     const CONTAINER: &str = "in Docker: docker run --privileged --cgroupns=private";
     if Path::new("/sys/fs/cgroup/cgroup.controllers").exists() {
@@ -258,15 +258,15 @@ fn cure_cgroups() -> String {
         )
     } else {
         format!(
-            "run the service as root, or have root hand it a cgroup: for c in memory pids cpu cpuacct freezer; do mkdir \
+            "run the service as root, or let root give it a cgroup: for c in memory pids cpu cpuacct freezer; do mkdir \
              -p /sys/fs/cgroup/$c/agents; chown -R USER /sys/fs/cgroup/$c/agents; echo PID > \
              /sys/fs/cgroup/$c/agents/cgroup.procs; done; {CONTAINER}"
         )
     }
 }
 
-/// The usual switches that keep an ordinary user from making a sandbox, in the order they bite.
-fn cure_namespaces(why: &str) -> String {
+/// The usual settings that prevent an ordinary user from creating namespaces, in the order in which they take effect.
+fn cure_namespaces(error: &str) -> String {
     const SWITCHES: [(&str, &str, &str); 3] = [
         (
             "/proc/sys/kernel/unprivileged_userns_clone",
@@ -287,9 +287,9 @@ fn cure_namespaces(why: &str) -> String {
     if Bubblewrap::find().is_err() {
         return bubblewrap::CURE_INSTALL.into();
     }
-    // Then namespaces were made, and only the last step in them was refused.
-    if why.contains("mount proc") {
-        return "have a /proc without masked files, beside which agents may have one of their own; in Docker: docker run \
+    // Then the namespaces were created, and only the last step was refused.
+    if error.contains("mount proc") {
+        return "provide a /proc without masked files, so that agents can mount their own; in Docker: docker run \
                 --security-opt systempaths=unconfined"
             .into();
     }

@@ -1,15 +1,15 @@
 use crate::{
-    AnswerState, CpuReading, Glance, Isolation, Killer, Limits, Looks, OwnWait, ReadLine,
-    SandboxError, SpawnError, SpawnSpec, Taken, WriteError,
+    AnswerState, CpuReading, Baseline, Isolation, Killer, Limits, CpuSamples, CallerCounters, ReadLine,
+    SandboxError, SpawnError, SpawnSpec, HostInterference, WriteError,
     cgroup::AgentCgroup,
     command_check::check_command,
-    cpu_waits::KnownThreads,
-    end::{End, Evidence},
+    thread_waits::TrackedThreads,
+    exit_cause::{ExitCause, ExitReport},
     error::IoContext,
     line_socket::{Closed, LineSocket, wait_for_any},
-    next_look::NextLook,
-    output_holders,
-    prepared::{Prepared, Started},
+    poll_interval::PollInterval,
+    inherited_descriptors,
+    launch::{Launch, LaunchedAgent},
     process_tree::ProcessTree,
     status_pipe::StatusPipe,
     stderr_tail::StderrTail,
@@ -23,10 +23,10 @@ use std::{
     time::{Duration, Instant},
 };
 
-/// How long to wait for the exit status once a channel is closed.
-const END_PATIENCE: Duration = Duration::from_millis(500);
+/// Wait for the exit status once a channel is closed.
+const EXIT_TIMEOUT: Duration = Duration::from_millis(500);
 
-/// A running agent. Dropping it kills and reaps the whole tree and removes its cgroup and scratch.
+/// A running agent. Dropping it kills and reaps the whole tree and removes its cgroup and scratch folder.
 #[derive(Debug)]
 pub struct AgentProcess {
     lines: LineSocket,
@@ -34,33 +34,33 @@ pub struct AgentProcess {
     stderr: StderrTail,
     tree: ProcessTree,
     limits: Limits,
-    next_look: NextLook,
-    /// Whose waits are read.
-    threads: KnownThreads,
+    output_poll: PollInterval,
+    /// The threads whose scheduling counters are read.
+    threads: TrackedThreads,
     is_frozen: bool,
-    end: Option<End>,
+    end: Option<ExitCause>,
 }
 
-/// What an agent used, and how it ended.
+/// Resource usage and exit of an agent.
 #[derive(Debug, Clone, Default)]
 pub struct Usage {
-    /// The most memory the tree had at a time, in bytes; `None` where the host does not tell.
+    /// Peak memory of the tree, in bytes; `None` if the host does not report it.
     pub peak_memory_bytes: Option<u64>,
-    /// CPU time of the tree in seconds; `None` where the host does not tell.
+    /// CPU time of the tree in seconds; `None` if the host does not report it.
     pub cpu_time_s: Option<f64>,
     /// The end of standard error, lossy UTF-8.
     pub stderr_tail: String,
-    /// How it ended by itself, unless with status 0; `None` also when it had to be killed.
+    /// How it ended on its own, if not with status 0. `None` also if the service killed it.
     pub exit: Option<AgentFaultKind>,
 }
 
 impl AgentProcess {
-    /// Starts the agent. Returns when its sandbox exists; that its program cannot be executed may show
-    /// only then, as a closed channel and [`AgentFaultKind::CannotStart`] from [`Self::diagnose_end`].
+    /// Starts the agent. Returns when its sandbox exists. A program that cannot be executed may fail only later:
+    /// with a closed channel and [`AgentFaultKind::CannotStart`] from [`Self::diagnose_end`].
     ///
     /// # Errors
     /// [`SpawnError::Agent`] if the bundle's command cannot be started, [`SpawnError::Platform`] if the
-    /// host lacks a layer that is not given up or something of ours fails.
+    /// host lacks a layer that is not given up, or the sandbox cannot be set up.
     pub fn spawn(spec: &SpawnSpec) -> Result<Self, SpawnError> {
         static SWEEP: Once = Once::new();
         if matches!(spec.isolation, Isolation::Sandboxed { .. }) {
@@ -77,68 +77,68 @@ impl AgentProcess {
             bundle_dir,
             ..spec.clone()
         };
-        let Started {
+        let LaunchedAgent {
             lines,
             output_name,
             stderr,
             tree,
-        } = Prepared::new(&spec)?.start(&spec)?;
+        } = Launch::new(&spec)?.start(&spec)?;
         Ok(Self {
             lines,
             output_name,
             stderr,
             tree,
             limits: spec.limits,
-            next_look: NextLook::first(Instant::now()),
-            threads: KnownThreads::default(),
+            output_poll: PollInterval::start(Instant::now()),
+            threads: TrackedThreads::default(),
             is_frozen: false,
             end: None,
         })
     }
 
-    /// Sends `line` (which ends in `\n`) without waiting. What the agent leaves no room for follows while its
-    /// answer is waited for.
+    /// Sends `line` (which ends in `\n`) without blocking. Bytes that do not fit into the agent's input are sent while
+    /// the caller waits for the answer.
     ///
     /// # Errors
-    /// [`WriteError::Closed`] is the agent's doing, the rest is ours.
+    /// [`WriteError::Closed`] is an agent fault, the others are platform faults.
     pub fn send_line(&mut self, line: &[u8]) -> Result<(), WriteError> {
-        // Before the call: on a shared CPU the agent may run, and even answer, before it returns.
+        // Taken before the call: on a shared CPU the agent may run, and even answer, before it returns.
         let at = Instant::now();
         match self.lines.send(line) {
             Ok(Ok(())) => {
-                self.next_look = NextLook::first(at);
+                self.output_poll = PollInterval::start(at);
                 Ok(())
             }
             Ok(Err(Closed)) => {
-                self.diagnose_end(END_PATIENCE)?;
+                self.diagnose_end(EXIT_TIMEOUT)?;
                 Err(WriteError::Closed)
             }
             Err(source) => Err(SandboxError::io("cannot write to the agent", source).into()),
         }
     }
 
-    /// Stops the whole tree until [`Self::thaw`]; a tree that is ended is thawed. Tells whether the host has
-    /// something that stops it.
+    /// Freezes the whole tree until [`Self::thaw`]; killing the tree also thaws it. Returns whether the host can
+    /// freeze it.
     pub fn freeze(&mut self) -> bool {
         let freezer = self.tree.cgroup.as_ref().and_then(AgentCgroup::freezer);
         self.is_frozen = freezer.is_some_and(|freezer| freezer.freeze());
         self.is_frozen
     }
 
-    /// Lets a frozen tree go on.
+    /// Thaws a frozen tree.
     pub fn thaw(&mut self) {
         if std::mem::take(&mut self.is_frozen) {
             self.tree.thaw();
         }
     }
 
-    /// Does the host have something that stops the whole tree?
+    /// Can the host freeze the whole tree?
     pub fn can_freeze(&self) -> bool {
         let cgroup = self.tree.cgroup.as_ref();
         cgroup.is_some_and(|cgroup| cgroup.freezer().is_some())
     }
 
-    /// Ends the tree from another thread.
+    /// A handle that kills the tree from another thread.
     ///
     /// # Errors
     /// When the host has no descriptor left.
@@ -146,23 +146,23 @@ impl AgentProcess {
         self.tree.killer().context("cannot watch over the agent")
     }
 
-    /// Has the channel taken every line that was sent?
-    pub const fn has_taken_all(&self) -> bool {
+    /// Has the channel accepted all bytes of all sent lines?
+    pub const fn is_all_sent(&self) -> bool {
         self.lines.is_all_sent()
     }
 
-    /// Waits for the agent's next line, of at most `max_bytes` without its newline, until `deadline`;
-    /// one that has passed takes what is there already.
+    /// Waits until `deadline` for the agent's next line, of at most `max_bytes` without its newline. With an expired
+    /// deadline it returns a line that is available already.
     ///
     /// # Errors
-    /// When the socket or the sandbox itself failed; never for what the agent does.
+    /// When the socket or the sandbox failed; never because of the agent's behaviour.
     pub fn read_line(
         &mut self,
         max_bytes: usize,
         deadline: Instant,
     ) -> Result<ReadLine, SandboxError> {
         let answer = loop {
-            let until = self.until_next_look(deadline);
+            let until = self.next_poll_or_deadline(deadline);
             let answer = self
                 .lines
                 .read_line(max_bytes, until)
@@ -173,38 +173,38 @@ impl AgentProcess {
             if self.output_is_abandoned()? {
                 break ReadLine::Closed;
             }
-            self.next_look.after_a_longer_pause(Instant::now());
+            self.output_poll.lengthen(Instant::now());
         };
         if matches!(answer, ReadLine::Closed) {
-            self.diagnose_end(END_PATIENCE)?;
+            self.diagnose_end(EXIT_TIMEOUT)?;
         }
         Ok(answer)
     }
 
-    /// Looks for the agent's next line until `until` without giving the CPU away, for [`Self::read_line`] to
-    /// take: only on a CPU that the agent cannot use.
+    /// Busy-polls until `until` for the agent's next line, which [`Self::read_line`] then returns. Use it only on a CPU
+    /// that the agent cannot use.
     ///
     /// # Errors
     /// When the socket itself failed.
-    pub fn look_out(&mut self, until: Instant) -> Result<(), SandboxError> {
+    pub fn spin_until(&mut self, until: Instant) -> Result<(), SandboxError> {
         self.lines
-            .look_out(until)
+            .spin_until(until)
             .context("cannot read from the agent")
     }
 
-    /// Waits until one of the agents has something for [`Self::read_line`], be it a part of a line or
-    /// its end, or until `deadline`. May return early, when an agent's silence is to be looked into:
-    /// that, too, `read_line` does, with a deadline that has passed.
+    /// Waits until one of the agents has output for [`Self::read_line`] (even a part of a line) or has ended, or until
+    /// `deadline`. May return early when a silent agent must be checked; `read_line` with an expired deadline does
+    /// this check.
     ///
     /// # Errors
-    /// When the sockets cannot be waited for.
+    /// When polling the sockets fails.
     pub fn wait_for_any(agents: &[&Self], deadline: Instant) -> Result<(), SandboxError> {
-        if agents.iter().any(|agent| agent.lines.holds_line()) {
+        if agents.iter().any(|agent| agent.lines.has_line()) {
             return Ok(());
         }
         let until = agents
             .iter()
-            .fold(deadline, |until, agent| agent.until_next_look(until));
+            .fold(deadline, |until, agent| agent.next_poll_or_deadline(until));
         let mut awaited: Vec<PollFd<'_>> = agents
             .iter()
             .flat_map(|agent| agent.lines.awaited())
@@ -213,10 +213,10 @@ impl AgentProcess {
         Ok(())
     }
 
-    /// Outside of a sandbox a closed output is seen at once.
-    fn until_next_look(&self, deadline: Instant) -> Instant {
+    /// Without a sandbox the kernel reports a closed output at once, so no checks are needed.
+    fn next_poll_or_deadline(&self, deadline: Instant) -> Instant {
         if self.tree.is_sandboxed() {
-            deadline.min(self.next_look.at)
+            deadline.min(self.output_poll.due)
         } else {
             deadline
         }
@@ -225,23 +225,25 @@ impl AgentProcess {
     /// Is there unread output already (an answer before the question)?
     ///
     /// # Errors
-    /// When the socket cannot be asked.
+    /// When the socket cannot be queried.
     pub fn has_pending_output(&mut self) -> Result<bool, SandboxError> {
         self.lines
             .has_pending_output()
             .context("cannot look at the agent's output")
     }
 
-    /// Why it ended, if it ends by itself within `wait`: exit, signal, or the limit that ended it.
-    /// `None` while it runs and after we have killed it.
+    /// The agent fault, if the agent ends on its own within `wait`: exit, signal, or the limit that it reached.
+    /// `None` while it runs and after [`Self::kill`].
     ///
     /// # Errors
-    /// When the end was a failure of ours.
+    /// When a platform fault ended it.
     pub fn diagnose_end(&mut self, wait: Duration) -> Result<Option<AgentFaultKind>, SandboxError> {
         match self.observe_end(wait) {
-            Some(End::Agent(fault)) => Ok(Some(fault.clone())),
-            Some(End::Platform(why)) => Err(SandboxError::other("the sandbox failed", why.clone())),
-            Some(End::Killed) | None => Ok(None),
+            Some(ExitCause::Agent(fault)) => Ok(Some(fault.clone())),
+            Some(ExitCause::Platform(error)) => {
+                Err(SandboxError::other("the sandbox failed", error.clone()))
+            }
+            Some(ExitCause::Killed) | None => Ok(None),
         }
     }
 
@@ -250,79 +252,81 @@ impl AgentProcess {
         self.stderr.text()
     }
 
-    /// CPU time of the whole tree so far, in seconds: by its cgroup, or where it has none by the clocks
-    /// of its processes, which miss what a process used right before its end. `None` where the host
-    /// does not tell.
+    /// CPU time of the whole tree so far, in seconds: by its cgroup, or without one by the clocks of its processes,
+    /// which miss the time that a process used right before its end. `None` if the host does not report it.
     pub fn cpu_time_s(&self) -> Option<f64> {
         self.tree.cpu_time_s()
     }
 
-    /// Looks up which threads the agent has; nothing is known of others, nor of more than the first few.
-    pub fn know_threads(&mut self) {
-        if self.counts_cpus() {
+    /// Updates the list of tracked threads, which is limited to the agent's first few threads.
+    pub fn track_threads(&mut self) {
+        if self.has_cpu_accounting() {
             self.threads.update(&self.tree.processes());
         }
     }
 
-    fn counts_cpus(&self) -> bool {
+    fn has_cpu_accounting(&self) -> bool {
         let cgroup = self.tree.cgroup.as_ref();
-        cgroup.is_some_and(|cgroup| cgroup.cpu_evidence.is_some())
+        cgroup.is_some_and(|cgroup| cgroup.cpu_accounting.is_some())
     }
 
-    /// The counters of the agent's CPUs, as a look at it; `None` without a cgroup.
-    pub fn read_cpus(&self) -> Option<CpuReading> {
-        let evidence = self.tree.cgroup.as_ref()?.cpu_evidence.as_ref()?;
-        evidence.begin(&self.threads)
+    /// Reads the counters of the agent's CPUs and threads; `None` without a cgroup.
+    pub fn sample_cpus(&self) -> Option<CpuReading> {
+        let accounting = self.tree.cgroup.as_ref()?.cpu_accounting.as_ref()?;
+        accounting.read_start(&self.threads)
     }
 
-    /// The counters before a question, with those of the calling thread if it keeps off the agent's CPUs on `own_cpus`.
-    pub fn glance_at_cpus(&self, own_cpus: Option<&[usize]>) -> Glance {
+    /// Reads the counters before a question. `caller_cpus`: the CPUs of the calling thread if they are disjoint from
+    /// the agent's; then its counters are included.
+    pub fn read_baseline(&self, caller_cpus: Option<&[usize]>) -> Baseline {
         let cgroup = self.tree.cgroup.as_ref();
-        let evidence = cgroup.and_then(|cgroup| cgroup.cpu_evidence.as_ref());
-        let stat = if evidence.is_some() || own_cpus.is_some() {
+        let accounting = cgroup.and_then(|cgroup| cgroup.cpu_accounting.as_ref());
+        let stat = if accounting.is_some() || caller_cpus.is_some() {
             fs::read_to_string("/proc/stat").unwrap_or_default()
         } else {
             String::new()
         };
-        Glance {
+        Baseline {
             at: Instant::now(),
-            cpus: evidence.and_then(|evidence| evidence.glance(&self.threads, &stat)),
-            own: own_cpus.map(|cpus| OwnWait::now(&stat, cpus, self.stderr.ran())),
+            cpus: accounting.and_then(|accounting| accounting.read_baseline(&self.threads, &stat)),
+            caller: caller_cpus.map(|cpus| CallerCounters::read(&stat, cpus, self.stderr.reader_run_time())),
         }
     }
 
-    /// The counters of the calling thread, which may use `cpus`, after a [`Self::glance_at_cpus`].
-    pub fn own_wait(&self, cpus: &[usize]) -> OwnWait {
+    /// The counters of the calling thread, which may use `cpus`, after [`Self::read_baseline`].
+    pub fn caller_counters(&self, cpus: &[usize]) -> CallerCounters {
         let stat = fs::read_to_string("/proc/stat").unwrap_or_default();
-        OwnWait::now(&stat, cpus, self.stderr.ran())
+        CallerCounters::read(&stat, cpus, self.stderr.reader_run_time())
     }
 
-    /// For how much of the time since `asked`, or since `looks` at it began, or by the `glance` before it was
-    /// asked, the agent wanted to run and
-    /// could not, because all CPUs that it may use ran something outside of its cgroup, or were held up by a
-    /// machine below this one; without either, zero. `None` where the host does not tell. Only waits of a thread
-    /// count that then ran, unless the answer is still to come. Never more
-    /// than the kernel's counters prove: with version 1 of the cgroup interface in nanoseconds, with version
-    /// 2 in ticks of 10 ms, of which a few may be missing. They lag behind by 10 ms at most: so long the
-    /// agent must have been waited for when looks begin, and as much, with its age, is taken off since a glance.
-    pub fn taken_from_it_since(
+    /// Host interference since the question: the time in which the agent was runnable and could not run, because all
+    /// its CPUs ran processes outside of its cgroup, or the hypervisor had stopped them.
+    ///
+    /// It is measured since the first of `samples`, and since the `baseline` that was read before the question
+    /// (`asked`). Without either it is zero; `None` if the host has no such counters. A thread's wait counts only if
+    /// the thread then ran, unless the answer is still pending.
+    ///
+    /// The result never exceeds what the kernel's counters prove. Cgroup version 1 counts in nanoseconds, version 2 in
+    /// ticks of 10 ms, of which a few may be missing. Counters lag by up to 10 ms. So samples must begin at least that
+    /// long after the question, and the lag and the age of the baseline are subtracted.
+    pub fn interference_since(
         &self,
         asked: Instant,
-        looks: Option<&Looks>,
-        glance: Option<&CpuReading>,
+        samples: Option<&CpuSamples>,
+        baseline: Option<&CpuReading>,
         answer: AnswerState,
-    ) -> Option<Taken> {
-        let evidence = self.tree.cgroup.as_ref()?.cpu_evidence.as_ref()?;
-        if looks.is_none() && glance.is_none() {
-            return Some(Taken::default());
+    ) -> Option<HostInterference> {
+        let accounting = self.tree.cgroup.as_ref()?.cpu_accounting.as_ref()?;
+        if samples.is_none() && baseline.is_none() {
+            return Some(HostInterference::default());
         }
-        evidence.taken_since(asked, looks, glance, &self.threads, answer)
+        accounting.interference_since(asked, samples, baseline, &self.threads, answer)
     }
 
-    /// Ends the agent's input, waits up to `grace` for it to exit, then kills the tree; always reaps.
+    /// Ends the agent's input, waits up to `grace` for its exit, then kills the tree; always reaps it.
     ///
     /// # Errors
-    /// When the sandbox failed under the agent.
+    /// When the sandbox failed.
     pub fn finish(mut self, grace: Duration) -> Result<Usage, SandboxError> {
         self.lines.end_input();
         self.thaw();
@@ -338,7 +342,7 @@ impl AgentProcess {
             cpu_time_s: self.cpu_time_s(),
             stderr_tail: self.stderr.text(),
             exit: match &self.end {
-                Some(End::Agent(fault)) if *fault != (AgentFaultKind::Exited { code: 0 }) => {
+                Some(ExitCause::Agent(fault)) if *fault != (AgentFaultKind::Exited { code: 0 }) => {
                     Some(fault.clone())
                 }
                 _ => None,
@@ -346,56 +350,61 @@ impl AgentProcess {
         };
         self.tree.clean_up();
         match &self.end {
-            Some(End::Platform(why)) => Err(SandboxError::other("the sandbox failed", why.clone())),
+            Some(ExitCause::Platform(error)) => {
+                Err(SandboxError::other("the sandbox failed", error.clone()))
+            }
             _ => Ok(usage),
         }
     }
 
-    /// Ends the whole tree now and reaps it.
+    /// Kills the whole tree and reaps it.
     pub fn kill(&mut self) {
         if !self.tree.has_ended() {
             self.tree.kill();
-            self.end.get_or_insert(End::Killed);
+            self.end.get_or_insert(ExitCause::Killed);
         }
         self.stderr.close();
     }
 
-    /// Has the agent, though alive, closed its output, with nothing left in it?
+    /// Has the agent closed its output while it still runs, with no unread output left?
     fn output_is_abandoned(&self) -> Result<bool, SandboxError> {
-        let held =
-            output_holders::any_holds(&self.output_name, &self.tree.processes(), self.tree.pid());
-        if held {
+        let is_open = inherited_descriptors::is_open_in_tree(
+            &self.output_name,
+            &self.tree.processes(),
+            self.tree.pid(),
+        );
+        if is_open {
             return Ok(false);
         }
         let pending = self.lines.has_pending_output();
         Ok(!pending.context("cannot look at the agent's output")?)
     }
 
-    fn observe_end(&mut self, wait: Duration) -> Option<&End> {
+    fn observe_end(&mut self, wait: Duration) -> Option<&ExitCause> {
         if self.end.is_none() {
             let status = match self.tree.wait(Instant::now() + wait) {
                 Ok(status) => status?,
                 Err(error) => {
-                    self.end = Some(End::Platform(format!("cannot wait for the agent: {error}")));
+                    self.end = Some(ExitCause::Platform(format!("cannot wait for the agent: {error}")));
                     return self.end.as_ref();
                 }
             };
             self.stderr.close();
-            let evidence = Evidence {
+            let report = ExitReport {
                 status,
-                sandboxed: self.tree.status.as_mut().map(StatusPipe::exit_code),
+                sandboxed_exit: self.tree.status.as_mut().map(StatusPipe::exit_code),
                 limit_hit: self.tree.cgroup.as_ref().and_then(AgentCgroup::limit_hit),
                 stderr: &self.stderr.text(),
                 limits: &self.limits,
             };
-            self.end = Some(evidence.end());
+            self.end = Some(report.cause());
         }
         self.end.as_ref()
     }
 }
 
 impl Drop for AgentProcess {
-    /// Whatever else was forgotten: nothing that is shared with an agent is closed while it lives.
+    /// Kills the agent first, so that no shared socket is closed while it lives.
     fn drop(&mut self) {
         self.kill();
     }

@@ -1,4 +1,4 @@
-//! The processes of one agent: their end awaited, forced, and cleaned up after.
+//! The processes of one agent: waiting for their end, killing and cleaning up.
 
 use crate::{
     Killer, cgroup::AgentCgroup, cpu_clock::TreeClock, line_socket::wait_for,
@@ -15,23 +15,23 @@ use std::{
     time::{Duration, Instant},
 };
 
-/// How long a killed process may take to disappear before we say so and go on.
-const KILL_PATIENCE: Duration = Duration::from_secs(60);
-/// How long bubblewrap may take to follow the sandbox it watches.
-const FOLLOW_PATIENCE: Duration = Duration::from_secs(2);
+/// Wait for a killed process to disappear; then an error is logged.
+const KILL_TIMEOUT: Duration = Duration::from_secs(60);
+/// Wait for bubblewrap to exit after its sandbox has ended.
+const BUBBLEWRAP_EXIT_TIMEOUT: Duration = Duration::from_secs(2);
 
-/// The child, what it started, and what holds them.
+/// The child, its descendants, and the resources that contain them.
 #[derive(Debug)]
 pub(crate) struct ProcessTree {
     child: Child,
     clock: TreeClock,
-    /// Readable when the child has ended.
+    /// Pidfd of the child: readable when the child has ended.
     child_end: OwnedFd,
-    /// The sandbox's first process: with it ends everything inside.
+    /// Pidfd of the sandbox's first process, whose end terminates all others in the sandbox.
     sandbox_init: Option<OwnedFd>,
     pub(crate) status: Option<StatusPipe>,
     pub(crate) cgroup: Option<AgentCgroup>,
-    /// The scratch folder where no sandbox has one of its own.
+    /// The scratch folder on the host, for agents without a mount namespace.
     scratch: Option<tempfile::TempDir>,
     ended: Option<ExitStatus>,
 }
@@ -62,13 +62,13 @@ impl ProcessTree {
         }
     }
 
-    /// Remembers the sandbox's first process, unless it is gone again.
+    /// Opens the sandbox's first process, unless it has ended already.
     pub(crate) fn watch_init(&mut self, pid: Pid) {
         let Ok(init) = pidfd_open(pid, PidfdFlags::empty()) else {
             return;
         };
-        // bubblewrap has one child only. If the process of that number is it, the descriptor is its;
-        // else it has ended and the number may belong to a stranger.
+        // bubblewrap has only one child. If this process is a child of bubblewrap, it is the right one; otherwise the
+        // sandbox has ended, and the pid may belong to an unrelated process.
         let parent = parent_and_group(pid.as_raw_nonzero().get()).map(|(parent, _)| parent);
         if parent == Some(self.pid().as_raw_nonzero().get()) {
             self.sandbox_init = Some(init);
@@ -79,7 +79,7 @@ impl ProcessTree {
         Pid::from_child(&self.child)
     }
 
-    /// CPU time of the tree so far, seconds.
+    /// CPU time of the tree so far, in seconds.
     pub(crate) fn cpu_time_s(&self) -> Option<f64> {
         self.cgroup
             .as_ref()
@@ -91,7 +91,7 @@ impl ProcessTree {
         self.status.is_some()
     }
 
-    /// Every process of the tree that can be found.
+    /// All processes of the tree that can be found.
     pub(crate) fn processes(&self) -> Vec<Pid> {
         match &self.cgroup {
             Some(cgroup) => cgroup.processes(),
@@ -99,39 +99,39 @@ impl ProcessTree {
         }
     }
 
-    /// Has everything been reaped?
+    /// Has the child been reaped?
     pub(crate) fn has_ended(&self) -> bool {
         self.ended.is_some()
     }
 
-    /// Waits for the child's end and reaps it, with what is left of its process group.
+    /// Waits for the child's end, kills the rest of its process group, and reaps the child.
     pub(crate) fn wait(&mut self, deadline: Instant) -> io::Result<Option<ExitStatus>> {
         if self.ended.is_none() && wait_for(self.child_end.as_fd(), PollFlags::IN, deadline)? {
-            // Not reaped yet, so its number is still its own, and so is the group's.
-            self.end_relatives();
+            // The child is not reaped yet, so its pid and its process group id cannot have been reused.
+            self.kill_relatives();
             self.ended = Some(self.child.wait()?);
         }
         Ok(self.ended)
     }
 
-    /// Ends every process of the tree and reaps the child.
+    /// Kills every process of the tree and reaps the child.
     pub(crate) fn kill(&mut self) {
         if self.ended.is_some() {
             return;
         }
-        // bubblewrap reaps its child when that ends first; the other way round, the orphan would fall to
-        // the host's init, which in a container may be us.
+        // Kill the sandbox's first process before bubblewrap, which then reaps it. In the other order the orphan would
+        // be reparented to init, which in a container may be this service.
         if let Some(init) = &self.sandbox_init {
             let _ = pidfd_send_signal(init, Signal::KILL);
             self.thaw();
-            if matches!(self.wait(Instant::now() + FOLLOW_PATIENCE), Ok(Some(_))) {
+            if matches!(self.wait(Instant::now() + BUBBLEWRAP_EXIT_TIMEOUT), Ok(Some(_))) {
                 return;
             }
         }
-        self.end_relatives();
+        self.kill_relatives();
         let _ = self.child.kill();
         self.thaw();
-        if !matches!(self.wait(Instant::now() + KILL_PATIENCE), Ok(Some(_))) {
+        if !matches!(self.wait(Instant::now() + KILL_TIMEOUT), Ok(Some(_))) {
             tracing::error!(
                 pid = self.child.id(),
                 "an agent's process did not end after SIGKILL"
@@ -139,14 +139,14 @@ impl ProcessTree {
         }
     }
 
-    /// Lets the tree go on, if it was frozen.
+    /// Thaws the tree if it was frozen.
     pub(crate) fn thaw(&self) {
         if let Some(freezer) = self.cgroup.as_ref().and_then(AgentCgroup::freezer) {
             freezer.thaw();
         }
     }
 
-    /// Ends the tree from other threads.
+    /// A handle that kills the tree from other threads.
     pub(crate) fn killer(&self) -> io::Result<Killer> {
         let processes = self.sandbox_init.iter().chain([&self.child_end]);
         let cgroups = self.cgroup.as_ref().map(|cgroup| cgroup.leaves().to_vec());
@@ -158,9 +158,9 @@ impl ProcessTree {
         })
     }
 
-    /// Without a sandbox, whose end is the end of all in it: ends the child's process group and its
-    /// descendants, and waits until they are gone. The child itself is only killed.
-    fn end_relatives(&self) {
+    /// Kills the child's process group and descendants, and waits for their end; the child itself is not reaped. Does
+    /// nothing with a sandbox, where the end of the first process terminates all others.
+    fn kill_relatives(&self) {
         if self.is_sandboxed() {
             return;
         }
@@ -172,7 +172,7 @@ impl ProcessTree {
         for end in &ends {
             let _ = pidfd_send_signal(end, Signal::KILL);
         }
-        let deadline = Instant::now() + KILL_PATIENCE;
+        let deadline = Instant::now() + KILL_TIMEOUT;
         for end in &ends {
             if !matches!(wait_for(end.as_fd(), PollFlags::IN, deadline), Ok(true)) {
                 tracing::error!(
@@ -183,7 +183,7 @@ impl ProcessTree {
         }
     }
 
-    /// Removes what held the tree. After [`Self::kill`] or the end.
+    /// Removes the cgroup and the scratch folder. Call it after [`Self::kill`] or the child's end.
     pub(crate) fn clean_up(&mut self) {
         if let Some(mut cgroup) = self.cgroup.take() {
             cgroup.remove();
@@ -203,16 +203,16 @@ impl Drop for ProcessTree {
     }
 }
 
-/// The parent and the process group of a process, as the kernel has them now.
+/// Current parent and process group of a process.
 fn parent_and_group(pid: i32) -> Option<(i32, i32)> {
     let stat = fs::read_to_string(format!("/proc/{pid}/stat")).ok()?;
-    // The command's name, in parentheses, may hold anything; the fields after it are plain.
+    // The command's name, in parentheses, may contain anything; the fields after it are plain.
     let mut fields = stat.rsplit_once(')')?.1.split_whitespace().skip(1);
     Some((fields.next()?.parse().ok()?, fields.next()?.parse().ok()?))
 }
 
-/// The other members of `root`'s process group, its children, theirs and so on, as far as they are still
-/// linked to it; without `root` itself.
+/// The other members of `root`'s process group, and all descendants that are still linked to it, without `root`
+/// itself.
 fn relatives(root: Pid) -> Vec<Pid> {
     let root = root.as_raw_nonzero().get();
     let entries = fs::read_dir("/proc").into_iter().flatten().flatten();

@@ -7,7 +7,7 @@ use std::{
 };
 
 /// Folders of shared libraries and of the dynamic loader, as distributions lay them out. On hosts with
-/// a merged /usr the short ones are links and appear inside as the same links.
+/// a merged /usr the short paths are links, and the sandbox has the same links.
 const LIBRARY_PATHS: [&str; 9] = [
     "/usr/lib",
     "/usr/lib32",
@@ -20,7 +20,7 @@ const LIBRARY_PATHS: [&str; 9] = [
     "/etc/ld.so.cache",
 ];
 
-/// Where `python3` is looked for, in this order.
+/// Paths searched for `python3`, in this order.
 const PYTHON_CANDIDATES: [&str; 4] = [
     "/usr/local/bin/python3",
     "/usr/bin/python3",
@@ -28,7 +28,7 @@ const PYTHON_CANDIDATES: [&str; 4] = [
     "/opt/python/bin/python3",
 ];
 
-/// What a script's first line usually names.
+/// Programs that a script's first line usually names.
 const SCRIPT_HELPERS: [&str; 5] = [
     "/bin",
     "/bin/sh",
@@ -37,34 +37,34 @@ const SCRIPT_HELPERS: [&str; 5] = [
     "/usr/bin/env",
 ];
 
-/// A runtime the organiser offers (`runtime` in `agent.toml`): which paths of the host an agent sees,
+/// A runtime that the organiser offers (`runtime` in `agent.toml`): the host paths that an agent sees,
 /// read-only and under the same names, and its PATH.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Runtime {
-    /// Absolute host paths. A symbolic link appears as the same link, so its target must be named too.
-    /// Files must be readable by everybody when the service runs as root, for agents do not.
+    /// Absolute host paths. A symbolic link appears as the same link, so its target must be listed too.
+    /// When the service runs as root, files must be world-readable, because agents run as other users.
     pub read_only_paths: Vec<PathBuf>,
     /// The agent's `PATH`.
     pub path: String,
-    /// Where the files that agents see really are.
+    /// Source of the files that agents see.
     #[serde(skip)]
     pub files: RuntimeFiles,
 }
 
-/// Where a runtime's files are.
+/// Location of a runtime's files.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub enum RuntimeFiles {
-    /// On the host, under the names by which agents see them.
+    /// On the host, under the same names as in the sandbox.
     #[default]
     Host,
-    /// In a folder that holds a copy of them, in memory.
+    /// In a folder in memory that holds a copy of them.
     Copy(PathBuf),
-    /// They are all of this folder, which becomes the agent's root: nothing of the host is shown beside it.
+    /// This folder becomes the agent's root: no file of the host is mounted beside it.
     Root(PathBuf),
 }
 
 impl Runtime {
-    /// For self-contained binaries: the host's shared libraries and nothing else.
+    /// Runtime of self-contained binaries: the host's shared libraries and nothing else.
     pub fn native() -> Self {
         Self {
             read_only_paths: existing(&LIBRARY_PATHS),
@@ -73,18 +73,18 @@ impl Runtime {
         }
     }
 
-    /// The host's Python: the first `python3` of the usual places that starts, with its own libraries,
-    /// the system's and `/bin/sh` and `/usr/bin/env` for scripts. `None` if there is none.
+    /// The host's Python: the first `python3` of the usual paths that starts, with its own libraries,
+    /// the system's, and `/bin/sh` and `/usr/bin/env` for scripts. `None` if there is none.
     pub fn python3() -> Option<Self> {
         PYTHON_CANDIDATES
             .iter()
             .find_map(|candidate| Self::python3_at(Path::new(candidate)).ok())
     }
 
-    /// A Python the organiser names, e.g. one built in `/opt` or a virtual environment.
+    /// A Python that the organiser configures, e.g. one built in `/opt` or a virtual environment.
     ///
     /// # Errors
-    /// When `interpreter` does not start or does not tell where its libraries are.
+    /// When `interpreter` does not start or does not print its library paths.
     pub fn python3_at(interpreter: &Path) -> Result<Self, SandboxError> {
         let python = PythonLayout::ask(interpreter)?;
         let mut paths = existing(&LIBRARY_PATHS);
@@ -114,10 +114,12 @@ impl Runtime {
         })
     }
 
-    /// A container image's own: `root` holds its merged layers, and `path` is its `PATH`. It must have real
-    /// folders `agent`, `dev`, `etc`, `proc`, `sys` and `tmp`, and files `etc/passwd` and `etc/group`, over which the
-    /// sandbox shows its own; links may lead anywhere. Needs [`Layer::Namespaces`](crate::Layer::Namespaces).
-    pub fn of_image(root: &Path, path: &str) -> Self {
+    /// Runtime of a container image: `root` holds its merged layers, and `path` is its `PATH`.
+    ///
+    /// `root` must have real folders `agent`, `dev`, `etc`, `proc`, `sys` and `tmp`, and files `etc/passwd` and
+    /// `etc/group`, over which the sandbox mounts its own. Other links may point anywhere. Needs
+    /// [`Layer::Namespaces`](crate::Layer::Namespaces).
+    pub fn from_image(root: &Path, path: &str) -> Self {
         Self {
             read_only_paths: Vec::new(),
             path: path.to_owned(),
@@ -125,7 +127,7 @@ impl Runtime {
         }
     }
 
-    /// The folder that is the agent's root, if it has one of its own.
+    /// The agent's root folder, if it has one of its own.
     pub(crate) fn root(&self) -> Option<&Path> {
         match &self.files {
             RuntimeFiles::Root(root) => Some(root),
@@ -133,16 +135,16 @@ impl Runtime {
         }
     }
 
-    /// Where the files of one of its paths are. A symbolic link is shown as the same link.
+    /// Host path of the files that the sandbox shows at `path`. A symbolic link appears as the same link.
     pub(crate) fn source(&self, path: &Path) -> PathBuf {
         match &self.files {
-            RuntimeFiles::Copy(copy) if !path.is_symlink() => inside(copy, path),
+            RuntimeFiles::Copy(copy) if !path.is_symlink() => path_in_image(copy, path),
             _ => path.to_owned(),
         }
     }
 
-    /// The host path of the first `python3` this runtime's PATH leads to, for messages. A root of its own is not
-    /// looked into.
+    /// Host path of the first `python3` in this runtime's PATH, for messages. `None` for a container image, which
+    /// is not searched.
     pub fn interpreter(&self) -> Option<PathBuf> {
         if self.root().is_some() {
             return None;
@@ -154,17 +156,17 @@ impl Runtime {
     }
 }
 
-/// Where an image of the host's files holds `path`.
-pub(crate) fn inside(image: &Path, path: &Path) -> PathBuf {
+/// The path at which a copy of the host's files holds `path`.
+pub(crate) fn path_in_image(image: &Path, path: &Path) -> PathBuf {
     image.join(path.strip_prefix("/").unwrap_or(path))
 }
 
-/// Where an interpreter keeps its files, as it says itself.
+/// File layout of an interpreter, as it reports it.
 struct PythonLayout {
     executable: PathBuf,
-    /// Installation prefix; for a virtual environment the one of the Python behind it.
+    /// Installation prefix; in a virtual environment the prefix of the underlying Python.
     base_prefix: PathBuf,
-    /// The virtual environment, or the same.
+    /// Prefix of the virtual environment; without one, the same as `base_prefix`.
     prefix: PathBuf,
     standard_library: PathBuf,
     packages: Vec<PathBuf>,
@@ -172,29 +174,29 @@ struct PythonLayout {
 
 impl PythonLayout {
     fn ask(interpreter: &Path) -> Result<Self, SandboxError> {
-        const QUESTION: &str = "import sys, os, site, sysconfig\n\
+        const SCRIPT: &str = "import sys, os, site, sysconfig\n\
             print(os.path.realpath(sys.executable))\n\
             print(sys.base_prefix)\n\
             print(sys.prefix)\n\
             print(sysconfig.get_path('stdlib'))\n\
             for p in dict.fromkeys(site.getsitepackages() + [sysconfig.get_path('platstdlib')]): print(p)";
-        let what = format!("cannot ask {} for its layout", interpreter.display());
+        let action = format!("cannot ask {} for its layout", interpreter.display());
         let answer = Command::new(interpreter)
-            .args(["-I", "-c", QUESTION])
+            .args(["-I", "-c", SCRIPT])
             .env_clear()
             .stdin(Stdio::null())
             .stderr(Stdio::null())
             .output()
-            .context(&what)?;
+            .context(&action)?;
         if !answer.status.success() {
-            return Err(SandboxError::other(what, answer.status.to_string()));
+            return Err(SandboxError::other(action, answer.status.to_string()));
         }
         let text = String::from_utf8_lossy(&answer.stdout);
         let mut lines = text.lines().map(PathBuf::from);
         let mut next = || {
             lines
                 .next()
-                .ok_or_else(|| SandboxError::other(&what, "its answer is too short"))
+                .ok_or_else(|| SandboxError::other(&action, "its answer is too short"))
         };
         Ok(Self {
             executable: next()?,
@@ -205,7 +207,7 @@ impl PythonLayout {
         })
     }
 
-    /// A prefix of its own is shown as a whole; from `/usr` and `/usr/local` only what belongs to Python.
+    /// A private prefix is shown as a whole; of `/usr` and `/usr/local` only the files of Python.
     fn paths(&self) -> Vec<PathBuf> {
         let mut paths = vec![self.executable.clone()];
         for prefix in [&self.base_prefix, &self.prefix] {
@@ -234,7 +236,7 @@ fn existing(paths: &[&str]) -> Vec<PathBuf> {
     let mut found: Vec<PathBuf> = Vec::new();
     for path in paths {
         let path = PathBuf::from(path);
-        // `/bin` matters only where it is a link; a real folder of programs is not shown.
+        // `/bin` matters only if it is a link; a real folder of programs is not shown.
         let wanted =
             path != Path::new("/bin") || fs::symlink_metadata(&path).is_ok_and(|m| m.is_symlink());
         if wanted && path.exists() {
@@ -243,15 +245,15 @@ fn existing(paths: &[&str]) -> Vec<PathBuf> {
             }
         }
     }
-    // A link's target may be a folder of programs (`/bin`): the link is wanted, the folder is not.
+    // The target of `/bin` is a folder of programs: the sandbox needs the link but not the folder.
     found.retain(|path| path != Path::new("/usr/bin"));
     found
 }
 
-/// `path` and, while it is a link, what it points to, links in its folders excluded.
+/// `path` and, while it is a link, its target. Links in parent folders are resolved, not listed.
 fn link_chain(path: &Path) -> Vec<PathBuf> {
     let mut chain = vec![path.to_path_buf()];
-    // Longer chains than this end in ELOOP for the kernel as well.
+    // Longer chains end in ELOOP in the kernel as well.
     for _ in 0..40 {
         let last = chain.last().cloned().unwrap_or_default();
         let Ok(target) = fs::read_link(&last) else {
@@ -278,7 +280,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_runtime_shows_no_folder_of_users_or_configuration() {
+    fn runtime_shows_no_user_or_configuration_folder() {
         let mut runtimes = vec![Runtime::native()];
         runtimes.extend(Runtime::python3());
         for path in runtimes.iter().flat_map(|runtime| &runtime.read_only_paths) {

@@ -1,12 +1,12 @@
-//! Which system calls an agent may not make.
+//! Seccomp filters: the system calls that an agent may not make.
 //!
-//! Most filters name what an agent has no use for, each with the answer that programs survive best: not
-//! permitted, not there, not for this file, or advice that is taken note of and not followed. One answers
-//! `ENOSYS` to everything newer than this list, to `clone3`, whose flags a filter cannot see, and to the
-//! x32 calls, which would slip past a list of numbers; programs then take their older way.
+//! Most filters list calls that an agent does not need. Each list has the answer that programs handle best: not
+//! permitted, not implemented, not supported for this file, or success without effect. One filter answers
+//! `ENOSYS` to every call newer than this list, to `clone3`, whose flags a filter cannot read, and to the
+//! x32 calls, which would bypass a list of numbers. Programs then fall back to older calls.
 //!
-//! What agents share, the files of the bundle and the runtime, must not be a notice board: whatever leaves
-//! a trace on a file or in the kernel's copy of it, and whatever shows one, is among what is refused.
+//! The files that agents share (of the bundle and the runtime) must not be a covert channel between agents. So
+//! the refused calls include all that leave a trace on a file or in the page cache, and all that reveal one.
 
 use crate::{Layer, SandboxError};
 use seccompiler::{
@@ -15,7 +15,7 @@ use seccompiler::{
 };
 use std::collections::BTreeMap;
 
-/// Refused whatever their arguments. The reason stands at each group.
+/// Refused with any arguments. Each group states its reason.
 const REFUSED: &[i64] = &[
     // other processes' memory and descriptors
     libc::SYS_ptrace,
@@ -45,7 +45,7 @@ const REFUSED: &[i64] = &[
     libc::SYS_keyctl,
     libc::SYS_add_key,
     libc::SYS_request_key,
-    // large attack surfaces without a use for an agent
+    // large attack surfaces that no agent needs
     libc::SYS_bpf,
     libc::SYS_perf_event_open,
     libc::SYS_io_uring_setup,
@@ -54,7 +54,7 @@ const REFUSED: &[i64] = &[
     libc::SYS_userfaultfd,
     libc::SYS_fanotify_init,
     libc::SYS_seccomp,
-    // files by handle, past any mount
+    // opening files by handle bypasses mounts
     libc::SYS_open_by_handle_at,
     libc::SYS_name_to_handle_at,
     // the machine itself
@@ -79,7 +79,7 @@ const REFUSED: &[i64] = &[
     libc::SYS_clock_adjtime,
     libc::SYS_nfsservctl,
     libc::SYS_lookup_dcookie,
-    // a thread with a slice of its own choice lets others go first, and seems to be kept waiting
+    // a thread could choose a time slice with which it yields to others, and seem to wait for the CPU
     libc::SYS_sched_setattr,
     // personality switches off address-space randomisation
     libc::SYS_personality,
@@ -98,16 +98,16 @@ const REFUSED_HERE: &[i64] = &[
 #[cfg(not(target_arch = "x86_64"))]
 const REFUSED_HERE: &[i64] = &[];
 
-/// As on a kernel without them (`ENOSYS`).
+/// Answered as by a kernel that lacks them (`ENOSYS`).
 const ABSENT: &[i64] = &[
-    // locks on a file that agents share are seen by all of them; by `fcntl` see below
+    // locks on a shared file are visible to all agents; for locks by `fcntl` see below
     libc::SYS_flock,
-    // tells what others do with a file
+    // reports other agents' accesses to a file
     libc::SYS_inotify_init1,
-    // tell what is in memory of a file, and so what others have read
+    // show which pages of a file are in memory, and so what other agents have read
     libc::SYS_mincore,
     CACHESTAT,
-    // its slots are counted for the whole host, and the count can be read
+    // its slots are counted for the whole host, and every agent can read the count
     libc::SYS_io_setup,
 ];
 
@@ -119,18 +119,18 @@ const ABSENT_HERE: &[i64] = &[];
 /// The same number on all architectures.
 const CACHESTAT: i64 = 451;
 
-/// Advice about files, which is all that they are: success, and nothing happens. They would bring a file
-/// that agents share into memory, or drop it.
-const UNHEEDED: &[i64] = &[libc::SYS_fadvise64, libc::SYS_readahead];
+/// Advice about files: succeeds without effect. The real calls would load a shared file into memory, or drop it.
+const IGNORED: &[i64] = &[libc::SYS_fadvise64, libc::SYS_readahead];
 /// The same for a mapping.
-const UNHEEDED_ADVICE: [libc::c_int; 3] =
+const IGNORED_ADVICE: [libc::c_int; 3] =
     [libc::MADV_WILLNEED, libc::MADV_COLD, libc::MADV_PAGEOUT];
 
-/// Requests of `fcntl` that are answered as if the kernel did not know them (`EINVAL`). Locks for an agent's
-/// own files stay, but nobody is told of another's: not of those by `flock`'s heirs, which `/proc/locks`
-/// shows to all, nor by asking for one: `F_GETLK` succeeds and leaves the question as it was, so that whoever asks
-/// finds the lock taken, whether it is or not. SQLite asks so where several processes write, and gives up if that
-/// fails.
+/// Requests of `fcntl` that are answered as if the kernel did not know them (`EINVAL`).
+///
+/// Ordinary locks on an agent's own files work, but no agent can see another's locks. Open file description
+/// locks are refused, since `/proc/locks` shows them to all. `F_GETLK` succeeds and leaves its argument
+/// unchanged, so every lock seems to be taken. It must not fail: SQLite queries locks this way when several
+/// processes write, and stops on an error.
 const UNKNOWN_REQUESTS: [libc::c_int; 10] = [
     libc::F_OFD_GETLK,
     libc::F_OFD_SETLK,
@@ -138,16 +138,16 @@ const UNKNOWN_REQUESTS: [libc::c_int; 10] = [
     libc::F_SETLEASE,
     libc::F_GETLEASE,
     libc::F_NOTIFY,
-    // hints about a file's future are kept with the file, and can be read
+    // write hints are stored with the file, and every agent can read them
     RW_HINTS[0],
     RW_HINTS[1],
     RW_HINTS[2],
     RW_HINTS[3],
 ];
-/// `F_GET_RW_HINT`, `F_SET_RW_HINT` and the same for an open file.
+/// `F_GET_RW_HINT`, `F_SET_RW_HINT`, and both for an open file description.
 const RW_HINTS: [libc::c_int; 4] = [1035, 1036, 1037, 1038];
 
-/// `clone` with one of these is `unshare` by another name.
+/// `clone` with one of these flags has the effect of `unshare`.
 const NAMESPACE_FLAGS: [libc::c_int; 7] = [
     libc::CLONE_NEWNS,
     libc::CLONE_NEWCGROUP,
@@ -158,61 +158,62 @@ const NAMESPACE_FLAGS: [libc::c_int; 7] = [
     libc::CLONE_NEWNET,
 ];
 
-/// The newest call that was looked at: `mseal` (Linux 6.10). Numbers are the same on all architectures
-/// since 424. Newer ones do not exist for agents until somebody has read what they do.
+/// The newest reviewed call: `mseal` (Linux 6.10). Since 424, numbers are the same on all architectures. Newer
+/// calls do not exist for agents until a developer has reviewed them.
 const NEWEST_KNOWN: u32 = 462;
 
-/// The programs, in the order of installation.
+/// The filter programs in the order of installation.
 #[derive(Debug, Clone)]
 pub(crate) struct Filters(Vec<BpfProgram>);
 
 type Rules = BTreeMap<i64, Vec<SeccompRule>>;
 
 impl Filters {
-    /// `keep_affinity`: also refuse to change CPU affinity, for hosts where no cpuset holds the agent.
+    /// `keep_affinity`: also refuses to change the CPU affinity, for hosts where no cpuset confines the agent.
     pub(crate) fn build(keep_affinity: bool) -> Result<Self, SandboxError> {
-        let mut rules = whatever_arguments(&[REFUSED, REFUSED_HERE]);
+        let mut rules = any_arguments(&[REFUSED, REFUSED_HERE]);
         if keep_affinity {
             rules.insert(libc::SYS_sched_setaffinity, Vec::new());
         }
         rules.insert(libc::SYS_clone, namespace_rules()?);
-        // Sockets of one's own only: no family but AF_UNIX, which reaches nothing outside the sandbox
-        // (no path of the host is mounted, abstract names belong to the network namespace).
+        // Only AF_UNIX sockets: they reach nothing outside the sandbox, because no socket path of the host is
+        // mounted, and abstract names belong to the network namespace.
         let not_unix = vec![rule([argument(0, SeccompCmpOp::Ne, libc::AF_UNIX)])?];
         rules.insert(libc::SYS_socket, not_unix.clone());
         rules.insert(libc::SYS_socketpair, not_unix);
         // Pushing input into a terminal.
         let terminal = [libc::TIOCSTI, libc::TIOCLINUX].map(|request| request as libc::c_int);
         rules.insert(libc::SYS_ioctl, one_of(1, &terminal)?);
-        // Pages of pipes are counted by user, which an ordinary user's agents share.
+        // The kernel counts pages of pipes per user, and agents of an unprivileged service share one user.
         rules.insert(libc::SYS_fcntl, one_of(1, &[libc::F_SETPIPE_SZ])?);
 
-        let mut unheeded = whatever_arguments(&[UNHEEDED]);
-        unheeded.insert(libc::SYS_madvise, one_of(2, &UNHEEDED_ADVICE)?);
-        unheeded.insert(libc::SYS_fcntl, one_of(1, &[libc::F_GETLK])?);
-        // How much of its log may lie unread is not an agent's to say. Libraries ask for room, and do not look.
-        let room = [libc::SO_SNDBUF, libc::SO_SNDBUFFORCE].map(|option| {
+        let mut ignored = any_arguments(&[IGNORED]);
+        ignored.insert(libc::SYS_madvise, one_of(2, &IGNORED_ADVICE)?);
+        ignored.insert(libc::SYS_fcntl, one_of(1, &[libc::F_GETLK])?);
+        // An agent must not choose how much of its log can be unread. The call succeeds without effect: libraries
+        // set a buffer size and do not check it.
+        let buffer_size = [libc::SO_SNDBUF, libc::SO_SNDBUFFORCE].map(|option| {
             rule([
                 argument(1, SeccompCmpOp::Eq, libc::SOL_SOCKET),
                 argument(2, SeccompCmpOp::Eq, option),
             ])
         });
-        let room = room.into_iter().collect::<Result<Vec<_>, _>>()?;
-        unheeded.insert(libc::SYS_setsockopt, room);
+        let buffer_size = buffer_size.into_iter().collect::<Result<Vec<_>, _>>()?;
+        ignored.insert(libc::SYS_setsockopt, buffer_size);
         let mut unknown_requests = Rules::new();
         unknown_requests.insert(libc::SYS_fcntl, one_of(1, &UNKNOWN_REQUESTS)?);
-        // Collapsing pages of a file changes what others find of it.
+        // Collapsing pages of a file changes its state in memory for other agents.
         unknown_requests.insert(libc::SYS_madvise, one_of(2, &[libc::MADV_COLLAPSE])?);
-        // With a flag: only if it is in memory, or so that it does not stay there.
+        // Its flags can read only what is in memory, or keep a read out of memory.
         let flagged = vec![rule([argument(5, SeccompCmpOp::Ne, 0)])?];
-        let no_such_reading = Rules::from([(libc::SYS_preadv2, flagged)]);
+        let read_flags = Rules::from([(libc::SYS_preadv2, flagged)]);
         Ok(Self(vec![
             unknown_calls(),
-            program(whatever_arguments(&[ABSENT, ABSENT_HERE]), libc::ENOSYS)?,
-            program(unheeded, 0)?,
+            program(any_arguments(&[ABSENT, ABSENT_HERE]), libc::ENOSYS)?,
+            program(ignored, 0)?,
             program(unknown_requests, libc::EINVAL)?,
-            program(no_such_reading, libc::EOPNOTSUPP)?,
-            // The one that refuses `seccomp` itself comes last.
+            program(read_flags, libc::EOPNOTSUPP)?,
+            // Last, because it refuses `seccomp` itself.
             program(rules, libc::EPERM)?,
         ]))
     }
@@ -223,12 +224,13 @@ impl Filters {
     }
 }
 
-fn whatever_arguments(lists: &[&[i64]]) -> Rules {
+/// Rules that match these calls with any arguments.
+fn any_arguments(lists: &[&[i64]]) -> Rules {
     let calls = lists.iter().copied().flatten();
     calls.map(|&call| (call, Vec::new())).collect()
 }
 
-/// The rules of calls that are answered with `errno`; 0 is success.
+/// Compiles a filter that answers the calls of `rules` with `errno`; 0 is success.
 fn program(rules: Rules, errno: libc::c_int) -> Result<BpfProgram, SandboxError> {
     let arch = TargetArch::try_from(std::env::consts::ARCH).map_err(|error| unavailable(&error))?;
     let answer = SeccompAction::Errno(errno.cast_unsigned());
@@ -237,7 +239,7 @@ fn program(rules: Rules, errno: libc::c_int) -> Result<BpfProgram, SandboxError>
         .map_err(|error| unavailable(&error))
 }
 
-/// A comparison of the lower half of an argument.
+/// A condition on the lower half of an argument.
 fn argument(
     index: u8,
     compare: SeccompCmpOp,
@@ -247,7 +249,7 @@ fn argument(
     SeccompCondition::new(index, SeccompCmpArgLen::Dword, compare, value)
 }
 
-/// Rules for the argument being any of these.
+/// Rules that match if the argument is one of `values`.
 fn one_of(index: u8, values: &[libc::c_int]) -> Result<Vec<SeccompRule>, SandboxError> {
     let rules = values
         .iter()
@@ -273,18 +275,20 @@ fn rule<const N: usize>(
         .map_err(|error| unavailable(&error))
 }
 
-/// `ENOSYS` for `clone3` and for every number above [`NEWEST_KNOWN`], the x32 ones (bit 30) included. And
-/// success, without doing it, for `prctl(PR_SET_PDEATHSIG)`: the agent is its sandbox's first process and
-/// could otherwise untie itself from the service, but libraries use the call for their own children, which
-/// here end with the agent in any case.
-/// The other filter refuses foreign architectures, so this one need not look.
+/// Answers `ENOSYS` to `clone3` and to every number above [`NEWEST_KNOWN`], including the x32 calls (bit 30).
+///
+/// `prctl(PR_SET_PDEATHSIG)` succeeds without effect. The agent is its sandbox's first process and could
+/// otherwise outlive the service. The call must not fail, because libraries use it for their own children,
+/// which end with the agent in any case.
+///
+/// The other filters refuse foreign architectures, so this one does not check the architecture.
 fn unknown_calls() -> BpfProgram {
     const LOAD: u16 = (libc::BPF_LD | libc::BPF_W | libc::BPF_ABS) as u16;
     const JUMP_EQUAL: u16 = (libc::BPF_JMP | libc::BPF_JEQ | libc::BPF_K) as u16;
     const JUMP_GREATER: u16 = (libc::BPF_JMP | libc::BPF_JGT | libc::BPF_K) as u16;
     const RETURN: u16 = (libc::BPF_RET | libc::BPF_K) as u16;
     /// Offsets in `seccomp_data`: the call's number, and the lower half of its first argument (the
-    /// filter compiler is for little-endian machines only).
+    /// filter compiler supports little-endian machines only).
     const NUMBER: u32 = 0;
     const FIRST_ARGUMENT: u32 = 16;
     let step = |code, k| sock_filter {
@@ -307,7 +311,7 @@ fn unknown_calls() -> BpfProgram {
     ]
 }
 
-/// The program as the kernel and bubblewrap read it: an array of `struct sock_filter`.
+/// The program in the format of the kernel and of bubblewrap: an array of `struct sock_filter`.
 pub(crate) fn to_bytes(program: &BpfProgram) -> Vec<u8> {
     let mut bytes = Vec::with_capacity(program.len() * 8);
     for instruction in program {
@@ -321,6 +325,6 @@ pub(crate) fn to_bytes(program: &BpfProgram) -> Vec<u8> {
 fn unavailable(error: &dyn std::error::Error) -> SandboxError {
     SandboxError::Unavailable {
         layer: Layer::Seccomp,
-        why: format!("no filter for this architecture: {error}"),
+        reason: format!("no filter for this architecture: {error}"),
     }
 }

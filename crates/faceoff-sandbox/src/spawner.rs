@@ -1,7 +1,7 @@
-//! One thread starts all children.
+//! A single thread that forks all children.
 //!
-//! "Die with the parent" is, to the kernel, "die with the thread that forked you". Callers come and go
-//! (a pool's thread may end while its agent plays on), so the fork happens on a thread that lives as
+//! The kernel ties the parent-death signal to the thread that forked, not to the process. A caller's thread
+//! may end while its agent still runs (in a thread pool, say). So the fork happens on a thread that lives as
 //! long as the process.
 
 use crate::affinity;
@@ -11,26 +11,26 @@ use std::{
     sync::{Mutex, OnceLock, mpsc},
 };
 
-type Job = (Command, mpsc::SyncSender<io::Result<Child>>);
-static SPAWNER: OnceLock<Mutex<mpsc::Sender<Job>>> = OnceLock::new();
+type SpawnRequest = (Command, mpsc::SyncSender<io::Result<Child>>);
+static SPAWNER: OnceLock<Mutex<mpsc::Sender<SpawnRequest>>> = OnceLock::new();
 
-/// Starts `command` as a child of the long-lived thread. The command, and with it every descriptor that
-/// its set-up closure owns, is dropped before this returns.
+/// Starts `command` as a child of the long-lived thread. The command, and every descriptor that its set-up
+/// closure owns, is dropped before this returns.
 pub(crate) fn spawn(command: Command) -> io::Result<Child> {
     let sender = spawner()?;
-    let (answer, result) = mpsc::sync_channel(1);
-    let gone = || io::Error::other("the thread that starts agents has ended");
-    sender.send((command, answer)).map_err(|_| gone())?;
-    result.recv().map_err(|_| gone())?
+    let (reply, result) = mpsc::sync_channel(1);
+    let thread_ended = || io::Error::other("the thread that starts agents has ended");
+    sender.send((command, reply)).map_err(|_| thread_ended())?;
+    result.recv().map_err(|_| thread_ended())?
 }
 
-fn spawner() -> io::Result<mpsc::Sender<Job>> {
+fn spawner() -> io::Result<mpsc::Sender<SpawnRequest>> {
     if SPAWNER.get().is_none() {
-        let (sender, jobs) = mpsc::channel::<Job>();
+        let (sender, requests) = mpsc::channel::<SpawnRequest>();
         std::thread::Builder::new()
             .name("agent-spawner".into())
-            .spawn(move || run(&jobs))?;
-        // A race costs a thread that ends at once, its channel being closed.
+            .spawn(move || run(&requests))?;
+        // A race costs one thread, which ends at once because its channel is closed.
         let _ = SPAWNER.set(Mutex::new(sender));
     }
     let lock = SPAWNER
@@ -42,15 +42,15 @@ fn spawner() -> io::Result<mpsc::Sender<Job>> {
         .clone())
 }
 
-fn run(jobs: &mpsc::Receiver<Job>) {
-    // This thread may descend from a worker slot that is pinned to its own CPUs; children must not
-    // inherit that. The main thread's set is the service's.
-    affinity::as_the_process();
-    for (mut command, answer) in jobs {
+fn run(requests: &mpsc::Receiver<SpawnRequest>) {
+    // A worker slot pinned to its own CPUs may have started this thread; children must not inherit that
+    // affinity. The main thread has the affinity of the service.
+    affinity::reset_to_process();
+    for (mut command, reply) in requests {
         let child = command.spawn();
         drop(command);
-        // The caller waits for this; if it is gone, the child must not linger.
-        if let Err(mpsc::SendError(Ok(mut orphan))) = answer.send(child) {
+        // The caller waits for this answer; if it is gone, the child must be killed.
+        if let Err(mpsc::SendError(Ok(mut orphan))) = reply.send(child) {
             let _ = orphan.kill();
             let _ = orphan.wait();
         }

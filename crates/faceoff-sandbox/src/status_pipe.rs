@@ -1,4 +1,4 @@
-//! What bubblewrap tells about its child: its pid when it exists, its exit code when it has ended.
+//! bubblewrap's status reports: the pid of its child at the start, the child's exit code at the end.
 
 use crate::{SandboxError, error::IoContext, line_socket::wait_for};
 use rustix::{
@@ -13,7 +13,7 @@ use std::{
     time::Instant,
 };
 
-/// bubblewrap writes two short documents; more than this is not bubblewrap.
+/// Limit for the two short documents that bubblewrap writes.
 const MAX_BYTES: usize = 16 << 10;
 
 /// The reading end of bubblewrap's `--json-status-fd`.
@@ -25,7 +25,7 @@ pub(crate) struct StatusPipe {
 }
 
 impl StatusPipe {
-    /// The pipe and the end that bubblewrap is to inherit.
+    /// The pipe, and its writing end for bubblewrap to inherit.
     pub(crate) fn new() -> io::Result<(Self, OwnedFd)> {
         let (pipe, writer) = pipe_with(PipeFlags::CLOEXEC)?;
         ioctl_fionbio(&pipe, true)?;
@@ -44,7 +44,7 @@ impl StatusPipe {
         &mut self,
         deadline: Instant,
     ) -> Result<Option<Pid>, SandboxError> {
-        const WHAT: &str = "cannot read bubblewrap's status";
+        const ACTION: &str = "cannot read bubblewrap's status";
         loop {
             if let Some(pid) = self.number("child-pid") {
                 return Ok(Pid::from_raw(pid));
@@ -52,25 +52,25 @@ impl StatusPipe {
             if self.closed {
                 return Ok(None);
             }
-            let ready = wait_for(self.pipe.as_fd(), PollFlags::IN, deadline).context(WHAT)?;
+            let ready = wait_for(self.pipe.as_fd(), PollFlags::IN, deadline).context(ACTION)?;
             if !ready {
                 return Err(SandboxError::other(
-                    WHAT,
+                    ACTION,
                     "it did not set up the sandbox in time",
                 ));
             }
-            self.fill().context(WHAT)?;
+            self.fill().context(ACTION)?;
         }
     }
 
-    /// The agent's exit code, if it was started and has ended: 128 + signal when a signal ended it.
-    /// Ask after bubblewrap has ended.
+    /// The agent's exit code, if it was started and has ended; 128 + signal after a signal. Valid only after
+    /// bubblewrap has ended.
     pub(crate) fn exit_code(&mut self) -> Option<i32> {
         while !self.closed && matches!(self.fill(), Ok(true)) {}
         self.number("exit-code")
     }
 
-    /// Reads once; false when there is nothing (more).
+    /// Reads once; `false` if no (more) bytes are available.
     fn fill(&mut self) -> io::Result<bool> {
         let mut chunk = [0; 1024];
         match read(&self.pipe, &mut chunk) {
@@ -88,8 +88,8 @@ impl StatusPipe {
         }
     }
 
-    /// The integer after `"key":` in a complete document. The documents are flat, and bubblewrap alone
-    /// writes them.
+    /// The integer after `"key":` in a complete document. The documents are flat, and only bubblewrap writes
+    /// them.
     fn number(&self, key: &str) -> Option<i32> {
         let text = std::str::from_utf8(&self.text).ok()?;
         let after = text.split_once(&format!("\"{key}\":"))?.1.trim_start();

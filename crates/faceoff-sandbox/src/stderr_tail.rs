@@ -1,4 +1,4 @@
-//! Standard error: drained by a thread, the end of it kept.
+//! Standard error of an agent: a thread reads it and keeps its end.
 
 use crate::sched_stat::SchedStat;
 use rustix::{
@@ -19,62 +19,62 @@ use std::{
 };
 
 const CHUNK_BYTES: usize = 64 << 10;
-/// The pause after each read: a flood, be it of a byte at a time, wakes the service a thousand times a second at
-/// most, and blocks nobody but the flooder. A log has room for as long.
+/// Minimum pause after a read. A flood, even one byte at a time, wakes the service at most a thousand times a
+/// second, and only the flooding agent blocks. The socket's buffer bridges the pause.
 const PAUSE: Duration = Duration::from_millis(1);
-/// … or, if that is longer, so many times the CPU time that the read took: whoever polls the other end from a
-/// hundred thousand places makes each byte dear.
+/// The pause is at least this multiple of the CPU time of the read. An agent that polls the other end through a
+/// hundred thousand descriptors makes each read expensive.
 const PAUSE_PER_CPU_TIME: u32 = 20;
-/// A read that takes more CPU time is the last one of this log.
-const DEAREST_READ: Duration = Duration::from_millis(20);
+/// CPU time of one read above which the log is not read any further.
+const MAX_READ_CPU_TIME: Duration = Duration::from_millis(20);
 
-/// The thread that reads standard error, and what it keeps.
+/// The thread that reads standard error, and the bytes it has kept.
 #[derive(Debug)]
 pub(crate) struct StderrTail {
     tail: Arc<Mutex<VecDeque<u8>>>,
-    /// What the kernel tells of the thread.
+    /// The kernel's scheduling counters of the thread.
     schedule: Option<File>,
     thread: Option<JoinHandle<()>>,
-    /// Dropped to end the thread although the agent's end is still open somewhere.
+    /// Dropped to stop the thread even if a process still has the agent's end open.
     stop: Option<OwnedFd>,
 }
 
 impl StderrTail {
-    /// Starts draining `log`, a socket, keeping its last `keep_bytes`.
+    /// Starts a thread that reads the socket `log` and keeps its last `keep_bytes`.
     pub(crate) fn drain(log: OwnedFd, keep_bytes: u64) -> io::Result<Self> {
-        let (stop_seen, stop) = pipe_with(PipeFlags::CLOEXEC)?;
+        let (stopped, stop) = pipe_with(PipeFlags::CLOEXEC)?;
         let keep = usize::try_from(keep_bytes).unwrap_or(usize::MAX);
         let tail = Arc::new(Mutex::new(VecDeque::new()));
         let shared = Arc::clone(&tail);
-        let (tell, told) = mpsc::channel();
+        let (sender, receiver) = mpsc::channel();
         let thread = std::thread::Builder::new()
             .name("agent-stderr".into())
             .spawn(move || {
-                let _ = tell.send(File::open("/proc/thread-self/schedstat").ok());
-                drop(tell);
-                drain_until_closed(&log, &stop_seen, keep, &shared);
+                let _ = sender.send(File::open("/proc/thread-self/schedstat").ok());
+                drop(sender);
+                drain_until_closed(&log, &stopped, keep, &shared);
             })?;
         Ok(Self {
             tail,
-            schedule: told.recv().ok().flatten(),
+            schedule: receiver.recv().ok().flatten(),
             thread: Some(thread),
             stop: Some(stop),
         })
     }
 
-    /// What is kept so far, lossy UTF-8.
+    /// The kept end of the log, lossy UTF-8.
     pub(crate) fn text(&self) -> String {
         let mut tail = lock(&self.tail);
         String::from_utf8_lossy(tail.make_contiguous()).into_owned()
     }
 
-    /// For how long the thread has run: on the evaluator's CPU, and because of what the agent writes.
-    pub(crate) fn ran(&self) -> Duration {
+    /// Run time of the reading thread. It runs on the evaluator's CPUs, as long as the agent writes.
+    pub(crate) fn reader_run_time(&self) -> Duration {
         let file = self.schedule.as_ref();
         file.and_then(SchedStat::read).unwrap_or_default().ran
     }
 
-    /// Takes what is still there and ends the thread. Call when the tree is dead.
+    /// Reads the remaining bytes and ends the thread. Call it when the process tree is dead.
     pub(crate) fn close(&mut self) {
         drop(self.stop.take());
         if let Some(thread) = self.thread.take() {
@@ -101,7 +101,7 @@ fn drain_until_closed(log: &OwnedFd, stop: &OwnedFd, keep: usize, tail: &Mutex<V
         let excess = tail.len().saturating_sub(keep);
         tail.drain(..excess);
     };
-    // More than a socket holds when the writers are dead; a survivor's flood is not followed further.
+    // More than a socket can hold after its writers have died. A surviving writer's flood is cut off here.
     let mut left_after_stop = 1 << 20;
     loop {
         let mut fds = [
@@ -113,27 +113,30 @@ fn drain_until_closed(log: &OwnedFd, stop: &OwnedFd, keep: usize, tail: &Mutex<V
             Err(_) => return,
         }
         let stopped = !fds[1].revents().is_empty();
-        // What is there now: a read goes on as long as the agent adds to it.
-        let there = ioctl_fionread(log).unwrap_or(0);
-        let most = usize::try_from(there)
+        // Only the bytes available now: a read without a limit continues as long as the agent writes.
+        let available = ioctl_fionread(log).unwrap_or(0);
+        let limit = usize::try_from(available)
             .unwrap_or(CHUNK_BYTES)
             .clamp(1, CHUNK_BYTES);
         let before = own_cpu_time();
-        match recv(log, &mut chunk[..most], RecvFlags::DONTWAIT) {
+        match recv(log, &mut chunk[..limit], RecvFlags::DONTWAIT) {
             Ok((0, _)) => return,
             Ok((count, _)) => {
                 keep_end(&chunk[..count]);
-                let took = own_cpu_time().saturating_sub(before);
+                let cpu_time = own_cpu_time().saturating_sub(before);
                 if stopped {
                     left_after_stop -= count.min(left_after_stop);
                     if left_after_stop == 0 {
                         return;
                     }
-                } else if took > DEAREST_READ {
-                    keep_end(b"\n[faceoff] this log is not read any further: to read it takes the evaluator too long\n");
+                } else if cpu_time > MAX_READ_CPU_TIME {
+                    keep_end(
+                        b"\n[faceoff] the rest of this log is not read: reading it takes the evaluator too much CPU \
+                          time\n",
+                    );
                     return;
                 } else {
-                    std::thread::sleep(PAUSE.max(took * PAUSE_PER_CPU_TIME));
+                    std::thread::sleep(PAUSE.max(cpu_time * PAUSE_PER_CPU_TIME));
                 }
             }
             Err(Errno::AGAIN) if stopped => return,

@@ -1,4 +1,4 @@
-//! What a killed service left behind.
+//! Removes the remains of a killed service.
 
 use crate::{
     cgroup,
@@ -7,12 +7,13 @@ use crate::{
 };
 use std::{fs, path::Path};
 
-/// Scratch folders, where no sandbox has one of its own, begin with this.
+/// Prefix of the scratch folders that agents without a mount namespace get on the host.
 pub(crate) const SCRATCH_PREFIX: &str = "faceoff-scratch-";
 
-/// Removes the cgroups, scratch folders and images in memory, and ends the processes, of agents whose service is dead.
-/// Those of living services, this one's included, are left alone. Returns how many were removed. Done by
-/// itself before a service's first agent; call it at start-up to have the memory back earlier.
+/// Removes the cgroups, scratch folders and memory images of agents whose service is dead, and kills their processes.
+/// Living services, including this one, keep theirs. Returns the number of removed items.
+///
+/// A service's first spawn calls it automatically; a call at start-up frees the memory earlier.
 pub fn sweep_stale() -> usize {
     cgroup::sweep()
         + sweep_folder(&std::env::temp_dir(), SCRATCH_PREFIX)
@@ -23,9 +24,9 @@ fn sweep_folder(folder: &Path, prefix: &str) -> usize {
     let mut removed = 0;
     for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
         let name = entry.file_name();
-        let owner = name.to_str().and_then(|name| Owner::of_name(name, prefix));
+        let owner = name.to_str().and_then(|name| Owner::parse(name, prefix));
         if owner.is_some_and(Owner::is_dead) && fs::remove_dir_all(entry.path()).is_ok() {
-            tracing::info!(folder = %entry.path().display(), "removed what a dead service has left");
+            tracing::info!(folder = %entry.path().display(), "removed a folder of a dead service");
             removed += 1;
         }
     }

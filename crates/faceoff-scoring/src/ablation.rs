@@ -7,13 +7,13 @@ use faceoff_types::{Profile, Task};
 use serde::{Deserialize, Serialize};
 use std::{borrow::Borrow, collections::BTreeMap};
 
-/// How an agent did in one task under one profile, beside the ideal one on the same episodes.
+/// Results of an agent in one task under one profile, compared with the ideal profile on the same episodes.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct ProfileEffect {
-    /// The perturbations.
+    /// Selects the perturbations.
     pub profile: Profile,
-    /// Episodes played.
+    /// Episodes simulated under each of the two profiles.
     pub episodes: u32,
     /// Episodes that ended in success.
     pub successes: u32,
@@ -24,7 +24,7 @@ pub struct ProfileEffect {
     pub success_ci95: [f64; 2],
     /// Penalty points over all episodes.
     pub penalty_points: f64,
-    /// The success rate less the ideal profile's, as a fraction.
+    /// The success rate minus that of the ideal profile, as a fraction.
     pub difference: f64,
     /// Episodes that succeed in the ideal profile only.
     pub lost: u32,
@@ -34,13 +34,13 @@ pub struct ProfileEffect {
     pub p_value: f64,
 }
 
-/// Compares each profile with the ideal one, task by task, on paired episodes: the table behind the
-/// paper's ablation figure. Profiles come in their own order; tasks without an ideal run are left out.
+/// Compares each profile with the ideal one, task by task, on paired episodes: the table of the paper's ablation
+/// figure. Profiles are in the order of [`Profile`]; tasks without an ideal run are left out.
 ///
-/// The caller sees to it that all runs come from one seed.
+/// The caller ensures that all runs have the same seed.
 ///
 /// # Errors
-/// If a profile did not play as many episodes as the ideal one.
+/// If a profile has more or fewer episodes than the ideal one.
 pub fn ablation(
     runs: &BTreeMap<Profile, impl Borrow<EpisodeSummary>>,
 ) -> Result<BTreeMap<Task, Vec<ProfileEffect>>, PairingError> {
@@ -49,17 +49,17 @@ pub fn ablation(
     };
     let effects_of = |(task, ideal): (&Task, &TaskSummary)| {
         let effects = runs.iter().map(|(profile, run)| {
-            let played = run.borrow().tasks.get(task);
-            let played = played.ok_or(PairingError::Unpaired(*task, 0))?;
-            let tally = PairedTally::of(*task, &ideal.successes, &played.successes)?;
-            Ok(effect(*profile, &tally, played.penalty_points))
+            let summary = run.borrow().tasks.get(task);
+            let summary = summary.ok_or(PairingError::Unpaired(*task, 0))?;
+            let tally = PairedTally::from_successes(*task, &ideal.successes, &summary.successes)?;
+            Ok(effect(*profile, &tally, summary.penalty_points))
         });
         Ok((*task, effects.collect::<Result<_, _>>()?))
     };
     ideal.borrow().tasks.iter().map(effects_of).collect()
 }
 
-/// Of a profile, which is `tally`'s second; the ideal one is its first.
+/// The ideal profile is A of `tally`, `profile` is B.
 fn effect(profile: Profile, tally: &PairedTally, penalty_points: f64) -> ProfileEffect {
     let (episodes, successes) = (tally.episodes(), tally.both + tally.only_b);
     let rate = |successes: u32| f64::from(successes) / f64::from(episodes);
@@ -82,8 +82,8 @@ mod tests {
     use super::*;
     use faceoff_types::{ComputationTime, EpisodeEnd, EpisodeOutcome, Violations};
 
-    fn played(outcomes: &[EpisodeOutcome]) -> EpisodeSummary {
-        EpisodeSummary::of(outcomes, &Default::default()).unwrap()
+    fn summary(outcomes: &[EpisodeOutcome]) -> EpisodeSummary {
+        EpisodeSummary::from_outcomes(outcomes, &Default::default()).unwrap()
     }
 
     fn run(task: Task, successes: &[bool]) -> Vec<EpisodeOutcome> {
@@ -106,7 +106,7 @@ mod tests {
     }
 
     #[test]
-    fn a_factor_is_compared_with_the_ideal_on_the_same_episodes() {
+    fn profile_is_compared_with_ideal_on_same_episodes() {
         let mut ideal = run(Task::Hit, &[true; 8]);
         ideal.extend(run(Task::Prepare, &[true, false]));
         let mut lost = run(
@@ -115,8 +115,8 @@ mod tests {
         );
         lost.extend(run(Task::Prepare, &[false, true]));
         let runs = BTreeMap::from([
-            (Profile::TrackingLoss, played(&lost)),
-            (Profile::Ideal, played(&ideal)),
+            (Profile::TrackingLoss, summary(&lost)),
+            (Profile::Ideal, summary(&ideal)),
         ]);
         let tasks = ablation(&runs).unwrap();
         assert_eq!(
@@ -144,14 +144,14 @@ mod tests {
     }
 
     #[test]
-    fn runs_of_different_episodes_are_refused() {
+    fn runs_with_different_episodes_are_refused() {
         let runs = BTreeMap::from([
-            (Profile::Ideal, played(&run(Task::Hit, &[true, true]))),
-            (Profile::Evaluation, played(&run(Task::Hit, &[true]))),
+            (Profile::Ideal, summary(&run(Task::Hit, &[true, true]))),
+            (Profile::Evaluation, summary(&run(Task::Hit, &[true]))),
         ]);
         let unpaired = |task, episode| Err(PairingError::Unpaired(task, episode));
         assert_eq!(ablation(&runs), unpaired(Task::Hit, 1));
-        let other_task = played(&run(Task::Defend, &[true, true]));
+        let other_task = summary(&run(Task::Defend, &[true, true]));
         let runs = BTreeMap::from([
             (Profile::Ideal, runs[&Profile::Ideal].clone()),
             (Profile::Evaluation, other_task),

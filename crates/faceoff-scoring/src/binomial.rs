@@ -1,42 +1,42 @@
-//! The number of heads among fair coin tosses, which is all that the paired tests need.
+//! The binomial distribution with probability ½, as the paired tests need it.
 
-/// The distribution of the number of heads in `n` fair tosses.
+/// The distribution of the number of heads K in `n` fair coin tosses.
 #[derive(Debug)]
-pub(crate) struct FairTosses {
-    /// `at[k]` = P(K = k), k from 0 to n.
-    at: Vec<f64>,
-    /// `at_least[k]` = P(K ≥ k), k from 0 to n + 1.
-    at_least: Vec<f64>,
+pub(crate) struct SymmetricBinomial {
+    /// `pmf[k]` = P(K = k), k from 0 to n.
+    pmf: Vec<f64>,
+    /// `tail[k]` = P(K ≥ k), k from 0 to n + 1.
+    tail: Vec<f64>,
 }
 
-impl FairTosses {
+impl SymmetricBinomial {
     pub(crate) fn new(n: u32) -> Self {
         let n = n as usize;
-        // Outwards from the middle, where nothing underflows that matters: C(n, k) relative to the
-        // middle one. (Probabilities below 1e-308 of the middle's become 0.)
-        let mut at = vec![0.0; n + 1];
+        // C(n, k) relative to the middle one, from the middle outwards. Values below 1e-308 of the middle one
+        // underflow to 0, which does not matter.
+        let mut pmf = vec![0.0; n + 1];
         let middle = n / 2;
-        at[middle] = 1.0;
+        pmf[middle] = 1.0;
         for k in (0..middle).rev() {
-            at[k] = at[k + 1] * (k + 1) as f64 / (n - k) as f64;
+            pmf[k] = pmf[k + 1] * (k + 1) as f64 / (n - k) as f64;
         }
         for k in middle + 1..=n {
-            at[k] = at[n - k];
+            pmf[k] = pmf[n - k];
         }
-        let total: f64 = at.iter().sum();
-        for probability in &mut at {
+        let total: f64 = pmf.iter().sum();
+        for probability in &mut pmf {
             *probability /= total;
         }
-        let mut at_least = vec![0.0; n + 2];
+        let mut tail = vec![0.0; n + 2];
         for k in (0..=n).rev() {
-            at_least[k] = at_least[k + 1] + at[k];
+            tail[k] = tail[k + 1] + pmf[k];
         }
-        Self { at, at_least }
+        Self { pmf, tail }
     }
 
     /// P(K = k) for k = 0, 1, … n.
     pub(crate) fn probabilities(&self) -> impl Iterator<Item = f64> + '_ {
-        self.at.iter().copied()
+        self.pmf.iter().copied()
     }
 
     /// P(K ≥ k); 1 for a negative k, 0 beyond n.
@@ -44,7 +44,7 @@ impl FairTosses {
         match usize::try_from(k) {
             Err(_) if k < 0 => 1.0,
             Err(_) => 0.0,
-            Ok(k) => self.at_least.get(k).copied().unwrap_or(0.0),
+            Ok(k) => self.tail.get(k).copied().unwrap_or(0.0),
         }
     }
 }
@@ -57,7 +57,7 @@ mod tests {
     #[test]
     fn tails_agree_with_exact_integers() {
         for n in 0..=60u32 {
-            let tosses = FairTosses::new(n);
+            let tosses = SymmetricBinomial::new(n);
             let mut choose: u128 = 1; // C(n, n)
             let mut tail: u128 = 0;
             for k in (0..=n).rev() {
@@ -74,9 +74,9 @@ mod tests {
     }
 
     #[test]
-    fn tails_agree_with_another_implementation() {
+    fn tails_agree_with_statrs() {
         for n in [100u32, 999, 2000] {
-            let tosses = FairTosses::new(n);
+            let tosses = SymmetricBinomial::new(n);
             let other = Binomial::new(0.5, u64::from(n)).unwrap();
             for k in (1..=n).step_by(7) {
                 let (got, want) = (tosses.at_least(i128::from(k)), other.sf(u64::from(k) - 1));
@@ -89,11 +89,11 @@ mod tests {
     }
 
     #[test]
-    fn beyond_the_ends_all_or_nothing() {
-        let tosses = FairTosses::new(3);
+    fn tails_beyond_range_are_one_or_zero() {
+        let tosses = SymmetricBinomial::new(3);
         assert_eq!(tosses.at_least(-1), 1.0);
         assert_eq!(tosses.at_least(4), 0.0);
         assert_eq!(tosses.at_least(i128::MAX), 0.0);
-        assert_eq!(FairTosses::new(0).at_least(0), 1.0);
+        assert_eq!(SymmetricBinomial::new(0).at_least(0), 1.0);
     }
 }

@@ -1,43 +1,42 @@
 use faceoff_types::{EvaluationResult, Task, Tier};
 use std::cmp::Ordering;
 
-/// One candidate row of a board.
+/// An evaluation that a board ranks.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BoardEntry<K> {
-    /// What the caller identifies the row by.
+    /// Identifies the row for the caller.
     pub key: K,
-    /// The evaluation's score.
+    /// The evaluation's scores.
     pub result: EvaluationResult,
-    /// When the agent was submitted, milliseconds since 1970: the earlier one wins a full tie.
+    /// Time of the submission in milliseconds since 1970: of rows that are equal otherwise, the earlier is first.
     pub submitted_at_ms: i64,
 }
 
-/// A row in its place.
+/// A row with its rank.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RankedEntry<K> {
-    /// From 1 over the whole board, through the tiers; no rank is given twice.
+    /// From 1 over the whole board, across tiers; ranks are unique.
     pub rank: u32,
-    /// The tier under which the row stands: overall, or of the task.
+    /// The tier that the row is listed under: the overall tier, or that of the task.
     pub tier: Tier,
-    /// The row.
+    /// The evaluation.
     pub entry: BoardEntry<K>,
 }
 
-/// What decides a row's place.
+/// The sort key of a board.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Placing {
+pub(crate) struct BoardKey {
     tier: Tier,
     score: f64,
     penalty_points: f64,
     submitted_at_ms: i64,
 }
 
-impl Placing {
-    /// A number that is not finite (none comes out of this crate's scoring) takes the last place of
-    /// its tier instead of an arbitrary one.
+impl BoardKey {
+    /// Rows with a number that is not finite are last in their tier. The scoring of this crate produces none.
     pub(crate) fn new(tier: Tier, score: f64, penalty_points: f64, submitted_at_ms: i64) -> Self {
-        // Adding 0 turns −0 into 0, which the total order of floats would tell apart.
-        let or = |number: f64, last: f64| {
+        // Adding 0 turns −0 into 0: `total_cmp` distinguishes them.
+        let finite_or = |number: f64, last: f64| {
             if number.is_finite() {
                 number + 0.0
             } else {
@@ -46,14 +45,14 @@ impl Placing {
         };
         Self {
             tier,
-            score: or(score, f64::NEG_INFINITY),
-            penalty_points: or(penalty_points, f64::INFINITY),
+            score: finite_or(score, f64::NEG_INFINITY),
+            penalty_points: finite_or(penalty_points, f64::INFINITY),
             submitted_at_ms,
         }
     }
 
     /// Better first: tier, then higher score, then lower penalty, then earlier submission.
-    pub(crate) fn board_order(&self, other: &Self) -> Ordering {
+    pub(crate) fn compare(&self, other: &Self) -> Ordering {
         self.tier
             .cmp(&other.tier)
             .then_with(|| other.score.total_cmp(&self.score))
@@ -63,7 +62,7 @@ impl Placing {
 }
 
 /// The overall board: tiers in order; inside a tier the higher score first, then the lower penalty,
-/// then the earlier submission, then the order in which the entries were given.
+/// then the earlier submission, then the order of `entries`.
 #[must_use]
 pub fn overall_board<K>(entries: Vec<BoardEntry<K>>) -> Vec<RankedEntry<K>> {
     ranked(entries, |result| {
@@ -71,8 +70,8 @@ pub fn overall_board<K>(entries: Vec<BoardEntry<K>>) -> Vec<RankedEntry<K>> {
     })
 }
 
-/// The board of one task: as [`overall_board`], by the task's success rate, penalty and tier. Entries
-/// that did not play the task are left out.
+/// The board of one task: as [`overall_board`], by the task's success rate, penalty and tier. Entries without the task
+/// are left out.
 #[must_use]
 pub fn task_board<K>(task: Task, entries: Vec<BoardEntry<K>>) -> Vec<RankedEntry<K>> {
     ranked(entries, |result| {
@@ -85,22 +84,22 @@ fn ranked<K>(
     entries: Vec<BoardEntry<K>>,
     by: impl Fn(&EvaluationResult) -> Option<(Tier, f64, f64)>,
 ) -> Vec<RankedEntry<K>> {
-    let mut placed: Vec<_> = entries
+    let mut keyed: Vec<_> = entries
         .into_iter()
         .filter_map(|entry| {
             let (tier, score, penalty_points) = by(&entry.result)?;
             Some((
-                Placing::new(tier, score, penalty_points, entry.submitted_at_ms),
+                BoardKey::new(tier, score, penalty_points, entry.submitted_at_ms),
                 entry,
             ))
         })
         .collect();
-    placed.sort_by(|(a, _), (b, _)| a.board_order(b));
+    keyed.sort_by(|(a, _), (b, _)| a.compare(b));
     (1..)
-        .zip(placed)
-        .map(|(rank, (placing, entry))| RankedEntry {
+        .zip(keyed)
+        .map(|(rank, (key, entry))| RankedEntry {
             rank,
-            tier: placing.tier,
+            tier: key.tier,
             entry,
         })
         .collect()

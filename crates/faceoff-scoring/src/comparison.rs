@@ -8,55 +8,55 @@ use faceoff_types::{Profile, Seed, Task, TaskWeights, Variation};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// An evaluation as comparisons need it: its episodes and what they were drawn from.
+/// An evaluation with what a comparison depends on: rules, seeds and the results of its episodes.
 #[derive(Debug, Clone, Copy)]
-pub struct Played<'a> {
-    /// The rules that it was scored by.
+pub struct ComparedEvaluation<'a> {
+    /// Name of the ruleset that it was scored by.
     pub ruleset: &'a str,
-    /// The perturbations.
+    /// Selects the perturbations.
     pub profile: Profile,
-    /// What it was played and scored by otherwise than the ruleset has it.
+    /// Deviations from the ruleset in perturbations and scoring.
     pub variation: &'a Variation,
-    /// The evaluation's seed: on a server, the day's.
+    /// The evaluation's seed; on a server, that of the evaluation day.
     pub seed: Seed,
     /// The seed of the season's model mismatch.
     pub mismatch_seed: Seed,
-    /// The episodes.
+    /// Results of the episodes.
     pub summary: &'a EpisodeSummary,
 }
 
-/// Why two evaluations did not meet the same episodes; names the field that differs. Seeds are not
-/// told, since they may be secret.
+/// The first field in which two evaluations differ, so that their episodes are not the same. Seeds are not
+/// included, since they may be secret.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub enum NotPaired {
-    /// Other rules.
+pub enum NotComparable {
+    /// Different rulesets.
     #[error("ruleset: the first evaluation was scored by {0}, the second by {1}")]
     Ruleset(String, String),
-    /// Other perturbations.
+    /// Different perturbation profiles.
     #[error("profile: the first evaluation played {0}, the second {1}")]
     Profile(Profile, Profile),
-    /// Other weights, bounds or magnitudes: which of them.
+    /// Different `weights`, `tier_bounds` or `perturbations`; the name of the field.
     #[error("{0}: the two evaluations were played or scored by different {0}")]
     Variation(&'static str),
-    /// Other draws.
+    /// Different evaluation seeds.
     #[error("seed: the two evaluations have different seeds (another day, season or --seed)")]
     Seed,
-    /// Another robot.
+    /// Different robots, by the seed of the model mismatch.
     #[error(
         "mismatch_seed: the two evaluations have different seeds of the model mismatch (another \
          season or --mismatch-seed)"
     )]
     MismatchSeed,
-    /// A task that only one of the two played.
+    /// A task that only one of the two includes.
     #[error("tasks: only one of the two evaluations played {0}")]
     Tasks(Task),
-    /// Not equally many.
+    /// Different numbers of episodes of a task.
     #[error("episodes: the first evaluation played {1} of {0}, the second {2}")]
     Episodes(Task, u32, u32),
 }
 
-impl NotPaired {
-    /// The field that differs.
+impl NotComparable {
+    /// Name of the field that differs, as in JSON.
     #[must_use]
     pub const fn field(&self) -> &'static str {
         match self {
@@ -71,12 +71,12 @@ impl NotPaired {
     }
 }
 
-/// Two evaluations on the same episodes. Differences are the first (A) minus the second (B).
+/// Two evaluations on the same episodes. Differences are those of A (the first) minus B (the second).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Comparison {
-    /// By task.
+    /// One comparison for each task.
     pub tasks: BTreeMap<Task, TaskComparison>,
-    /// Of the overall scores.
+    /// The overall scores.
     pub overall: OverallComparison,
 }
 
@@ -104,7 +104,8 @@ pub struct TaskComparison {
     /// McNemar's exact test, two-sided.
     pub p_value: f64,
     /// Is `p_value` at most [`SIGNIFICANCE`]?
-    pub told_apart: bool,
+    #[serde(rename = "told_apart")]
+    pub significant: bool,
 }
 
 /// The overall scores of two evaluations on the same episodes.
@@ -117,28 +118,29 @@ pub struct OverallComparison {
     pub score_b: f64,
     /// Score of A minus that of B, in percentage points.
     pub difference: f64,
-    /// Its 95 % interval: the tasks' intervals, weighed and joined by the square-and-add method.
+    /// Its 95 % interval: the weighted intervals of the tasks, combined by the square-and-add method.
     #[cfg_attr(feature = "openapi", schema(min_items = 2, max_items = 2))]
     pub difference_ci95: [f64; 2],
     /// The exact paired test of the weighted score ([`overall_p_value`]).
     pub p_value: f64,
     /// Is `p_value` at most [`SIGNIFICANCE`]?
-    pub told_apart: bool,
+    #[serde(rename = "told_apart")]
+    pub significant: bool,
 }
 
-impl Played<'_> {
-    /// Compares with an evaluation that met the same episodes.
+impl ComparedEvaluation<'_> {
+    /// Compares two evaluations on the same episodes.
     ///
     /// # Errors
-    /// If it did not: the field that differs.
-    pub fn compare(&self, other: &Self) -> Result<Comparison, NotPaired> {
-        let tallies = self.tallies(other)?;
+    /// If the episodes are not the same: the field that differs.
+    pub fn compare(&self, other: &Self) -> Result<Comparison, NotComparable> {
+        let tallies = self.paired_tallies(other)?;
         let estimates: BTreeMap<_, _> = tallies
             .iter()
             .map(|(task, tally)| (*task, paired_difference(tally)))
             .collect();
         let overall = score_difference(&self.variation.weights, estimates.clone());
-        let [score_a, score_b] = [self, other].map(|played| played.score());
+        let [score_a, score_b] = [self, other].map(Self::score);
         let p_value = overall_p_value(&self.variation.weights, &tallies);
         let tasks = tallies.into_iter().zip(estimates.into_values());
         Ok(Comparison {
@@ -156,7 +158,7 @@ impl Played<'_> {
                         difference: difference.value,
                         difference_ci95: [difference.low, difference.high],
                         p_value,
-                        told_apart: p_value <= SIGNIFICANCE,
+                        significant: p_value <= SIGNIFICANCE,
                     };
                     (task, comparison)
                 })
@@ -167,34 +169,34 @@ impl Played<'_> {
                 difference: overall.value,
                 difference_ci95: [overall.low, overall.high],
                 p_value,
-                told_apart: p_value <= SIGNIFICANCE,
+                significant: p_value <= SIGNIFICANCE,
             },
         })
     }
 
-    /// Can the two be told apart at [`SIGNIFICANCE`], by one task or by the overall score?
+    /// Do the two differ significantly, at [`SIGNIFICANCE`], in one task or in the overall score?
     ///
-    /// On the same episodes by the paired test. On other episodes of the same kind (another day) by
-    /// whether the 95 % interval of the difference, for independent episodes, leaves out zero. Under
-    /// other rules or perturbations always: nothing says that they are alike.
+    /// On the same episodes this is the paired test. On other episodes of the same kind (another day) it is whether the
+    /// 95 % interval of the difference, for independent episodes, excludes zero. Under different rules or
+    /// perturbations it is always true, since there is no evidence of a tie.
     #[must_use]
-    pub fn told_apart(&self, other: &Self, task: Option<Task>) -> bool {
-        let of_interest = |any: &Task| task.is_none_or(|task| task == *any);
-        match self.tallies(other) {
+    pub fn differs_significantly(&self, other: &Self, task: Option<Task>) -> bool {
+        let is_selected = |any: &Task| task.is_none_or(|task| task == *any);
+        match self.paired_tallies(other) {
             Ok(mut tallies) => {
-                tallies.retain(|any, _| of_interest(any));
+                tallies.retain(|any, _| is_selected(any));
                 overall_p_value(&self.weights_of(task), &tallies) <= SIGNIFICANCE
             }
-            Err(NotPaired::Seed | NotPaired::Episodes(..)) => {
-                let differences = self.summary.tasks.iter().filter_map(|(any, mine)| {
-                    let theirs = other.summary.tasks.get(any)?;
+            Err(NotComparable::Seed | NotComparable::Episodes(..)) => {
+                let differences = self.summary.tasks.iter().filter_map(|(any, a)| {
+                    let b = other.summary.tasks.get(any)?;
                     let counts =
-                        [mine, theirs].map(|one| [one.successes.count(), one.successes.episodes()]);
+                        [a, b].map(|side| [side.successes.count(), side.successes.episodes()]);
                     Some((*any, unpaired_difference(counts[0], counts[1])))
                 });
                 score_difference(
                     &self.weights_of(task),
-                    differences.filter(|(any, _)| of_interest(any)),
+                    differences.filter(|(any, _)| is_selected(any)),
                 )
                 .excludes_zero()
             }
@@ -202,7 +204,7 @@ impl Played<'_> {
         }
     }
 
-    /// Of one task alone the weight does not matter, even if it is none.
+    /// The weights for a test. For a single task its weight does not matter, even if it is zero.
     fn weights_of(&self, task: Option<Task>) -> TaskWeights {
         match task {
             None => self.variation.weights,
@@ -221,45 +223,45 @@ impl Played<'_> {
         )
     }
 
-    fn tallies(&self, other: &Self) -> Result<BTreeMap<Task, PairedTally>, NotPaired> {
+    fn paired_tallies(&self, other: &Self) -> Result<BTreeMap<Task, PairedTally>, NotComparable> {
         if self.ruleset != other.ruleset {
-            return Err(NotPaired::Ruleset(
+            return Err(NotComparable::Ruleset(
                 self.ruleset.to_owned(),
                 other.ruleset.to_owned(),
             ));
         }
         if self.profile != other.profile {
-            return Err(NotPaired::Profile(self.profile, other.profile));
+            return Err(NotComparable::Profile(self.profile, other.profile));
         }
-        let (mine, theirs) = (self.variation, other.variation);
+        let (a, b) = (self.variation, other.variation);
         for (field, differs) in [
-            ("perturbations", mine.perturbations != theirs.perturbations),
-            ("weights", mine.weights != theirs.weights),
-            ("tier_bounds", mine.tier_bounds != theirs.tier_bounds),
+            ("perturbations", a.perturbations != b.perturbations),
+            ("weights", a.weights != b.weights),
+            ("tier_bounds", a.tier_bounds != b.tier_bounds),
         ] {
             if differs {
-                return Err(NotPaired::Variation(field));
+                return Err(NotComparable::Variation(field));
             }
         }
         if self.mismatch_seed != other.mismatch_seed {
-            return Err(NotPaired::MismatchSeed);
+            return Err(NotComparable::MismatchSeed);
         }
         let (a, b) = (&self.summary.tasks, &other.summary.tasks);
         let unshared = |a: &BTreeMap<Task, _>, b: &BTreeMap<Task, _>| {
             a.keys().find(|task| !b.contains_key(task)).copied()
         };
         if let Some(task) = unshared(a, b).or_else(|| unshared(b, a)) {
-            return Err(NotPaired::Tasks(task));
+            return Err(NotComparable::Tasks(task));
         }
         if self.seed != other.seed {
-            return Err(NotPaired::Seed);
+            return Err(NotComparable::Seed);
         }
         a.iter()
             .zip(b.values())
             .map(|((task, a), b)| {
                 let (a, b) = (&a.successes, &b.successes);
-                let tally = PairedTally::of(*task, a, b)
-                    .map_err(|_| NotPaired::Episodes(*task, a.episodes(), b.episodes()))?;
+                let tally = PairedTally::from_successes(*task, a, b)
+                    .map_err(|_| NotComparable::Episodes(*task, a.episodes(), b.episodes()))?;
                 Ok((*task, tally))
             })
             .collect()

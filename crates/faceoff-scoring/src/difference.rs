@@ -1,6 +1,5 @@
-//! Intervals of differences, all by the square-and-add method: each bound of a sum lies as far from its
-//! estimate as the root of the summed squares of its parts' distances (Newcombe, Statistics in Medicine
-//! 17, 1998; Zou and Donner, Statistics in Medicine 27, 2008).
+//! Intervals of differences by the square-and-add method: the margin of a sum is the root of the summed squares of the
+//! margins of its parts (Newcombe, Statistics in Medicine 17, 1998; Zou and Donner, Statistics in Medicine 27, 2008).
 
 use crate::{evaluation::weight_percent, interval::wilson95, paired::PairedTally};
 use faceoff_types::{Task, TaskWeights};
@@ -24,26 +23,28 @@ impl Estimate {
         }
     }
 
-    fn below(self) -> f64 {
+    /// Distance of the lower bound from the estimate.
+    fn lower_margin(self) -> f64 {
         self.value - self.low
     }
 
-    fn above(self) -> f64 {
+    /// Distance of the upper bound from the estimate.
+    fn upper_margin(self) -> f64 {
         self.high - self.value
     }
 
     /// `a − b` of two rates whose episodes correlate with `phi`; 0 for independent ones.
     fn difference(a: Self, b: Self, phi: f64) -> Self {
-        let distance = |of_a: f64, of_b: f64| {
-            (of_a * of_a - 2.0 * phi * of_a * of_b + of_b * of_b)
+        let margin = |a: f64, b: f64| {
+            (a * a - 2.0 * phi * a * b + b * b)
                 .max(0.0)
                 .sqrt()
         };
         let value = a.value - b.value;
         Self {
             value,
-            low: (value - distance(a.below(), b.above())).max(-1.0),
-            high: (value + distance(a.above(), b.below())).min(1.0),
+            low: (value - margin(a.lower_margin(), b.upper_margin())).max(-1.0),
+            high: (value + margin(a.upper_margin(), b.lower_margin())).min(1.0),
         }
     }
 
@@ -52,16 +53,16 @@ impl Estimate {
     }
 }
 
-/// Success rate of the first team minus that of the second on the same episodes, with Newcombe's paired
-/// score interval (method 10 of his comparison).
+/// Success rate of A minus that of B on the same episodes, with Newcombe's paired score interval (method 10 of his
+/// comparison).
 pub(crate) fn paired_difference(tally: &PairedTally) -> Estimate {
     let n = tally.episodes();
     let (a, b) = (tally.both + tally.only_a, tally.both + tally.only_b);
     Estimate::difference(Estimate::rate(a, n), Estimate::rate(b, n), phi(tally))
 }
 
-/// The correlation of the two teams' successes, shrunk towards 0 where it is positive: a correlation
-/// that chance might have made must not narrow the interval.
+/// The correlation of the successes of A and B, shrunk towards 0 if it is positive: a correlation that may be due to
+/// chance must not narrow the interval.
 fn phi(tally: &PairedTally) -> f64 {
     let [both, only_a, only_b, neither] =
         [tally.both, tally.only_a, tally.only_b, tally.neither].map(f64::from);
@@ -79,8 +80,8 @@ fn phi(tally: &PairedTally) -> f64 {
     shrunk / margins.sqrt()
 }
 
-/// As [`paired_difference`], for `[successes, episodes]` of two teams that met different episodes
-/// (Newcombe's score interval for independent proportions).
+/// As [`paired_difference`], for `[successes, episodes]` of A and B on different episodes (Newcombe's score interval
+/// for independent proportions).
 pub(crate) fn unpaired_difference(a: [u32; 2], b: [u32; 2]) -> Estimate {
     Estimate::difference(Estimate::rate(a[0], a[1]), Estimate::rate(b[0], b[1]), 0.0)
 }
@@ -91,17 +92,17 @@ pub(crate) fn score_difference(
     weights: &TaskWeights,
     tasks: impl IntoIterator<Item = (Task, Estimate)>,
 ) -> Estimate {
-    let (mut value, mut below, mut above) = (0.0, 0.0, 0.0);
+    let (mut value, mut lower_squares, mut upper_squares) = (0.0, 0.0, 0.0);
     for (task, difference) in tasks {
         let weight = weight_percent(weights, task);
         value += weight * difference.value;
-        below += (weight * difference.below()).powi(2);
-        above += (weight * difference.above()).powi(2);
+        lower_squares += (weight * difference.lower_margin()).powi(2);
+        upper_squares += (weight * difference.upper_margin()).powi(2);
     }
     Estimate {
         value,
-        low: value - below.sqrt(),
-        high: value + above.sqrt(),
+        low: value - lower_squares.sqrt(),
+        high: value + upper_squares.sqrt(),
     }
 }
 
@@ -119,9 +120,9 @@ mod tests {
         }
     }
 
-    /// The values come from a program of its own that follows the formula in the paper.
+    /// The values come from a separate implementation of the formula in the paper.
     #[test]
-    fn the_paired_interval_is_newcombes_method_10() {
+    fn paired_interval_is_newcombes_method_10() {
         for (tally, low, high) in [
             (tally(20, 12, 2, 16), 0.056_156_4, 0.329_207_0),
             (tally(36, 12, 2, 0), 0.056_929_6, 0.340_427_6),
@@ -137,10 +138,9 @@ mod tests {
         }
     }
 
-    /// Over all results that 24 episodes can have, weighed by their probabilities: how often the
-    /// interval holds the true difference.
+    /// The probability that the interval contains the true difference, summed over all possible results of 24 episodes.
     #[test]
-    fn the_paired_interval_covers_the_truth_about_as_often_as_it_says() {
+    fn paired_interval_has_about_nominal_coverage() {
         const N: u32 = 24;
         for cells in [
             [0.3, 0.2, 0.2, 0.3],
@@ -150,9 +150,9 @@ mod tests {
             [0.05, 0.6, 0.05, 0.3],
         ] {
             let truth = cells[1] - cells[2];
-            // the cells one after the other, each out of what the earlier ones left
-            let chance = |of: f64, n: u32, k: u32| {
-                Binomial::new(of, u64::from(n)).unwrap().pmf(u64::from(k))
+            // The cells in sequence, each conditional on the earlier ones.
+            let probability = |p: f64, n: u32, k: u32| {
+                Binomial::new(p, u64::from(n)).unwrap().pmf(u64::from(k))
             };
             let mut covered = 0.0;
             for both in 0..=N {
@@ -163,9 +163,9 @@ mod tests {
                         if difference.low <= truth && truth <= difference.high {
                             let rest = 1.0 - cells[0];
                             let left = N - both;
-                            covered += chance(cells[0], N, both)
-                                * chance(cells[1] / rest, left, only_a)
-                                * chance(cells[2] / (rest - cells[1]), left - only_a, only_b);
+                            covered += probability(cells[0], N, both)
+                                * probability(cells[1] / rest, left, only_a)
+                                * probability(cells[2] / (rest - cells[1]), left - only_a, only_b);
                         }
                     }
                 }
@@ -175,7 +175,7 @@ mod tests {
     }
 
     #[test]
-    fn the_score_weighs_its_tasks() {
+    fn score_interval_weights_tasks() {
         let one = Estimate {
             value: 0.1,
             low: 0.0,

@@ -1,8 +1,8 @@
-//! Numbers that are drawn, always the same ones from the same key.
+//! Deterministic random draws: the same key gives the same numbers.
 
 use faceoff_types::Seed;
 
-/// Draws from an endless stream of bytes.
+/// Random numbers from an endless stream of bytes.
 pub(crate) struct Draws {
     stream: blake3::OutputReader,
     buffer: Box<[u8; Self::BYTES]>,
@@ -20,13 +20,12 @@ impl Draws {
         }
     }
 
-    /// The draws of a seed.
+    /// The stream keyed with a seed.
     pub(crate) fn from_seed(seed: &Seed) -> Self {
         Self::new(blake3::Hasher::new_keyed(seed.as_bytes()).finalize_xof())
     }
 
-    /// A number below `n`. Not perfectly even: by a share of n / 2³², which
-    /// thousands of resamples cannot show.
+    /// A uniform number below `n`. Its bias of at most n / 2³² is negligible for thousands of resamples.
     pub(crate) fn below(&mut self, n: u32) -> usize {
         if self.used == Self::BYTES {
             self.stream.fill(&mut self.buffer[..]);
@@ -38,7 +37,7 @@ impl Draws {
         ((u64::from(draw) * u64::from(n)) >> 32) as usize
     }
 
-    /// Puts `items` into an order that is drawn (Fisher and Yates).
+    /// Shuffles `items` (Fisher and Yates).
     pub(crate) fn shuffle<T>(&mut self, items: &mut [T]) {
         for last in (1..items.len()).rev() {
             let among = u32::try_from(last + 1).expect("a list of teams is short");

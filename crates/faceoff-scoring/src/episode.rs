@@ -1,28 +1,27 @@
 use faceoff_types::{ComputationTime, EpisodeEnd, EpisodeOutcome, Violations};
 
-/// Points for leaving the end effector's bounds (paper §2.2).
+/// Penalty points for an end effector outside its bounds (paper §2.2).
 pub const EE_POINTS: f64 = 3.0;
-/// Points for an elbow or wrist that is too low (reference implementation; the paper's list is silent).
+/// Penalty points for an elbow or wrist that is too low (reference implementation; not in the paper).
 pub const LINK_POINTS: f64 = 3.0;
-/// Points for a joint beyond its position limits (paper §2.2).
+/// Penalty points for a joint beyond its position limits (paper §2.2).
 pub const JOINT_POS_POINTS: f64 = 2.0;
-/// Points for a joint beyond its velocity limits (paper §2.2).
+/// Penalty points for a joint beyond its velocity limits (paper §2.2).
 pub const JOINT_VEL_POINTS: f64 = 1.0;
-/// The most points that computation time can cost in one episode (paper §2.2); also the price of an
-/// agent fault.
+/// Highest penalty for computation time in one episode (paper §2.2), and the penalty for an agent fault.
 pub const COMPUTATION_TIME_MAX_POINTS: f64 = 2.0;
-/// The most points that one episode can cost.
+/// Highest penalty of one episode.
 pub const MAX_EPISODE_PENALTY: f64 =
     EE_POINTS + LINK_POINTS + JOINT_POS_POINTS + JOINT_VEL_POINTS + COMPUTATION_TIME_MAX_POINTS;
 
-/// One control step, in seconds: what an answer may take.
+/// One control step in seconds, the time limit of an answer.
 const STEP_S: f64 = 0.02;
 
-/// The times that an episode's slowest answer may take before it costs (more) points, in seconds.
+/// Limits of the slowest answer of an episode in seconds; beyond each the penalty is higher.
 pub const COMPUTATION_TIME_LIMITS_S: [f64; 3] = [STEP_S, 5.0 * STEP_S, 10.0 * STEP_S];
 
-/// Points for the computation times of one episode: 0, 0.5, 1 or 2 (reference implementation, within
-/// the paper's "0.5–2 pts").
+/// Penalty points for the computation times of one episode: 0, 0.5, 1 or 2 (reference implementation, within the
+/// paper's "0.5–2 pts").
 #[must_use]
 pub fn computation_time_penalty(time: &ComputationTime) -> f64 {
     let [late, later, latest] = COMPUTATION_TIME_LIMITS_S;
@@ -37,7 +36,7 @@ pub fn computation_time_penalty(time: &ComputationTime) -> f64 {
     }
 }
 
-/// Points that an episode's computation times or its agent fault cost.
+/// Penalty points for the computation times of an episode, or for its agent fault.
 pub(crate) fn time_or_fault_penalty(outcome: &EpisodeOutcome) -> f64 {
     if has_fault(outcome) {
         COMPUTATION_TIME_MAX_POINTS
@@ -46,26 +45,26 @@ pub(crate) fn time_or_fault_penalty(outcome: &EpisodeOutcome) -> f64 {
     }
 }
 
-/// Did the agent end the episode by a fault?
+/// Did an agent fault end the episode?
 pub(crate) fn has_fault(outcome: &EpisodeOutcome) -> bool {
     outcome.fault.is_some() || outcome.end == EpisodeEnd::AgentFault
 }
 
-/// Penalty points of one episode: each kind of violation counts once, however often it happened.
+/// Penalty points of one episode: each kind of violation counts once, regardless of its duration.
 ///
-/// An agent fault costs the full points for computation time, whatever the steps before it took.
+/// An agent fault gives the full penalty for computation time, regardless of the earlier steps.
 #[must_use]
 pub fn episode_penalty(outcome: &EpisodeOutcome) -> f64 {
     violation_points(&outcome.violations) + time_or_fault_penalty(outcome)
 }
 
-/// Points for constraints that the robot's motion broke.
-pub(crate) fn violation_points(broken: &Violations) -> f64 {
+/// Penalty points for constraints that the robot's motion violated.
+pub(crate) fn violation_points(violations: &Violations) -> f64 {
     [
-        (broken.ee, EE_POINTS),
-        (broken.link, LINK_POINTS),
-        (broken.joint_pos, JOINT_POS_POINTS),
-        (broken.joint_vel, JOINT_VEL_POINTS),
+        (violations.ee, EE_POINTS),
+        (violations.link, LINK_POINTS),
+        (violations.joint_pos, JOINT_POS_POINTS),
+        (violations.joint_vel, JOINT_VEL_POINTS),
     ]
     .into_iter()
     .filter(|(violated, _)| *violated)
@@ -82,7 +81,7 @@ mod tests {
     }
 
     #[test]
-    fn computation_time_costs_by_its_worst_and_its_mean() {
+    fn computation_time_penalty_uses_maximum_and_mean() {
         assert_eq!(time(0.0, 0.0), 0.0);
         assert_eq!(time(0.001, 0.02), 0.0, "the limit itself is in time");
         assert_eq!(time(0.001, 0.020_000_1), 0.5);
@@ -94,7 +93,7 @@ mod tests {
     }
 
     #[test]
-    fn the_most_expensive_episode_is_the_sum_of_all() {
+    fn maximum_penalty_is_sum_of_all() {
         assert_eq!(MAX_EPISODE_PENALTY, 11.0);
     }
 }

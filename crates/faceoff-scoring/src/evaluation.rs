@@ -3,16 +3,15 @@ use faceoff_types::{
 };
 use std::collections::BTreeMap;
 
-/// What a task's success rate weighs in the overall score, in percent.
+/// Weight of a task's success rate in the overall score, in percent.
 pub(crate) fn weight_percent(weights: &TaskWeights, task: Task) -> f64 {
     f64::from(weights.of(task).count()) / 1e4
 }
 
-/// The overall score in percent, from success rates as fractions. A task that is not given counts 0.
+/// The overall score in percent, from success rates as fractions. Missing tasks count as 0.
 ///
-/// The paper's text speaks of a mean; the ruleset's weights are those that its qualifying table follows. Rounded to nine
-/// decimals, so that scores that are equal on paper are equal in the computer too and a board's ties are decided by the
-/// rules, not by rounding errors.
+/// The paper's text says "mean", but its qualifying table follows the weights of the ruleset. Rounding to nine decimals
+/// makes mathematically equal scores equal in floating point, so that the rules decide ties, not rounding errors.
 #[must_use]
 pub fn overall_score(weights: &TaskWeights, rates: impl IntoIterator<Item = (Task, f64)>) -> f64 {
     let score: f64 = rates
@@ -24,8 +23,7 @@ pub fn overall_score(weights: &TaskWeights, rates: impl IntoIterator<Item = (Tas
 
 /// Scores an evaluation: weighted score, maximum of the tasks' penalty points, worst of their tiers.
 ///
-/// A task that was not played counts as 0 in the score. With no task at all the result is empty: score
-/// 0, no penalty, deployable.
+/// A missing task counts as 0 in the score. Without any task the score is 0, the penalty 0 and the tier deployable.
 #[must_use]
 pub fn score_evaluation(
     ruleset: Ruleset,
@@ -64,7 +62,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_perfect_agent_scores_100_whatever_the_weights() {
+    fn perfect_agent_scores_100_for_all_weights() {
         for weights in ["0.4,0.4,0.2", "0.333333,0.333333,0.333334", "1,0,0"] {
             let weights: TaskWeights = weights.parse().unwrap();
             assert_eq!(
@@ -78,7 +76,7 @@ mod tests {
     }
 
     #[test]
-    fn scores_that_are_equal_on_paper_are_equal() {
+    fn mathematically_equal_scores_are_equal() {
         let score =
             |rates| overall_score(&TaskWeights::default(), Task::ALL.into_iter().zip(rates));
         let (one, other) = (score([0.1, 0.2, 0.3]), score([0.3, 0.1, 0.1]));

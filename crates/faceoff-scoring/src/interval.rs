@@ -1,10 +1,10 @@
 /// The standard normal distribution's 97.5 % point.
 const Z: f64 = 1.959_963_984_540_054;
 
-/// The 95 % Wilson score interval of a success rate, as fractions. No episodes: all is possible.
+/// The 95 % Wilson score interval of a success rate, as fractions; [0, 1] without episodes.
 ///
-/// Unlike the textbook interval it stays within 0 and 1 and is honest near them: no success in 50
-/// episodes still leaves a rate of up to 7 %.
+/// Unlike the normal approximation it stays within 0 and 1 and is valid near them: with no success in 50 episodes the
+/// upper bound is 7 %.
 #[must_use]
 pub fn wilson95(successes: u32, episodes: u32) -> [f64; 2] {
     if episodes == 0 {
@@ -26,7 +26,7 @@ pub fn wilson95_of_rate(rate: f64, episodes: u32) -> [f64; 2] {
     let centre = rate + Z * Z / (2.0 * n);
     let half_width = Z * (rate * (1.0 - rate) / n + Z * Z / (4.0 * n * n)).sqrt();
     let scale = 1.0 + Z * Z / n;
-    // At the ends the bound is exact in theory; rounding must not move it.
+    // For rates 0 and 1 one bound is exact in theory; rounding must not change it.
     let low = if rate <= 0.0 {
         0.0
     } else {
@@ -45,9 +45,9 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// The interval is the set of rates p with |s/n − p| ≤ z √(p(1−p)/n): its ends satisfy equality.
+    /// The interval is the set of rates p with |s/n − p| ≤ z √(p(1−p)/n): equality holds at its bounds.
     #[test]
-    fn the_ends_lie_at_the_normal_quantile_of_their_own_deviation() {
+    fn bounds_satisfy_score_test_equality() {
         for (successes, episodes) in [(7, 50), (25, 50), (549, 1000), (1, 3)] {
             let n = f64::from(episodes);
             let rate = f64::from(successes) / n;
@@ -62,7 +62,7 @@ mod tests {
     }
 
     #[test]
-    fn no_success_and_no_failure_reach_the_end_exactly() {
+    fn rates_0_and_1_have_exact_bound() {
         let [low, high] = wilson95(0, 50);
         assert_eq!(low, 0.0);
         assert!((high - 0.071_35).abs() < 1e-5, "{high}");
@@ -74,7 +74,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn the_interval_holds_the_rate_and_stays_within_0_and_1(n in 1u32..5000, part in 0.0..=1.0f64) {
+        fn interval_contains_rate_within_0_and_1(n in 1u32..5000, part in 0.0..=1.0f64) {
             let successes = (part * f64::from(n)) as u32;
             let rate = f64::from(successes) / f64::from(n);
             let [low, high] = wilson95(successes, n);

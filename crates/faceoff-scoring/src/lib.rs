@@ -1,11 +1,10 @@
 //! Scoring: outcomes → penalty points → tiers → boards → standings, with intervals and paired tests.
 //!
-//! Everything here is a pure function of what it is given, so that a stored recording can be scored
-//! again without simulating, and anyone can check a published number. The rules are those of the
-//! rulesets of [`faceoff_types::Ruleset`]; `docs/rules.md` explains them.
+//! All functions are pure: a stored recording can be scored again without a simulation, and anyone can check a
+//! published number. The rules are those of the rulesets of [`faceoff_types::Ruleset`]; `docs/rules.md` explains them.
 //!
-//! This crate reads no file, no clock and no random numbers (bootstraps draw from a hash of what they are given,
-//! schedules from a seed that they are given), and it knows neither the simulator nor the database.
+//! This crate reads no files, no clock and no random numbers, and it depends on neither the simulator nor the database.
+//! Bootstraps draw from a hash of their input, schedules from a given seed.
 
 #![warn(missing_docs)]
 
@@ -30,11 +29,11 @@ mod tier;
 mod tier_change;
 pub mod tournament;
 mod unique_map;
-mod who_solved;
+mod solved_episodes;
 
 pub use ablation::{ProfileEffect, ablation};
 pub use board::{BoardEntry, RankedEntry, overall_board, task_board};
-pub use comparison::{Comparison, NotPaired, OverallComparison, Played, TaskComparison};
+pub use comparison::{Comparison, NotComparable, OverallComparison, ComparedEvaluation, TaskComparison};
 pub use episode::{
     COMPUTATION_TIME_LIMITS_S, COMPUTATION_TIME_MAX_POINTS, EE_POINTS, JOINT_POS_POINTS,
     JOINT_VEL_POINTS, LINK_POINTS, MAX_EPISODE_PENALTY, computation_time_penalty, episode_penalty,
@@ -44,7 +43,7 @@ pub use interval::{wilson95, wilson95_of_rate};
 pub use mean::{joined_summary, mean_result};
 pub use paired::{PairedTally, PairingError, SIGNIFICANCE, overall_p_value};
 pub use qualifying::{
-    InvalidTaskScore, QUALIFYING_EPISODES, QualifyingRow, QualifyingSheet, TaskRow, TaskScore,
+    InvalidTaskScore, QUALIFYING_EPISODES, QualifyingRow, QualifyingScores, TaskRow, TaskScore,
 };
 pub use rank_groups::rank_groups;
 pub use step_times::StepTimes;
@@ -52,7 +51,7 @@ pub use successes::Successes;
 pub use summary::{EpisodeSummary, TaskSummary};
 pub use task::score_task;
 pub use tier::{
-    DEPLOYABLE_POINTS_PER_EPISODE, IMPROVABLE_POINTS_PER_EPISODE, tier_of, tier_within,
+    DEPLOYABLE_POINTS_PER_EPISODE, IMPROVABLE_POINTS_PER_EPISODE, tier_of, tier_with_bounds,
 };
 pub use tier_change::TIER_CHANGE_RESAMPLES;
-pub use who_solved::WhoSolved;
+pub use solved_episodes::SolvedEpisodes;

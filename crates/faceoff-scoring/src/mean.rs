@@ -1,10 +1,10 @@
-//! Several evaluations of one team, taken together: rows that are means of several days.
+//! Means over several evaluations of one team, for boards that rank several days.
 
 use crate::{
     evaluation::score_evaluation,
     interval::wilson95,
     summary::{EpisodeSummary, TaskSummary},
-    tier::tier_within,
+    tier::tier_with_bounds,
 };
 use faceoff_types::{
     ComputationTimeSummary, EvaluationResult, Ruleset, Seed, Task, TaskResult, TierBounds,
@@ -12,18 +12,18 @@ use faceoff_types::{
 };
 use std::collections::BTreeMap;
 
-/// Names the hash that stands for the seeds of several days.
-const SEEDS: &str = "faceoff-scoring seeds of several days 1";
+/// Context of the hash that represents the seeds of several days.
+const SEED_CONTEXT: &str = "faceoff-scoring seeds of several days 1";
 
-/// The mean of evaluations by the same rules, which played equally many episodes of the same tasks: success rates and
-/// penalty points are means over the evaluations, and tier and score follow from these. `None` of none.
+/// The mean of evaluations with the same rules, tasks and numbers of episodes; `None` if `results` is empty. Success rates
+/// and penalty points are means over the evaluations; tier and score follow from them.
 ///
-/// A task's `episodes`, `successes`, violations and steps are sums, so that its interval is that of all episodes. Of
-/// the computation times the mean is over all steps, the others are the worst of the days. `seed` stands for the
-/// evaluations' seeds in their order.
+/// A task's `episodes`, `successes`, violations and steps are sums, so that its interval is that of all episodes. The mean
+/// computation time is over all steps, percentile and maximum are the worst of the days. `seed` represents the seeds of
+/// the evaluations in their sequence.
 ///
 /// # Errors
-/// If the first one's ruleset is unknown.
+/// If the ruleset of the first evaluation is unknown.
 pub fn mean_result(
     results: &[&EvaluationResult],
 ) -> Result<Option<EvaluationResult>, UnknownRuleset> {
@@ -45,18 +45,18 @@ pub fn mean_result(
 }
 
 fn mean_task(days: &[&TaskResult], bounds: &TierBounds) -> TaskResult {
-    let sum = |of: fn(&TaskResult) -> u32| -> u32 {
-        days.iter().fold(0, |sum, day| sum.saturating_add(of(day)))
+    let sum = |value: fn(&TaskResult) -> u32| -> u32 {
+        days.iter().fold(0, |sum, day| sum.saturating_add(value(day)))
     };
     let (episodes, successes) = (sum(|day| day.episodes), sum(|day| day.successes));
-    // Multiples of one half: the sum is exact in any order.
+    // Points are multiples of one half: the sum is exact in any order.
     let points: f64 = days.iter().map(|day| day.penalty_points).sum();
     let steps: u64 = days.iter().map(|day| day.steps).sum();
-    let worst = |of: fn(&ComputationTimeSummary) -> f64| {
-        let times = days.iter().map(|day| of(&day.computation_time_s));
+    let worst = |value: fn(&ComputationTimeSummary) -> f64| {
+        let times = days.iter().map(|day| value(&day.computation_time_s));
         times.fold(0.0, f64::max)
     };
-    let all_times: f64 = days
+    let total_time_s: f64 = days
         .iter()
         .map(|day| day.computation_time_s.mean * day.steps as f64)
         .sum();
@@ -73,44 +73,44 @@ fn mean_task(days: &[&TaskResult], bounds: &TierBounds) -> TaskResult {
             joint_vel: sum(|day| day.violations.joint_vel),
             computation_time: sum(|day| day.violations.computation_time),
         },
-        tier: tier_within(bounds, points, episodes),
+        tier: tier_with_bounds(bounds, points, episodes),
         steps,
         computation_time_s: ComputationTimeSummary {
-            mean: all_times / (steps.max(1) as f64),
+            mean: total_time_s / (steps.max(1) as f64),
             p99: worst(|times| times.p99),
             max: worst(|times| times.max),
         },
     }
 }
 
-/// What stands for the seeds of several days: the same only if all are. That of one day is the day's.
+/// A hash of the seeds of several days; the seed itself for one day.
 fn joint_seed(seeds: impl Iterator<Item = Seed>) -> Seed {
     let seeds: Vec<Seed> = seeds.collect();
     if let [seed] = seeds[..] {
         return seed;
     }
-    let mut hash = blake3::Hasher::new_derive_key(SEEDS);
+    let mut hash = blake3::Hasher::new_derive_key(SEED_CONTEXT);
     for seed in seeds {
         hash.update(seed.to_string().as_bytes());
     }
     Seed::from_bytes(*hash.finalize().as_bytes())
 }
 
-/// The episodes of several evaluations as if they were one's, in the order in which they are given. How sure its
-/// tiers are is not known of them: that would need all outcomes.
+/// The episodes of several evaluations as those of one, in the given sequence. Its `tier_change` is 0: a bootstrap
+/// would need all outcomes.
 #[must_use]
 pub fn joined_summary(summaries: &[&EpisodeSummary]) -> EpisodeSummary {
     let mut tasks: BTreeMap<Task, Vec<&TaskSummary>> = BTreeMap::new();
     for summary in summaries {
-        for (task, of_task) in &summary.tasks {
-            tasks.entry(*task).or_default().push(of_task);
+        for (task, task_summary) in &summary.tasks {
+            tasks.entry(*task).or_default().push(task_summary);
         }
     }
     let tasks = tasks.into_iter().map(|(task, days)| {
         let summary = TaskSummary {
             successes: days
                 .iter()
-                .flat_map(|day| day.successes.episodes_solved())
+                .flat_map(|day| day.successes.iter())
                 .collect(),
             penalty_points: days.iter().map(|day| day.penalty_points).sum(),
             tier_change: 0.0,
@@ -158,7 +158,7 @@ mod tests {
     }
 
     #[test]
-    fn a_mean_is_of_rates_and_points_and_its_tier_follows() {
+    fn mean_averages_rates_and_points_and_derives_tier() {
         assert_eq!(mean_result(&[]).unwrap(), None);
         let (a, b) = (day(1, 40, 20.0), day(2, 60, 100.0));
         assert_eq!((a.tier, b.tier), (Tier::Deployable, Tier::Improvable));
@@ -182,7 +182,7 @@ mod tests {
     }
 
     #[test]
-    fn episodes_of_several_days_stand_one_after_the_other() {
+    fn joined_summary_concatenates_episodes_of_days() {
         let summary = |solved: &[bool]| EpisodeSummary {
             tasks: [(
                 Task::Hit,

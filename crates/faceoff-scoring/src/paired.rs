@@ -1,12 +1,12 @@
-use crate::{binomial::FairTosses, successes::Successes};
+use crate::{binomial::SymmetricBinomial, successes::Successes};
 use faceoff_types::{Task, TaskWeights};
 use std::collections::BTreeMap;
 
-/// Two teams are told apart when a difference like theirs, or a larger one, would come by chance with
-/// at most this probability.
+/// Significance level: two teams differ significantly if an equal or larger difference arises by chance with at most
+/// this probability.
 pub const SIGNIFICANCE: f64 = 0.05;
 
-/// How two teams did on the same episodes of one task.
+/// Successes of two teams on the same episodes of one task.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct PairedTally {
     /// Episodes in which both succeeded.
@@ -19,16 +19,16 @@ pub struct PairedTally {
     pub neither: u32,
 }
 
-/// Why episodes cannot be paired with another agent's.
+/// Why two agents' episodes cannot be paired.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum PairingError {
-    /// Which of the two counts?
+    /// Two outcomes have the same episode number.
     #[error("{0} episode {1} occurs twice")]
     Repeated(Task, u32),
-    /// Episodes are numbered without gaps.
+    /// An episode number was skipped.
     #[error("{0} episode {1} is missing")]
     Missing(Task, u32),
-    /// The first episode that only one of the two played.
+    /// The first episode that only one agent has.
     #[error("{0} episode {1} was played by one of the two only")]
     Unpaired(Task, u32),
 }
@@ -36,17 +36,16 @@ pub enum PairingError {
 impl PairedTally {
     /// Pairs two teams' episodes of one task.
     ///
-    /// The caller sees to it that both come from the same evaluation seed and profile: only then did
-    /// both teams meet the same episodes.
+    /// The caller ensures that both have the same evaluation seed and profile, and therefore the same episodes.
     ///
     /// # Errors
-    /// If the two did not play equally many.
-    pub fn of(task: Task, a: &Successes, b: &Successes) -> Result<Self, PairingError> {
+    /// If their numbers of episodes differ.
+    pub fn from_successes(task: Task, a: &Successes, b: &Successes) -> Result<Self, PairingError> {
         if a.episodes() != b.episodes() {
             let first = a.episodes().min(b.episodes());
             return Err(PairingError::Unpaired(task, first));
         }
-        let both = a.in_common(b);
+        let both = a.count_common(b);
         let (only_a, only_b) = (a.count() - both, b.count() - both);
         Ok(Self {
             both,
@@ -56,17 +55,17 @@ impl PairedTally {
         })
     }
 
-    /// Episodes played.
+    /// Number of episodes, the sum of all four counts.
     #[must_use]
     pub const fn episodes(&self) -> u32 {
         self.both + self.only_a + self.only_b + self.neither
     }
 
-    /// McNemar's exact test, two-sided: the probability that as uneven a split of the episodes in which
-    /// exactly one team succeeded, or a more uneven one, comes by chance if both are equally good.
+    /// McNemar's exact test, two-sided, over the episodes in which exactly one team succeeded: the probability of an
+    /// equally uneven or more uneven split if both teams are equally good.
     #[must_use]
     pub fn p_value(&self) -> f64 {
-        // One task alone: its weight does not matter.
+        // With a single task the weight does not matter.
         overall_p_value(
             &TaskWeights::default(),
             &BTreeMap::from([(Task::Hit, *self)]),
@@ -74,18 +73,16 @@ impl PairedTally {
     }
 }
 
-/// The exact paired test of two teams' overall scores, two-sided: McNemar's test, carried over to the
-/// weighted score.
+/// The exact paired test of two teams' overall scores, two-sided: McNemar's test, extended to the weighted score.
 ///
-/// If two teams are equally good, then in each episode that only one of them solved either could have
-/// been the one, like a fair toss. The difference of the overall scores is Σ weight · (only a − only b)
-/// / episodes over the tasks; the p-value is the probability that tosses bring as large a difference,
-/// in either direction. With one task this is McNemar's exact test. All comparisons of differences are
-/// made on integers.
+/// If two teams are equally good, each episode that only one of them solved is like a fair coin toss. The difference of
+/// the overall scores is Σ weight · (only a − only b) / episodes over the tasks. The p-value is the probability of an
+/// equal or larger difference in either direction. With one task this is McNemar's exact test. Differences are compared
+/// as integers.
 #[must_use]
 pub fn overall_p_value(weights: &TaskWeights, tallies: &BTreeMap<Task, PairedTally>) -> f64 {
-    // What weighs nothing decides nothing.
-    let played = || {
+    // Tasks with weight 0 have no influence.
+    let weighted = || {
         let counts = |task: &Task, tally: &PairedTally| {
             tally.episodes() > 0 && weights.of(*task).count() > 0
         };
@@ -93,14 +90,14 @@ pub fn overall_p_value(weights: &TaskWeights, tallies: &BTreeMap<Task, PairedTal
             .iter()
             .filter(move |(task, tally)| counts(task, tally))
     };
-    let common = played().fold(1, |common, (_, tally)| {
+    let common = weighted().fold(1, |common, (_, tally)| {
         lcm(common, i128::from(tally.episodes()))
     });
 
-    // Tasks whose episodes weigh the same are one long row of tosses.
+    // Tasks whose episodes have the same weight are combined.
     let mut tosses_by_weight = BTreeMap::<i128, u32>::new();
     let mut difference = 0;
-    for (task, tally) in played() {
+    for (task, tally) in weighted() {
         let weight =
             i128::from(weights.of(*task).count()) * (common / i128::from(tally.episodes()));
         *tosses_by_weight.entry(weight).or_default() += tally.only_a + tally.only_b;
@@ -109,43 +106,43 @@ pub fn overall_p_value(weights: &TaskWeights, tallies: &BTreeMap<Task, PairedTal
     if difference == 0 {
         return 1.0;
     }
-    let mut rows: Vec<_> = tosses_by_weight
+    let mut groups: Vec<_> = tosses_by_weight
         .into_iter()
-        .map(|(weight, tosses)| Row {
+        .map(|(weight, tosses)| WeightedTosses {
             weight,
             tosses,
-            heads: FairTosses::new(tosses),
+            heads: SymmetricBinomial::new(tosses),
         })
         .collect();
-    // The last row is looked up, the others are walked through: let the longest be the last.
-    rows.sort_by_key(|row| row.tosses);
-    (2.0 * at_least(&rows, difference.abs())).min(1.0)
+    // For the last group the tail is looked up, for the others all outcomes are enumerated: the largest is the last.
+    groups.sort_by_key(|group| group.tosses);
+    (2.0 * tail_probability(&groups, difference.abs())).min(1.0)
 }
 
-/// Tosses whose heads count `weight` and whose tails count `−weight`.
-struct Row {
+/// Coin tosses; heads add `weight`, tails subtract it.
+struct WeightedTosses {
     weight: i128,
     tosses: u32,
-    heads: FairTosses,
+    heads: SymmetricBinomial,
 }
 
-/// P(Σ weight · (heads − tails) ≥ `sum`) over all rows.
-fn at_least(rows: &[Row], sum: i128) -> f64 {
-    let Some((row, rest)) = rows.split_first() else {
+/// P(Σ weight · (heads − tails) ≥ `sum`) over all groups.
+fn tail_probability(groups: &[WeightedTosses], sum: i128) -> f64 {
+    let Some((group, rest)) = groups.split_first() else {
         return if sum <= 0 { 1.0 } else { 0.0 };
     };
-    let all_heads = row.weight * i128::from(row.tosses);
+    let all_heads = group.weight * i128::from(group.tosses);
     if rest.is_empty() {
         // weight · (2 heads − tosses) ≥ sum, for the smallest whole number of heads
-        let doubled = 2 * row.weight;
-        return row
+        let doubled = 2 * group.weight;
+        return group
             .heads
             .at_least((sum + all_heads + doubled - 1).div_euclid(doubled));
     }
     (0..)
-        .zip(row.heads.probabilities())
+        .zip(group.heads.probabilities())
         .map(|(heads, probability)| {
-            probability * at_least(rest, sum - (2 * row.weight * heads - all_heads))
+            probability * tail_probability(rest, sum - (2 * group.weight * heads - all_heads))
         })
         .sum()
 }
@@ -172,7 +169,7 @@ mod tests {
     }
 
     #[test]
-    fn mcnemar_is_the_two_sided_sign_test_of_the_uneven_pairs() {
+    fn mcnemar_is_two_sided_sign_test_of_discordant_pairs() {
         // 2 · Σ_{k ≤ min} C(n, k) / 2ⁿ, by hand
         for (only_a, only_b, p) in [
             (0, 0, 1.0),
@@ -192,7 +189,7 @@ mod tests {
     }
 
     #[test]
-    fn the_overall_test_agrees_with_counting_every_toss() {
+    fn overall_p_value_agrees_with_enumeration() {
         let cases = [
             [tally(1, 3, 1, 5), tally(2, 0, 2, 6), tally(0, 4, 1, 5)],
             [tally(1, 3, 1, 5), tally(2, 0, 2, 3), tally(0, 1, 4, 7)],
@@ -237,7 +234,7 @@ mod tests {
     }
 
     #[test]
-    fn a_clear_lead_over_a_whole_evaluation_is_told_apart() {
+    fn clear_lead_is_significant() {
         let lead = |task_lead: u32| tally(300, 150 + task_lead, 150, 400 - task_lead);
         let p = |hit, defend, prepare| {
             let leads = [lead(hit), lead(defend), lead(prepare)];

@@ -1,6 +1,6 @@
 use crate::{
-    board::Placing, episode::MAX_EPISODE_PENALTY, evaluation::overall_score,
-    interval::wilson95_of_rate, tier::tier_within, unique_map::UniqueMap,
+    board::BoardKey, episode::MAX_EPISODE_PENALTY, evaluation::overall_score,
+    interval::wilson95_of_rate, tier::tier_with_bounds, unique_map::UniqueMap,
 };
 use faceoff_types::{Task, TaskWeights, TeamName, Tier, TierBounds};
 use serde::{
@@ -12,7 +12,7 @@ use std::collections::BTreeMap;
 /// Episodes of each task in the qualifying stage (paper §2.2).
 pub const QUALIFYING_EPISODES: u32 = 1000;
 
-/// A team's published numbers of one task, the least that a board needs.
+/// A team's published results in one task, the minimum for a board.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 #[serde(try_from = "RawTaskScore")]
 pub struct TaskScore {
@@ -21,8 +21,8 @@ pub struct TaskScore {
     episodes: u32,
 }
 
-/// The field of a file as it is written; the fields of `results.json` that follow from others may
-/// stand there, so that its `tasks` can be used as they are.
+/// A task's entry in the file, not validated. Derived fields of `results.json` are allowed and ignored, so that its
+/// `tasks` can be copied unchanged.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct RawTaskScore {
@@ -48,27 +48,27 @@ const fn qualifying_episodes() -> u32 {
     QUALIFYING_EPISODES
 }
 
-/// Why numbers are no task's score.
+/// Why a task's results are invalid.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum InvalidTaskScore {
-    /// Not a fraction.
+    /// The success rate is not a fraction.
     #[error(
         "success_rate: expected a fraction from 0 to 1, got {0}{hint}",
         hint = if *.0 > 1.0 && *.0 <= 100.0 { " (divide percentages by 100)" } else { "" }
     )]
     SuccessRate(f64),
-    /// No episodes.
+    /// The number of episodes is 0.
     #[error("episodes: expected at least 1, got 0")]
     NoEpisodes,
-    /// More or fewer points than the rules can give.
+    /// The penalty points are impossible under the rules.
     #[error(
         "penalty_points: expected 0 to {most} ({MAX_EPISODE_PENALTY} for each of {episodes} episodes), got {points}",
         most = MAX_EPISODE_PENALTY * f64::from(*.episodes)
     )]
     PenaltyPoints {
-        /// The points given.
+        /// Penalty points in the file.
         points: f64,
-        /// The episodes they are for.
+        /// Number of episodes that they are the sum of.
         episodes: u32,
     },
 }
@@ -77,7 +77,7 @@ impl TaskScore {
     /// A task's score from its success rate (a fraction), penalty points and number of episodes.
     ///
     /// # Errors
-    /// If a number is not finite or not possible by the rules.
+    /// If a number is not finite or impossible under the rules.
     pub fn new(
         success_rate: f64,
         penalty_points: f64,
@@ -95,7 +95,7 @@ impl TaskScore {
                 episodes,
             });
         }
-        // −0 is a valid 0, but would be written with its sign.
+        // −0 is valid, but would be serialised with its sign.
         Ok(Self {
             success_rate: success_rate + 0.0,
             penalty_points: penalty_points + 0.0,
@@ -104,7 +104,7 @@ impl TaskScore {
     }
 
     fn tier(&self, bounds: &TierBounds) -> Tier {
-        tier_within(bounds, self.penalty_points, self.episodes)
+        tier_with_bounds(bounds, self.penalty_points, self.episodes)
     }
 }
 
@@ -115,12 +115,12 @@ impl TryFrom<RawTaskScore> for TaskScore {
     }
 }
 
-/// `tasks.json`: each team's numbers in the three tasks, in the file's order.
+/// `tasks.json`: the results of each team in the three tasks, in the sequence of the file.
 ///
-/// Reading it refuses a team or a task that occurs twice, an unknown task, a missing task, unknown
-/// fields, and numbers that the rules cannot give.
+/// Deserialisation rejects duplicate teams and tasks, unknown and missing tasks, unknown fields, and numbers that are
+/// impossible under the rules.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct QualifyingSheet {
+pub struct QualifyingScores {
     teams: Vec<(TeamName, TaskScores)>,
 }
 
@@ -145,7 +145,7 @@ impl<'de> Deserialize<'de> for TaskScores {
     }
 }
 
-impl<'de> Deserialize<'de> for QualifyingSheet {
+impl<'de> Deserialize<'de> for QualifyingScores {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         Ok(Self {
             teams: UniqueMap::deserialize(deserializer)?.0,
@@ -156,48 +156,48 @@ impl<'de> Deserialize<'de> for QualifyingSheet {
 /// One row of the qualifying board; field names as in `results.json`.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct QualifyingRow {
-    /// From 1 over the whole board.
+    /// From 1 over the whole board, across tiers.
     pub rank: u32,
-    /// The team.
+    /// Name in the input file.
     pub team: TeamName,
     /// Overall tier: the worst over the tasks.
     pub tier: Tier,
     /// Overall score in percent.
     pub score: f64,
-    /// Overall DS: the maximum over the tasks.
+    /// Overall deployability score (DS): the maximum over the tasks.
     pub penalty_points: f64,
-    /// The tasks.
+    /// Results of the three tasks.
     pub tasks: BTreeMap<Task, TaskRow>,
 }
 
-/// One task of a row.
+/// One task of a [`QualifyingRow`].
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct TaskRow {
-    /// From 1 over the whole board of this task.
+    /// Rank on the board of this task, from 1.
     pub rank: u32,
-    /// The task's tier.
+    /// Tier that follows from the penalty points.
     pub tier: Tier,
     /// Fraction of successes.
     pub success_rate: f64,
-    /// 95 % Wilson interval of the success rate.
+    /// 95 % Wilson interval of the success rate, as fractions.
     pub success_ci95: [f64; 2],
-    /// The task's DS.
+    /// The deployability score (DS) of the task.
     pub penalty_points: f64,
-    /// Episodes played.
+    /// Number of episodes.
     pub episodes: u32,
 }
 
-impl QualifyingSheet {
-    /// The board, best first, ordered as [`overall_board`](crate::overall_board); the place in the
-    /// sheet stands for the time of submission.
+impl QualifyingScores {
+    /// The board, best first, ranked as [`overall_board`](crate::overall_board). The position in the file replaces the
+    /// time of submission.
     #[must_use]
     pub fn board(&self) -> Vec<QualifyingRow> {
-        self.board_by(&TaskWeights::default(), &TierBounds::default())
+        self.board_with(&TaskWeights::default(), &TierBounds::default())
     }
 
-    /// As [`Self::board`], by other weights and bounds than the ruleset's.
+    /// As [`Self::board`], with weights and bounds other than those of the ruleset.
     #[must_use]
-    pub fn board_by(&self, weights: &TaskWeights, bounds: &TierBounds) -> Vec<QualifyingRow> {
+    pub fn board_with(&self, weights: &TaskWeights, bounds: &TierBounds) -> Vec<QualifyingRow> {
         let task_ranks = Task::ALL.map(|task| {
             self.ranks(|scores| {
                 let score = scores.0[&task];
@@ -213,8 +213,8 @@ impl QualifyingSheet {
         });
         let mut rows: Vec<_> = (0..)
             .zip(&self.teams)
-            .map(|(place, (team, scores))| QualifyingRow {
-                rank: ranks[place],
+            .map(|(index, (team, scores))| QualifyingRow {
+                rank: ranks[index],
                 team: team.clone(),
                 tier: scores.tier(bounds),
                 score: scores.score(weights),
@@ -222,7 +222,7 @@ impl QualifyingSheet {
                 tasks: Task::ALL
                     .into_iter()
                     .zip(&task_ranks)
-                    .map(|(task, ranks)| (task, scores.0[&task].row(ranks[place], bounds)))
+                    .map(|(task, ranks)| (task, scores.0[&task].row(ranks[index], bounds)))
                     .collect(),
             })
             .collect();
@@ -230,19 +230,19 @@ impl QualifyingSheet {
         rows
     }
 
-    /// Each team's rank, in the sheet's order.
-    fn ranks(&self, by: impl Fn(&TaskScores) -> (Tier, f64, f64)) -> Vec<u32> {
-        let mut order: Vec<(usize, Placing)> = (0..)
+    /// The rank of each team, in the sequence of the file.
+    fn ranks(&self, key: impl Fn(&TaskScores) -> (Tier, f64, f64)) -> Vec<u32> {
+        let mut keyed: Vec<(usize, BoardKey)> = (0..)
             .zip(&self.teams)
-            .map(|(place, (_, scores))| {
-                let (tier, score, penalty_points) = by(scores);
-                (place, Placing::new(tier, score, penalty_points, 0))
+            .map(|(index, (_, scores))| {
+                let (tier, score, penalty_points) = key(scores);
+                (index, BoardKey::new(tier, score, penalty_points, 0))
             })
             .collect();
-        order.sort_by(|(_, a), (_, b)| a.board_order(b));
-        let mut ranks = vec![0; order.len()];
-        for (rank, (place, _)) in (1..).zip(order) {
-            ranks[place] = rank;
+        keyed.sort_by(|(_, a), (_, b)| a.compare(b));
+        let mut ranks = vec![0; keyed.len()];
+        for (rank, (index, _)) in (1..).zip(keyed) {
+            ranks[index] = rank;
         }
         ranks
     }

@@ -1,20 +1,19 @@
 use crate::board::RankedEntry;
 
-/// Rank groups of a board: neighbours that the day's episodes cannot tell apart.
+/// Rank groups of a board: adjacent rows that are statistically tied with the leader of their group.
 ///
-/// Down the board, the first row opens group 1 and leads it. A row joins the group above it if it
-/// stands in the same tier and `told_apart(leader, row)` is false; otherwise it opens the next group
-/// and leads that one. So every member of a group cannot be told from its leader (two members further
-/// down might be), groups are contiguous, and none spans two tiers. Each pair is tested at 5 %; there
-/// is no correction for the number of teams.
+/// The first row is the leader of group 1. Each next row joins the current group if it is in the same tier and
+/// `differs(leader, row)` is false; otherwise it is the leader of the next group. Therefore all members of a group are
+/// tied with its leader, but not necessarily with each other. Groups are contiguous, and each is within one tier. Each
+/// pair is tested at 5 %, without a correction for the number of teams.
 ///
 /// Returns one group number per row, from 1.
 ///
 /// # Errors
-/// The first error of `told_apart`.
+/// The first error of `differs`.
 pub fn rank_groups<K, E>(
     board: &[RankedEntry<K>],
-    mut told_apart: impl FnMut(&K, &K) -> Result<bool, E>,
+    mut differs: impl FnMut(&K, &K) -> Result<bool, E>,
 ) -> Result<Vec<u32>, E> {
     let mut groups = Vec::with_capacity(board.len());
     let mut group = 0;
@@ -22,7 +21,7 @@ pub fn rank_groups<K, E>(
     for row in board {
         let joins = match leader {
             Some(leader) if leader.tier == row.tier => {
-                !told_apart(&leader.entry.key, &row.entry.key)?
+                !differs(&leader.entry.key, &row.entry.key)?
             }
             _ => false,
         };

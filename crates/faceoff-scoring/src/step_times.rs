@@ -1,34 +1,33 @@
 use faceoff_types::ComputationTimeSummary;
 use std::{cmp::Reverse, collections::BinaryHeap};
 
-/// Computation times of a task's answered steps, in order of play: their sum, their maximum, and for
-/// the 99th percentile the largest hundredth of them. The rest is not kept.
+/// Statistics of the computation times of a task's answered steps, in the sequence of the steps: sum, and for maximum and
+/// 99th percentile the largest hundredth of the times. The others are not stored.
 #[derive(Debug, Clone, Default)]
 pub struct StepTimes {
-    announced: u64,
+    expected_count: u64,
     count: u64,
     sum_s: f64,
-    /// The largest times, the shortest on top; as bits, whose order is that of numbers that are not
-    /// negative.
+    /// The largest times, the shortest on top, as bits: these sort like the numbers if none is negative.
     largest: BinaryHeap<Reverse<u64>>,
 }
 
 impl StepTimes {
-    /// For so many steps: the percentile's rank must be known beforehand.
+    /// Statistics for exactly `steps` times: the rank of the percentile depends on their number.
     #[must_use]
-    pub fn of(steps: u64) -> Self {
+    pub fn for_steps(steps: u64) -> Self {
         Self {
-            announced: steps,
+            expected_count: steps,
             ..Self::default()
         }
     }
 
-    /// Adds a time in seconds, which is not negative.
+    /// Adds a time in seconds; it must not be negative.
     pub fn add(&mut self, time_s: f64) {
         self.count += 1;
         self.sum_s += time_s;
         let time = Reverse(time_s.to_bits());
-        if self.largest.len() < self.kept() {
+        if self.largest.len() < self.retained_count() {
             self.largest.push(time);
         } else if let Some(mut shortest) = self.largest.peek_mut()
             && time < *shortest
@@ -37,26 +36,26 @@ impl StepTimes {
         }
     }
 
-    /// Times that were added.
+    /// Number of times added.
     #[must_use]
     pub const fn count(&self) -> u64 {
         self.count
     }
 
-    /// Those from the percentile's nearest rank on.
-    fn kept(&self) -> usize {
-        let below = (self.announced * 99).div_ceil(100).saturating_sub(1);
-        usize::try_from(self.announced - below).unwrap_or(usize::MAX)
+    /// Number of times from the nearest rank of the percentile to the maximum.
+    fn retained_count(&self) -> usize {
+        let below = (self.expected_count * 99).div_ceil(100).saturating_sub(1);
+        usize::try_from(self.expected_count - below).unwrap_or(usize::MAX)
     }
 
-    /// Mean, 99th percentile (nearest rank) and maximum; zeros when there was no step.
+    /// Mean, 99th percentile (nearest rank) and maximum; zeros without steps.
     ///
     /// # Panics
-    /// If more or fewer times were added than announced: the percentile would be another's.
+    /// If more or fewer times were added than expected: the percentile would be wrong.
     pub(crate) fn summary(&self) -> ComputationTimeSummary {
         assert_eq!(
-            self.count, self.announced,
-            "as many times are added as were announced"
+            self.count, self.expected_count,
+            "as many times are added as are expected"
         );
         let (Some(Reverse(p99)), Some(Reverse(max))) =
             (self.largest.peek(), self.largest.iter().min())
@@ -77,17 +76,17 @@ mod tests {
     use proptest::prelude::*;
 
     fn summary(times_s: &[f64]) -> ComputationTimeSummary {
-        let mut times = StepTimes::of(times_s.len() as u64);
+        let mut times = StepTimes::for_steps(times_s.len() as u64);
         times_s.iter().for_each(|time_s| times.add(*time_s));
         times.summary()
     }
 
     #[test]
-    fn the_99th_percentile_is_the_nearest_rank() {
+    fn percentile_is_nearest_rank() {
         let hundred: Vec<f64> = (1..=100).rev().map(f64::from).collect();
-        let of_hundred = summary(&hundred);
+        let summary_of_hundred = summary(&hundred);
         assert_eq!(
-            (of_hundred.mean, of_hundred.p99, of_hundred.max),
+            (summary_of_hundred.mean, summary_of_hundred.p99, summary_of_hundred.max),
             (50.5, 99.0, 100.0)
         );
         assert_eq!(summary(&[0.5]).p99, 0.5);
@@ -96,8 +95,8 @@ mod tests {
     }
 
     #[test]
-    fn a_hundredth_of_the_times_is_kept() {
-        let mut times = StepTimes::of(1_000_000);
+    fn memory_is_a_hundredth_of_times() {
+        let mut times = StepTimes::for_steps(1_000_000);
         for index in 0..1_000_000u32 {
             times.add(f64::from(index % 7919));
             assert!(times.largest.len() <= 10_001);
@@ -108,8 +107,8 @@ mod tests {
 
     proptest! {
         #[test]
-        fn all_is_as_with_every_time_kept(
-            // Few values give ties, many none.
+        fn summary_equals_that_of_all_times(
+            // Few distinct values give ties, many give none.
             mut times_s in prop_oneof![
                 prop::collection::vec((0u8..5).prop_map(|n| f64::from(n) * 1e-3), 1..1500),
                 prop::collection::vec(0.0..1.0f64, 1..1500),

@@ -1,8 +1,8 @@
 use serde::{Deserialize, Serialize};
 
-/// Which of the episodes 0, 1, … n − 1 of a task were solved, one bit each.
+/// The solved episodes of a task as a bit set over the episodes 0, 1, … n − 1.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(try_from = "Raw")]
+#[serde(try_from = "RawSuccesses")]
 pub struct Successes {
     episodes: u32,
     /// Episode e is bit e % 64 of word e / 64; bits beyond the last episode are 0.
@@ -11,15 +11,15 @@ pub struct Successes {
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Raw {
+struct RawSuccesses {
     episodes: u32,
     words: Vec<u64>,
 }
 
-impl TryFrom<Raw> for Successes {
+impl TryFrom<RawSuccesses> for Successes {
     type Error = &'static str;
 
-    fn try_from(Raw { episodes, words }: Raw) -> Result<Self, Self::Error> {
+    fn try_from(RawSuccesses { episodes, words }: RawSuccesses) -> Result<Self, Self::Error> {
         let used = episodes % 64;
         let stray = words
             .last()
@@ -32,7 +32,7 @@ impl TryFrom<Raw> for Successes {
 }
 
 impl FromIterator<bool> for Successes {
-    /// In order of the episodes.
+    /// Collects one value per episode, in the sequence of the episodes.
     fn from_iter<I: IntoIterator<Item = bool>>(solved: I) -> Self {
         let mut all = Self {
             episodes: 0,
@@ -53,28 +53,28 @@ impl FromIterator<bool> for Successes {
 }
 
 impl Successes {
-    /// Episodes played.
+    /// Number of episodes, solved or not.
     #[must_use]
     pub const fn episodes(&self) -> u32 {
         self.episodes
     }
 
-    /// Episodes solved.
+    /// Number of solved episodes.
     #[must_use]
     pub fn count(&self) -> u32 {
         self.words.iter().map(|word| word.count_ones()).sum()
     }
 
-    /// Whether each episode was solved, in their order.
-    pub(crate) fn episodes_solved(&self) -> impl Iterator<Item = bool> {
+    /// Whether each episode was solved, in the sequence of the episodes.
+    pub(crate) fn iter(&self) -> impl Iterator<Item = bool> {
         (0..self.episodes).map(|episode| {
             let word = self.words.get((episode / 64) as usize);
             word.is_some_and(|word| word >> (episode % 64) & 1 == 1)
         })
     }
 
-    /// Episodes that both solved; those beyond the shorter one's last do not count.
-    pub(crate) fn in_common(&self, other: &Self) -> u32 {
+    /// Number of episodes solved in both sets; surplus episodes of the longer one are ignored.
+    pub(crate) fn count_common(&self, other: &Self) -> u32 {
         self.words
             .iter()
             .zip(&other.words)
@@ -88,13 +88,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn bits_count_what_was_solved_and_survive_being_stored() {
+    fn bits_count_solved_episodes_and_round_trip() {
         for n in [0u32, 1, 63, 64, 65, 1000] {
             let every_third: Successes = (0..n).map(|e| e % 3 == 0).collect();
             let even: Successes = (0..n).map(|e| e % 2 == 0).collect();
             assert_eq!(every_third.episodes(), n);
             assert_eq!(every_third.count(), n.div_ceil(3));
-            assert_eq!(every_third.in_common(&even), n.div_ceil(6));
+            assert_eq!(every_third.count_common(&even), n.div_ceil(6));
             let json = serde_json::to_string(&every_third).unwrap();
             assert_eq!(
                 serde_json::from_str::<Successes>(&json).unwrap(),
@@ -104,7 +104,7 @@ mod tests {
     }
 
     #[test]
-    fn bits_that_belong_to_no_episode_are_refused() {
+    fn bits_without_episode_are_refused() {
         for json in [
             r#"{"episodes":3,"words":[8]}"#,
             r#"{"episodes":3,"words":[]}"#,

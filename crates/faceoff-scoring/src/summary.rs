@@ -8,43 +8,41 @@ use faceoff_types::{EpisodeOutcome, Task, TierBounds};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// What boards and comparisons need of an evaluation's episodes: some hundred bytes per task instead of
-/// all outcomes.
+/// Summary of an evaluation's episodes for boards and comparisons: some hundred bytes per task instead of all outcomes.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct EpisodeSummary {
-    /// By task played.
+    /// One summary for each task of the evaluation.
     pub tasks: BTreeMap<Task, TaskSummary>,
-    /// As [`TaskSummary::tier_change`], of the overall tier: the worst of the tasks'.
+    /// As [`TaskSummary::tier_change`], for the overall tier, which is the worst of the tasks' tiers.
     pub tier_change: f64,
 }
 
-/// What boards and comparisons need of the episodes of one task.
+/// Summary of the episodes of one task for boards and comparisons.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct TaskSummary {
-    /// Which episodes were solved.
+    /// The solved episodes.
     pub successes: Successes,
     /// Penalty points over all episodes.
     pub penalty_points: f64,
-    /// Probability that other episodes of the same kind would put the agent in another tier, by a
-    /// bootstrap of [`TIER_CHANGE_RESAMPLES`](crate::TIER_CHANGE_RESAMPLES) resamples of the episodes'
-    /// penalty points.
+    /// Probability of another tier on other episodes of the same kind, by a bootstrap with
+    /// [`TIER_CHANGE_RESAMPLES`](crate::TIER_CHANGE_RESAMPLES) resamples of the episodes' penalty points.
     pub tier_change: f64,
 }
 
 impl EpisodeSummary {
-    /// Changes whenever the same outcomes would give another summary: one that was stored under
-    /// another version is to be made again. Of runs that are long over the outcomes are gone: a new version has to
-    /// come with a way to make it of the one before.
+    /// Increases whenever the same outcomes would give another summary: summaries stored with another version are
+    /// computed again. The outcomes of old runs are deleted, so a new version must include a migration from the
+    /// previous one.
     pub const VERSION: u32 = 2;
 
-    /// Sums up an evaluation's episodes, given in any order, whose tiers are by these bounds. The same episodes give the same summary,
-    /// to the last bit.
+    /// Summarises an evaluation's episodes in any sequence, with tiers by `bounds`. The same episodes give bit-identical
+    /// summaries.
     ///
     /// # Errors
-    /// If a task's episodes are not 0, 1, … n − 1, each once.
-    pub fn of(outcomes: &[EpisodeOutcome], bounds: &TierBounds) -> Result<Self, PairingError> {
+    /// If the episodes of a task are not 0, 1, … n − 1, each once.
+    pub fn from_outcomes(outcomes: &[EpisodeOutcome], bounds: &TierBounds) -> Result<Self, PairingError> {
         let mut by_task = BTreeMap::<Task, Vec<&EpisodeOutcome>>::new();
         for outcome in outcomes {
             by_task.entry(outcome.task).or_default().push(outcome);
@@ -67,14 +65,14 @@ impl EpisodeSummary {
             let points = episodes.iter().map(|outcome| episode_penalty(outcome));
             (*task, points.collect())
         });
-        let change = TierChange::of(points.collect(), bounds);
+        let change = TierChange::from_points(points.collect(), bounds);
         let tasks = by_task.into_iter().map(|(task, episodes)| {
             let summary = TaskSummary {
                 successes: episodes
                     .iter()
                     .map(|outcome| outcome.success && !has_fault(outcome))
                     .collect(),
-                // Multiples of one half: the sum is exact in any order.
+                // Points are multiples of one half: the sum is exact in any order.
                 penalty_points: episodes
                     .iter()
                     .map(|outcome| episode_penalty(outcome))
@@ -89,7 +87,7 @@ impl EpisodeSummary {
         })
     }
 
-    /// The probability of another tier: of `task`, or overall. A task that was not played has none.
+    /// The probability of another tier in `task`, or overall if it is `None`; 0 for a missing task.
     #[must_use]
     pub fn tier_change_of(&self, task: Option<Task>) -> f64 {
         match task {

@@ -2,20 +2,19 @@ use crate::{
     episode::{episode_penalty, has_fault, time_or_fault_penalty},
     interval::wilson95,
     step_times::StepTimes,
-    tier::tier_within,
+    tier::tier_with_bounds,
 };
 use faceoff_types::{EpisodeOutcome, TaskResult, TierBounds, ViolationCounts};
 
-/// Scores one task from its episodes; its tier is by these bounds.
+/// Scores one task from its episodes, with the tier by `bounds`.
 ///
-/// `step_times` are the computation times of all answered steps in order of the episodes, so that the
-/// result does not depend on how they were cut into shards.
+/// `step_times` are the computation times of all answered steps in the sequence of the episodes, so that the result does
+/// not depend on the division into shards.
 ///
-/// An episode that ended by an agent fault is a failure and counts as a violation of the computation
-/// time.
+/// An episode that ended with an agent fault is a failure and counts as a violation of the computation time.
 ///
 /// # Panics
-/// If `step_times` holds more or fewer times than it was made for.
+/// If `step_times` has more or fewer times than expected.
 #[must_use]
 pub fn score_task(
     outcomes: &[EpisodeOutcome],
@@ -43,7 +42,7 @@ pub fn score_task(
             joint_vel: count(outcomes, |outcome| outcome.violations.joint_vel),
             computation_time: count(outcomes, |outcome| time_or_fault_penalty(outcome) > 0.0),
         },
-        tier: tier_within(bounds, penalty_points, episodes),
+        tier: tier_with_bounds(bounds, penalty_points, episodes),
         steps: outcomes
             .iter()
             .map(|outcome| u64::from(outcome.steps))

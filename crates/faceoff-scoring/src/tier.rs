@@ -1,23 +1,23 @@
 use faceoff_types::{Tier, TierBounds};
 
-/// A deployable agent collects at most this many penalty points per episode on average (paper §2.2:
-/// 500 per 1000 episodes of the qualifying stage, 45 per 90 windows of a game).
+/// Highest mean penalty per episode of a deployable agent, in points (paper §2.2: 500 per 1000 episodes of the
+/// qualifying stage, 45 per 90 windows of a game).
 pub const DEPLOYABLE_POINTS_PER_EPISODE: f64 = 0.5;
-/// An improvable agent collects at most this many (paper §2.2: 1500 per 1000 and 135 per 90).
+/// Highest mean penalty per episode of an improvable agent, in points (paper §2.2: 1500 per 1000 and 135 per 90).
 pub const IMPROVABLE_POINTS_PER_EPISODE: f64 = 1.5;
 
-/// The tier of a deployability score over a number of episodes, or of a game's windows of 500 steps, by the ruleset's
+/// The tier of a deployability score over a number of episodes, or of a game's windows of 500 steps, with the ruleset's
 /// bounds.
 ///
-/// The bounds belong to the better tier. Nothing played, nothing violated: deployable.
+/// A score equal to a bound is in the better tier. Without episodes the tier is deployable.
 #[must_use]
 pub fn tier_of(penalty_points: f64, episodes: u32) -> Tier {
-    tier_within(&TierBounds::default(), penalty_points, episodes)
+    tier_with_bounds(&TierBounds::default(), penalty_points, episodes)
 }
 
-/// As [`tier_of`], by other bounds.
+/// As [`tier_of`], with other bounds.
 #[must_use]
-pub fn tier_within(bounds: &TierBounds, penalty_points: f64, episodes: u32) -> Tier {
+pub fn tier_with_bounds(bounds: &TierBounds, penalty_points: f64, episodes: u32) -> Tier {
     let episodes = f64::from(episodes);
     if penalty_points <= bounds.deployable().as_f64() * episodes {
         Tier::Deployable
@@ -34,7 +34,7 @@ mod tests {
     use Tier::{Deployable, Improvable, NonDeployable};
 
     #[test]
-    fn the_bounds_of_the_paper_belong_to_the_better_tier() {
+    fn bounds_of_the_paper_belong_to_better_tier() {
         for (points, episodes, tier) in [
             (500.0, 1000, Deployable),
             (500.5, 1000, Improvable),
@@ -50,7 +50,7 @@ mod tests {
     }
 
     #[test]
-    fn the_default_bounds_are_the_papers_and_others_are_others() {
+    fn custom_bounds_replace_those_of_the_paper() {
         let bounds = TierBounds::default();
         assert_eq!(bounds.deployable().as_f64(), DEPLOYABLE_POINTS_PER_EPISODE);
         assert_eq!(bounds.improvable().as_f64(), IMPROVABLE_POINTS_PER_EPISODE);
@@ -61,12 +61,12 @@ mod tests {
             (20.0, Improvable),
             (20.5, NonDeployable),
         ] {
-            assert_eq!(tier_within(&strict, points, 100), tier, "{points}");
+            assert_eq!(tier_with_bounds(&strict, points, 100), tier, "{points}");
         }
     }
 
     #[test]
-    fn the_bounds_scale_with_the_number_of_episodes() {
+    fn bounds_scale_with_number_of_episodes() {
         assert_eq!(tier_of(25.0, 50), Deployable);
         assert_eq!(tier_of(25.5, 50), Improvable);
         assert_eq!(tier_of(75.5, 50), NonDeployable);

@@ -1,20 +1,20 @@
-//! How sure a tier is: the bootstrap over episodes.
+//! Uncertainty of a tier: the bootstrap over episodes.
 
-use crate::{draws::Draws, episode::MAX_EPISODE_PENALTY, tier::tier_within};
+use crate::{draws::Draws, episode::MAX_EPISODE_PENALTY, tier::tier_with_bounds};
 use faceoff_types::{Task, Tier, TierBounds};
 use std::collections::BTreeMap;
 
-/// Resamples of the bootstrap: a probability near one half is then known to ±1.1 percentage points
-/// (one standard error), one near the ends better.
+/// Resamples of the bootstrap: the standard error of a probability of one half is 1.1 percentage points, and smaller near
+/// 0 and 1.
 pub const TIER_CHANGE_RESAMPLES: u32 = 2000;
 
-/// Names the stream of draws; another way of drawing is another stream.
+/// Identifies the stream of random draws; a change of the method needs a new name.
 const STREAM: &str = "faceoff-scoring tier change bootstrap 1";
 
-/// Points are multiples of one half, so counted in halves they are small whole numbers.
+/// Highest penalty in half points: points are multiples of one half, so in half points they are small integers.
 const MAX_HALVES: f64 = 2.0 * MAX_EPISODE_PENALTY;
 
-/// Probabilities that a tier would be another one, had the agent met other episodes of the same kind.
+/// Probabilities of another tier on other episodes of the same kind.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct TierChange {
     pub(crate) tasks: BTreeMap<Task, f64>,
@@ -22,41 +22,41 @@ pub(crate) struct TierChange {
 }
 
 impl TierChange {
-    /// From the episodes' penalty points by task.
+    /// Estimates the probabilities from the penalty points of each task's episodes.
     ///
-    /// Each resample draws as many episodes of each task as were played, with replacement. The draws
-    /// come from BLAKE3 keyed with the penalty points themselves, in ascending order: the same
-    /// evaluation always gives the same numbers, whatever the machine, the time or the order of play.
-    pub(crate) fn of(points: BTreeMap<Task, Vec<f64>>, bounds: &TierBounds) -> Self {
+    /// Each resample draws the same number of episodes of each task, with replacement. The draws come from BLAKE3 keyed
+    /// with the penalty points in ascending order. The same evaluation therefore always gives the same numbers,
+    /// regardless of machine, time and sequence of episodes.
+    pub(crate) fn from_points(points: BTreeMap<Task, Vec<f64>>, bounds: &TierBounds) -> Self {
         let mut key = blake3::Hasher::new_derive_key(STREAM);
         let tasks: BTreeMap<Task, TaskPoints> = points
             .into_iter()
             .filter(|(_, points)| !points.is_empty())
             .map(|(task, points)| {
-                let played = TaskPoints::new(&points, *bounds);
+                let task_points = TaskPoints::new(&points, *bounds);
                 key.update(task.as_str().as_bytes());
-                key.update(&u64::from(played.episodes).to_le_bytes());
-                key.update(&played.halves);
-                (task, played)
+                key.update(&u64::from(task_points.episodes).to_le_bytes());
+                key.update(&task_points.halves);
+                (task, task_points)
             })
             .collect();
         let worst = |tiers: &mut dyn Iterator<Item = Tier>| tiers.max().unwrap_or(Tier::Deployable);
-        let observed = worst(&mut tasks.values().map(|played| played.tier));
+        let observed = worst(&mut tasks.values().map(|task| task.tier));
 
         let mut draws = Draws::new(key.finalize_xof());
         let mut changed: BTreeMap<Task, u32> = tasks.keys().map(|task| (*task, 0)).collect();
         let mut changed_overall = 0;
         for _ in 0..TIER_CHANGE_RESAMPLES {
-            let tiers = tasks.iter().map(|(task, played)| {
-                let tier = played.resampled(&mut draws);
-                if tier != played.tier
+            let tiers = tasks.iter().map(|(task, task_points)| {
+                let tier = task_points.resampled_tier(&mut draws);
+                if tier != task_points.tier
                     && let Some(changed) = changed.get_mut(task)
                 {
                     *changed += 1;
                 }
                 tier
             });
-            // every task is drawn, also once the worst tier is known
+            // All tasks are drawn, even if the worst tier is already known.
             let tiers: Vec<Tier> = tiers.collect();
             if worst(&mut tiers.into_iter()) != observed {
                 changed_overall += 1;
@@ -73,7 +73,7 @@ impl TierChange {
     }
 }
 
-/// The episodes of a task.
+/// Penalty points of the episodes of a task.
 struct TaskPoints {
     /// Half points of each episode, ascending.
     halves: Vec<u8>,
@@ -100,9 +100,9 @@ impl TaskPoints {
         }
     }
 
-    fn resampled(&self, draws: &mut Draws) -> Tier {
+    fn resampled_tier(&self, draws: &mut Draws) -> Tier {
         if self.halves.first() == self.halves.last() {
-            // whatever is drawn, it is this one
+            // All episodes have the same points, so all resamples have this tier.
             return self.tier;
         }
         let sum = (0..self.episodes)
@@ -113,7 +113,7 @@ impl TaskPoints {
 }
 
 fn tier_of_halves(bounds: &TierBounds, halves: u64, episodes: u32) -> Tier {
-    tier_within(bounds, halves as f64 / 2.0, episodes)
+    tier_with_bounds(bounds, halves as f64 / 2.0, episodes)
 }
 
 #[cfg(test)]
@@ -122,43 +122,43 @@ mod tests {
     use statrs::distribution::{Binomial, DiscreteCDF};
 
     fn change(points: &[(Task, Vec<f64>)]) -> TierChange {
-        TierChange::of(points.iter().cloned().collect(), &TierBounds::default())
+        TierChange::from_points(points.iter().cloned().collect(), &TierBounds::default())
     }
 
-    /// `broken` of `episodes` cost `points`.
-    fn episodes(episodes: usize, broken: usize, points: f64) -> Vec<f64> {
+    /// The first `violated` of `episodes` have `points`, the others none.
+    fn episodes(episodes: usize, violated: usize, points: f64) -> Vec<f64> {
         (0..episodes)
-            .map(|episode| if episode < broken { points } else { 0.0 })
+            .map(|episode| if episode < violated { points } else { 0.0 })
             .collect()
     }
 
-    /// With one kind of violation a resample's points are binomial, so the bootstrap's limit is known.
+    /// With one kind of violation the points of a resample are binomial, so the limit of the bootstrap is known.
     #[test]
-    fn the_bootstrap_agrees_with_the_exact_distribution() {
+    fn bootstrap_agrees_with_exact_distribution() {
         // 3 points each, 1000 episodes: deployable up to 166, improvable up to 500
-        for (broken, stays_low, stays_high) in [
+        for (violated, stays_low, stays_high) in [
             (160, 0, 166),
             (175, 167, 500),
             (480, 167, 500),
             (520, 501, 1000),
         ] {
-            let exact = Binomial::new(broken as f64 / 1000.0, 1000).unwrap();
+            let exact = Binomial::new(violated as f64 / 1000.0, 1000).unwrap();
             let below = if stays_low == 0 {
                 0.0
             } else {
                 exact.cdf(stays_low - 1)
             };
             let expected = 1.0 - (exact.cdf(stays_high) - below);
-            let got = change(&[(Task::Hit, episodes(1000, broken, 3.0))]).tasks[&Task::Hit];
+            let got = change(&[(Task::Hit, episodes(1000, violated, 3.0))]).tasks[&Task::Hit];
             assert!(
                 (got - expected).abs() < 0.035,
-                "{broken} broken: {got}, exactly {expected}"
+                "{violated} violated: {got}, exactly {expected}"
             );
         }
     }
 
     #[test]
-    fn what_cannot_change_does_not() {
+    fn tier_change_is_zero_for_equal_or_no_points() {
         let clean = change(&[(Task::Hit, vec![0.0; 50]), (Task::Defend, vec![11.0; 50])]);
         assert_eq!(clean.overall, 0.0);
         assert_eq!(clean.tasks[&Task::Hit], 0.0);
@@ -168,18 +168,18 @@ mod tests {
     }
 
     #[test]
-    fn the_worst_task_decides_overall() {
-        let unsure = episodes(50, 8, 3.0); // 24 of 25 points
-        let alone = change(&[(Task::Hit, unsure.clone())]);
+    fn worst_task_decides_overall_tier_change() {
+        let uncertain = episodes(50, 8, 3.0); // 24 of 25 points
+        let alone = change(&[(Task::Hit, uncertain.clone())]);
         assert!((0.2..0.6).contains(&alone.overall), "{alone:?}");
         assert_eq!(alone.overall, alone.tasks[&Task::Hit]);
-        let beside_a_bad_one = change(&[(Task::Hit, unsure), (Task::Defend, vec![11.0; 50])]);
-        assert_eq!(beside_a_bad_one.overall, 0.0);
-        assert!(beside_a_bad_one.tasks[&Task::Hit] > 0.2);
+        let with_bad_task = change(&[(Task::Hit, uncertain), (Task::Defend, vec![11.0; 50])]);
+        assert_eq!(with_bad_task.overall, 0.0);
+        assert!(with_bad_task.tasks[&Task::Hit] > 0.2);
     }
 
     #[test]
-    fn the_same_points_in_any_order_give_the_same_number() {
+    fn tier_change_does_not_depend_on_episode_order() {
         let points = episodes(50, 8, 3.0);
         let mut reversed = points.clone();
         reversed.reverse();

@@ -1,8 +1,8 @@
 use serde::de::{Deserialize, Deserializer, Error, MapAccess, Visitor};
 use std::{collections::BTreeSet, fmt, marker::PhantomData, str::FromStr};
 
-/// A JSON object whose keys are parsed, kept in the file's order, and refused when they occur twice
-/// (JSON readers keep the last one silently, and a board would lose a team).
+/// A JSON object with parsed keys, in the sequence of the file. Duplicate keys are refused: JSON readers silently use the
+/// last one, and a board would lose a team.
 pub(crate) struct UniqueMap<K, V>(pub(crate) Vec<(K, V)>);
 
 impl<'de, K, V> Deserialize<'de> for UniqueMap<K, V>

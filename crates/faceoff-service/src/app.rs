@@ -1,11 +1,11 @@
-//! What handlers share.
+//! The state that all handlers share.
 
 use crate::{
-    config::HttpConfig, kept::Kept, kept_analyses::KeptAnalyses, kept_answers::KeptAnswers,
-    passwords::Passwords, problem::Problem, rates::Rates, standing::KeptRows, summaries::Summaries,
-    uploads::Uploads,
+    config::HttpConfig, tournament_cache::TournamentCache, analysis_cache::AnalysisCache, answer_cache::AnswerCache,
+    passwords::Passwords, problem::Problem, rate_limits::RequestLimiter, aggregated_rows::RowCache, summaries::Summaries,
+    upload_slots::UploadSlots,
 };
-use faceoff_api::views::certainty::CertaintyView;
+use faceoff_api::views::champion_shares::ChampionSharesView;
 use faceoff_notify::Feed;
 use faceoff_scoring::tournament::rating::Ratings;
 use faceoff_store::Store;
@@ -19,63 +19,63 @@ use uuid::Uuid;
 pub struct AppState {
     /// The database and the artifacts.
     pub store: Store,
-    /// As the server was configured.
+    /// The server's configuration.
     pub config: HttpConfig,
-    pub uploads: Arc<Uploads>,
-    /// One permit per upload that is copied to where it stays.
-    pub storing: Semaphore,
-    /// One permit: an archive is made and sent.
-    pub archiving: Arc<Semaphore>,
-    /// Summaries of runs that boards have asked for.
+    pub upload_slots: Arc<UploadSlots>,
+    /// One permit per upload that is being copied into the artifacts.
+    pub artifact_writes: Semaphore,
+    /// One permit: only one season archive is made and sent at a time.
+    pub archive_permit: Arc<Semaphore>,
+    /// Summaries of the runs that boards show.
     pub summaries: Summaries,
-    /// Rows of boards that are chosen among many days.
-    pub rows: KeptRows,
-    pub kept_answers: KeptAnswers,
-    pub ratings: Kept<Ratings>,
-    pub(crate) kept_analyses: KeptAnalyses,
-    pub(crate) certainties: Kept<CertaintyView>,
-    /// Is it known that the season has a tournament? None is ever removed.
+    /// Rows of boards that are aggregated over many days.
+    pub row_cache: RowCache,
+    pub answer_cache: AnswerCache,
+    pub rating_cache: TournamentCache<Ratings>,
+    pub(crate) analysis_cache: AnalysisCache,
+    pub(crate) champion_share_cache: TournamentCache<ChampionSharesView>,
+    /// Whether the season is known to have a tournament. Tournaments are never removed.
     pub has_tournaments: AtomicBool,
-    /// One permit per reader of a game under way.
-    pub watching: Arc<Semaphore>,
-    /// One permit per reader of the stream of events.
-    pub following: Arc<Semaphore>,
-    /// What all of them read.
+    /// One permit per reader of a live game.
+    pub live_reader_permits: Arc<Semaphore>,
+    /// One permit per reader of the event stream.
+    pub event_reader_permits: Arc<Semaphore>,
+    /// Source of all event streams.
     pub feed: Feed,
-    /// Checks passwords, and counts wrong ones.
+    /// Verifies passwords and counts wrong ones.
     pub passwords: Passwords,
-    /// Who has asked how often of late.
-    pub rates: Rates,
-    /// Of this process alone: what was tagged before a restart may have been of another database.
-    pub run: Uuid,
+    /// Counts recent requests by address and by token.
+    pub request_limiter: RequestLimiter,
+    /// Random per process. Part of tags, because the database may be another one after a restart.
+    pub process_id: Uuid,
 }
 
-/// The disk is no faster for more of them, and each holds files open.
-const STORING: usize = 4;
+/// The disk gets no faster by more copies, and each holds files open.
+const MAX_ARTIFACT_WRITES: usize = 4;
 
-/// The state as handlers get it.
+/// The state as handlers receive it.
 pub type App = Arc<AppState>;
 
 impl AppState {
-    /// On a store, with nothing kept yet.
+    /// State with empty caches.
     pub fn new(store: Store, config: HttpConfig) -> Self {
         Self {
-            uploads: Arc::new(Uploads::new(config.limits.team_uploads)),
-            storing: Semaphore::new(STORING),
-            archiving: Arc::new(Semaphore::new(1)),
+            upload_slots: Arc::new(UploadSlots::new(config.limits.team_uploads)),
+            artifact_writes: Semaphore::new(MAX_ARTIFACT_WRITES),
+            archive_permit: Arc::new(Semaphore::new(1)),
             summaries: Summaries::new(store.clone(), config.clock.clone()),
-            rows: KeptRows::new(store.clone()),
-            kept_answers: KeptAnswers::default(),
-            ratings: Kept::default(),
-            kept_analyses: KeptAnalyses::default(),
-            certainties: Kept::default(),
+            row_cache: RowCache::new(store.clone()),
+            answer_cache: AnswerCache::default(),
+            rating_cache: TournamentCache::default(),
+            analysis_cache: AnalysisCache::default(),
+            champion_share_cache: TournamentCache::default(),
             has_tournaments: AtomicBool::new(false),
-            watching: Arc::new(Semaphore::new(config.limits.live_readers)),
-            following: Arc::new(Semaphore::new(config.limits.event_readers)),
+            live_reader_permits: Arc::new(Semaphore::new(config.limits.live_readers)),
+            event_reader_permits: Arc::new(Semaphore::new(config.limits.event_readers)),
             feed: Feed::new(store.clone()),
             passwords: Passwords::default(),
-            rates: Rates::new(config.rates),
-            run: Uuid::now_v7(),
+            request_limiter: RequestLimiter::new(config.rate_limits),
+            process_id: Uuid::now_v7(),
             store,
             config,
         }
@@ -86,9 +86,9 @@ impl AppState {
     /// # Errors
     /// [`ProblemKind::TooManyRequests`](crate::problem::ProblemKind::TooManyRequests).
     pub fn check_rate(&self, token: TokenId) -> Result<(), Problem> {
-        let checked = self.rates.check_token(token);
+        let checked = self.request_limiter.check_token(token);
         if checked.is_err() {
-            self.config.metrics.web().refused("rate");
+            self.config.metrics.web().record_refusal("rate");
         }
         checked
     }

@@ -1,67 +1,66 @@
-//! Who is calling: extractors that turn a token, or the cookie of whoever has signed in, into a person, a team or
-//! the host.
+//! Authentication: extractors that turn a token or a session cookie into a user, a team or the host.
 
 use crate::{
     app::App,
     boxed,
     problem::{Problem, ProblemKind},
-    session, watched,
+    session, request_log,
 };
 use axum::{
     extract::FromRequestParts,
     http::{header, request::Parts},
 };
 use faceoff_api::token::hash_token;
-use faceoff_store::{Actor, Holder, Person, Refusal, StoreError, Team, Token, TokenKind, Who};
+use faceoff_store::{Actor, VerifiedToken, User, TokenRejection, StoreError, Team, Token, TokenKind, Principal};
 use faceoff_types::TeamId;
 use jiff::Timestamp;
 use std::sync::Arc;
 
-/// A caller with a good token.
+/// A caller with a valid token.
 #[derive(Debug, Clone)]
 pub struct Caller {
-    /// What they called with.
+    /// The token or session of the request.
     pub token: Token,
-    pub who: Who,
+    pub principal: Principal,
 }
 
 impl Caller {
-    /// As the log has them.
+    /// The caller as the event log writes it.
     pub const fn actor(&self) -> Actor {
-        match &self.who {
-            Who::Host => Actor::Organiser,
-            Who::Team(team) => Actor::Team(team.id),
-            Who::Organiser(person) | Who::Member(person, _) => Actor::Person(person.id),
+        match &self.principal {
+            Principal::Host => Actor::Organiser,
+            Principal::Team(team) => Actor::Team(team.id),
+            Principal::Organiser(user) | Principal::Member(user, _) => Actor::User(user.id),
         }
     }
 
-    /// Whose team they are, or speak for.
+    /// The team that the caller belongs to or acts for.
     pub const fn team(&self) -> Option<&Team> {
-        match &self.who {
-            Who::Host | Who::Organiser(_) => None,
-            Who::Team(team) | Who::Member(_, team) => Some(team),
+        match &self.principal {
+            Principal::Host | Principal::Organiser(_) => None,
+            Principal::Team(team) | Principal::Member(_, team) => Some(team),
         }
     }
 
-    /// The person, unless it is the host or a team's program.
-    pub const fn person(&self) -> Option<&Person> {
-        match &self.who {
-            Who::Host | Who::Team(_) => None,
-            Who::Organiser(person) | Who::Member(person, _) => Some(person),
+    /// The user; `None` for the host and for a team's API client.
+    pub const fn user(&self) -> Option<&User> {
+        match &self.principal {
+            Principal::Host | Principal::Team(_) => None,
+            Principal::Organiser(user) | Principal::Member(user, _) => Some(user),
         }
     }
 
     /// The host, or an organiser.
     pub const fn is_organiser(&self) -> bool {
-        matches!(self.who, Who::Host | Who::Organiser(_))
+        matches!(self.principal, Principal::Host | Principal::Organiser(_))
     }
 
-    /// Is it theirs, or are they an organiser?
+    /// Whether the caller acts for this team or is an organiser.
     pub fn may_see(&self, team: TeamId) -> bool {
         self.is_organiser() || self.team().is_some_and(|own| own.id == team)
     }
 
-    /// What was `found`, if it is of the caller's `team`; another team's looks like none at all.
+    /// `found`, if the caller may see its `team`; otherwise the same error as if it did not exist.
     pub fn visible<T>(
         &self,
         what: &str,
@@ -75,49 +74,49 @@ impl Caller {
         }
     }
 
-    /// As the log line and a refusal call them.
-    fn named(&self) -> String {
-        match &self.who {
-            Who::Host => "the organiser's".into(),
-            Who::Organiser(person) => format!("that of the organiser “{}”", person.name),
-            Who::Team(team) => format!("that of the team “{}”", team.name),
-            Who::Member(person, team) => {
-                format!("that of “{}” of the team “{}”", person.name, team.name)
+    /// The caller's token, for a refusal.
+    fn description(&self) -> String {
+        match &self.principal {
+            Principal::Host => "the organiser's".into(),
+            Principal::Organiser(user) => format!("that of the organiser “{}”", user.name),
+            Principal::Team(team) => format!("that of the team “{}”", team.name),
+            Principal::Member(user, team) => {
+                format!("that of “{}” of the team “{}”", user.name, team.name)
             }
         }
     }
 }
 
-/// A caller who may organise.
+/// A caller with an organiser's rights.
 #[derive(Debug, Clone)]
 pub struct Organiser(Caller);
 
 impl Organiser {
     /// # Errors
     /// `Forbidden`.
-    pub fn of(caller: Caller) -> Result<Self, Problem> {
+    pub fn new(caller: Caller) -> Result<Self, Problem> {
         if caller.is_organiser() {
             return Ok(Self(caller));
         }
         Err(Problem::new(
             ProblemKind::Forbidden,
             format!(
-                "this request needs the organiser's token; yours is {}",
-                caller.named()
+                "this request needs an organiser's token; yours is {}",
+                caller.description()
             ),
         ))
     }
 
-    /// As the log has them.
+    /// The caller as the event log writes it.
     pub const fn actor(&self) -> Actor {
         self.0.actor()
     }
 }
 
-/// A caller who speaks for a team: a member, or a program with the team's own token.
+/// A caller who acts for a team: a member, or an API client with the team's token.
 #[derive(Debug, Clone)]
 pub struct TeamCaller {
-    /// The team that they speak for.
+    /// The team that the caller acts for.
     pub team: Team,
     caller: Caller,
 }
@@ -125,7 +124,7 @@ pub struct TeamCaller {
 impl TeamCaller {
     /// # Errors
     /// `Forbidden`.
-    pub fn of(caller: Caller) -> Result<Self, Problem> {
+    pub fn new(caller: Caller) -> Result<Self, Problem> {
         match caller.team() {
             Some(team) => Ok(Self {
                 team: team.clone(),
@@ -136,18 +135,18 @@ impl TeamCaller {
                 format!(
                     "this request needs a team's token; yours is {}. Use the token that POST /api/v1/teams \
                      returned, or a member's",
-                    caller.named()
+                    caller.description()
                 ),
             )),
         }
     }
 
-    /// As the log has them.
+    /// The caller as the event log writes it.
     pub const fn actor(&self) -> Actor {
         self.caller.actor()
     }
 
-    /// What was `found`, if it is the team's.
+    /// `found`, if it belongs to the team.
     pub fn visible<T>(
         &self,
         what: &str,
@@ -158,19 +157,19 @@ impl TeamCaller {
     }
 }
 
-/// What came with the request, if anything.
-enum Presented<'a> {
+/// The credential of a request.
+enum Credential<'a> {
     Bearer(&'a str),
     Cookie(&'a str),
 }
 
-fn presented<'a>(parts: &'a Parts) -> Result<Option<Presented<'a>>, Problem> {
+fn credential<'a>(parts: &'a Parts) -> Result<Option<Credential<'a>>, Problem> {
     if let Some(value) = parts.headers.get(header::AUTHORIZATION) {
         return match value.to_str().ok().and_then(|value| value.split_once(' ')) {
             Some((scheme, token))
                 if scheme.eq_ignore_ascii_case("bearer") && !token.trim().is_empty() =>
             {
-                Ok(Some(Presented::Bearer(token.trim())))
+                Ok(Some(Credential::Bearer(token.trim())))
             }
             _ => Err(Problem::new(
                 ProblemKind::Unauthenticated,
@@ -178,71 +177,72 @@ fn presented<'a>(parts: &'a Parts) -> Result<Option<Presented<'a>>, Problem> {
             )),
         };
     }
-    let Some(cookie) = session::cookie(&parts.headers) else {
+    let Some(cookie) = session::session_cookie(&parts.headers) else {
         return Ok(None);
     };
-    // A cookie comes with whatever a foreign page makes the browser send.
+    // Browsers also attach cookies to requests that a page of another site triggers.
     if !parts.method.is_safe() {
-        session::check_own_page(&parts.headers)?;
+        session::check_same_origin(&parts.headers)?;
     }
-    Ok(Some(Presented::Cookie(cookie)))
+    Ok(Some(Credential::Cookie(cookie)))
 }
 
 #[boxed]
-async fn caller(parts: &Parts, app: &App) -> Result<Option<Caller>, Problem> {
-    let (token, kind) = match presented(parts)? {
+async fn authenticate(parts: &Parts, app: &App) -> Result<Option<Caller>, Problem> {
+    let (token, kind) = match credential(parts)? {
         None => return Ok(None),
-        Some(Presented::Bearer(token)) => (token, TokenKind::Key),
-        Some(Presented::Cookie(token)) => (token, TokenKind::Session),
+        Some(Credential::Bearer(token)) => (token, TokenKind::ApiToken),
+        Some(Credential::Cookie(token)) => (token, TokenKind::Session),
     };
     let now = app.config.clock.now();
-    // A look-up by hash is safe although its time may depend on the hash: nobody can choose a
-    // token whose hash begins as another's does.
-    let holder = app.store.holder(hash_token(token), kind, now).await?;
-    let Holder { token, who } = match holder {
-        Ok(holder) => holder,
-        // Who was signed in once is a visitor, with a cookie that says nothing.
+    // The time of a look-up by hash may depend on the hash. That is safe: a token whose hash shares a prefix with
+    // another one cannot be chosen.
+    let verified = app.store.verify_token(hash_token(token), kind, now).await?;
+    let VerifiedToken { token, principal } = match verified {
+        Ok(verified) => verified,
+        // With an expired session cookie the caller is a visitor.
         Err(_) if kind == TokenKind::Session => return Ok(None),
-        Err(refusal) => return Err(refused(refusal)),
+        Err(rejection) => return Err(token_problem(rejection)),
     };
     app.check_rate(token.id)?;
-    note_use(app, &token, now);
-    let caller = Caller { token, who };
-    watched::asked_by(&caller.actor());
+    record_use(app, &token, now);
+    let caller = Caller { token, principal };
+    request_log::record_actor(&caller.actor());
     Ok(Some(caller))
 }
 
-/// Beside the request, which does not wait for it and does not fail with it.
-fn note_use(app: &App, token: &Token, now: Timestamp) {
-    let is_noted = token
+/// In the background: the request neither waits for it nor fails with it.
+fn record_use(app: &App, token: &Token, now: Timestamp) {
+    let is_recorded = token
         .last_used_at
-        .is_some_and(|at| now.duration_since(at) < faceoff_store::LAST_USE);
-    if is_noted {
+        .is_some_and(|at| now.duration_since(at) < faceoff_store::LAST_USE_INTERVAL);
+    if is_recorded {
         return;
     }
     let (app, token) = (Arc::clone(app), token.clone());
     tokio::spawn(async move {
-        if let Err(error) = app.store.token_used(&token, now).await {
-            tracing::debug!(token = %token.id, %error, "the last use of a token is not noted");
+        if let Err(error) = app.store.record_token_use(&token, now).await {
+            tracing::debug!(token = %token.id, %error, "the last use of a token was not recorded");
         }
     });
 }
 
-fn refused(refusal: Refusal) -> Problem {
+fn token_problem(refusal: TokenRejection) -> Problem {
     let shown = |at: Timestamp| at.strftime("%Y-%m-%d %H:%M UTC").to_string();
     let detail = match refusal {
-        Refusal::Unknown => {
-            "the token is not known; it may have been replaced. Make a new one, or ask the organiser for one".to_owned()
+        TokenRejection::Unknown => {
+            "the token is unknown; it may have been replaced. Create a new one, or ask an organiser for one".to_owned()
         }
-        Refusal::WrongKind => {
-            "what came as a token is the cookie of a page; make a token with POST /api/v1/tokens".to_owned()
+        TokenRejection::WrongKind => {
+            "expected an API token, got a session cookie; create a token with POST /api/v1/tokens".to_owned()
         }
-        Refusal::Revoked(at) => format!(
-            "the token was revoked or replaced, or its person has left, by {}. Use another one, or ask the organiser for one",
+        TokenRejection::Revoked(at) => format!(
+            "the token was revoked or replaced, or its user's account closed, by {}. Use another one, or ask an organiser for \
+             one",
             shown(at)
         ),
-        Refusal::Expired(at) => format!(
-            "the token expired on {}. Make a new one, or ask the organiser for one",
+        TokenRejection::Expired(at) => format!(
+            "the token expired on {}. Create a new one, or ask an organiser for one",
             shown(at)
         ),
     };
@@ -253,31 +253,31 @@ impl FromRequestParts<App> for Caller {
     type Rejection = Problem;
 
     async fn from_request_parts(parts: &mut Parts, app: &App) -> Result<Self, Problem> {
-        caller(parts, app).await?.ok_or_else(|| {
+        authenticate(parts, app).await?.ok_or_else(|| {
             Problem::new(
                 ProblemKind::Unauthenticated,
-                "no token came; send the header “Authorization: Bearer TOKEN” with your token, your team's, or the \
-                 organiser's",
+                "expected a token, got none; send the header “Authorization: Bearer TOKEN” with your token, your team's, or \
+                 an organiser's",
             )
         })
     }
 }
 
-/// Whoever calls: also a visitor without a token. A token that is worth nothing is refused all the same.
+/// A caller, or a visitor without a token. An invalid token is refused.
 #[derive(Debug, Clone)]
-pub struct Anybody(pub Option<Caller>);
+pub struct OptionalCaller(pub Option<Caller>);
 
-impl FromRequestParts<App> for Anybody {
+impl FromRequestParts<App> for OptionalCaller {
     type Rejection = Problem;
 
     async fn from_request_parts(parts: &mut Parts, app: &App) -> Result<Self, Problem> {
-        // Another scheme is somebody else's business: a proxy's in front of the pages.
+        // Another scheme is meant for a proxy in front of the pages.
         let header = parts.headers.get(header::AUTHORIZATION);
         let scheme = header.and_then(|value| value.as_bytes().get(..7));
         if scheme.is_some_and(|scheme| !scheme.eq_ignore_ascii_case(b"bearer ")) {
             return Ok(Self(None));
         }
-        caller(parts, app).await.map(Self)
+        authenticate(parts, app).await.map(Self)
     }
 }
 
@@ -285,7 +285,7 @@ impl FromRequestParts<App> for Organiser {
     type Rejection = Problem;
 
     async fn from_request_parts(parts: &mut Parts, app: &App) -> Result<Self, Problem> {
-        Self::of(Caller::from_request_parts(parts, app).await?)
+        Self::new(Caller::from_request_parts(parts, app).await?)
     }
 }
 
@@ -293,6 +293,6 @@ impl FromRequestParts<App> for TeamCaller {
     type Rejection = Problem;
 
     async fn from_request_parts(parts: &mut Parts, app: &App) -> Result<Self, Problem> {
-        Self::of(Caller::from_request_parts(parts, app).await?)
+        Self::new(Caller::from_request_parts(parts, app).await?)
     }
 }

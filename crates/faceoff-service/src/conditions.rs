@@ -1,4 +1,4 @@
-//! On what a request makes its answer depend: the tag of what its client has, and which bytes it wants.
+//! Conditional and range requests (RFC 9110): `If-None-Match`, `If-Range` and `Range`.
 
 use axum::{
     extract::FromRequestParts,
@@ -8,46 +8,46 @@ use axum::{
 use http_range_header::{RangeUnsatisfiableError, parse_range_header};
 use std::{convert::Infallible, ops::Range};
 
-/// The same as long as the answer is. Nothing in it has a meaning in a header.
+/// An entity tag: stays the same as long as the response does. Contains no character with a meaning in a header.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ETag {
-    /// With its quotation marks.
+    /// With quotation marks.
     opaque: String,
-    /// It is not of every byte: the answer may be compressed.
+    /// The tag does not identify every byte: the response may be compressed.
     is_weak: bool,
 }
 
 impl ETag {
-    /// Of the bytes that have this BLAKE3 hash.
-    pub fn of_bytes(blake3: &str) -> Self {
+    /// Tag of content with this BLAKE3 hash.
+    pub fn from_hash(blake3: &str) -> Self {
         Self {
             opaque: format!("\"blake3-{blake3}\""),
             is_weak: false,
         }
     }
 
-    /// Of the bytes of a file that never changes.
-    pub fn of_file(key: &str, bytes: u64) -> Self {
+    /// Tag of a file that never changes.
+    pub fn for_file(key: &str, bytes: u64) -> Self {
         Self {
             is_weak: false,
-            ..Self::of("file", &[key, &bytes.to_string()])
+            ..Self::new("file", &[key, &bytes.to_string()])
         }
     }
 
-    /// Of an answer that follows from all of these, and from nothing else.
-    pub fn of(what: &str, from: &[&str]) -> Self {
+    /// Tag of a response that is a function of these `parts`; `what` distinguishes kinds of responses.
+    pub fn new(kind: &str, parts: &[&str]) -> Self {
         let mut hasher = blake3::Hasher::new();
-        for part in from {
+        for part in parts {
             hasher.update(&(part.len() as u64).to_le_bytes());
             hasher.update(part.as_bytes());
         }
         Self {
-            opaque: format!("\"{what}-{}\"", hasher.finalize()),
+            opaque: format!("\"{kind}-{}\"", hasher.finalize()),
             is_weak: true,
         }
     }
 
-    /// As the header `ETag` has it.
+    /// Value of the header `ETag`.
     pub fn header(&self) -> HeaderValue {
         let weak = if self.is_weak { "W/" } else { "" };
         let text = format!("{weak}{}", self.opaque);
@@ -55,20 +55,20 @@ impl ETag {
     }
 }
 
-/// What a client says of the answer that it wants.
+/// The conditions of a request.
 #[derive(Debug)]
 pub struct Conditions {
     is_get: bool,
     headers: HeaderMap,
 }
 
-/// Which bytes are to be sent.
+/// The part of a file that is to be sent.
 #[derive(Debug, PartialEq, Eq)]
-pub enum Wanted {
-    All,
-    Some(Range<u64>),
-    /// A range that begins behind the end.
-    Nothing,
+pub enum ByteRange {
+    Full,
+    Partial(Range<u64>),
+    /// The range begins behind the end.
+    Unsatisfiable,
 }
 
 impl<S: Sync> FromRequestParts<S> for Conditions {
@@ -89,32 +89,32 @@ impl<S: Sync> FromRequestParts<S> for Conditions {
 }
 
 impl Conditions {
-    /// Is a body asked for, and not its headers alone?
+    /// Whether the response has a body: GET, not HEAD.
     pub const fn is_get(&self) -> bool {
         self.is_get
     }
 
-    /// Takes from a request what its client has.
-    pub fn taken_from(headers: &mut HeaderMap) -> Self {
-        let mut taken = HeaderMap::new();
+    /// Removes `If-None-Match` from a request's headers.
+    pub fn take_from(headers: &mut HeaderMap) -> Self {
+        let mut removed = HeaderMap::new();
         if let header::Entry::Occupied(values) = headers.entry(header::IF_NONE_MATCH) {
             let (name, values) = values.remove_entry_mult();
             for value in values {
-                taken.append(&name, value);
+                removed.append(&name, value);
             }
         }
         Self {
             is_get: true,
-            headers: taken,
+            headers: removed,
         }
     }
 
-    /// Has the client what has this tag, as a header tells it?
-    pub fn have(&self, tag: &HeaderValue) -> bool {
+    /// Whether the client already has the response with this tag.
+    pub fn matches(&self, tag: &HeaderValue) -> bool {
         let tag = tag.to_str().unwrap_or_default();
         let tag = tag.strip_prefix("W/").unwrap_or(tag);
         let known = self.headers.get_all(header::IF_NONE_MATCH).into_iter();
-        // A weak comparison, as the header's is; a comma within a tag makes parts that are none of ours.
+        // A weak comparison, as RFC 9110 requires. Our tags contain no comma, so splitting at commas is safe.
         known
             .filter_map(|value| value.to_str().ok())
             .flat_map(|value| value.split(','))
@@ -123,33 +123,33 @@ impl Conditions {
             .any(|known| known == "*" || known == tag)
     }
 
-    /// The answer to who has it already.
+    /// The response 304, if the client already has the response with this tag.
     pub fn not_modified(&self, tag: &ETag) -> Option<Response> {
-        self.have(&tag.header()).then(|| {
+        self.matches(&tag.header()).then(|| {
             let headers = [(header::ETAG, tag.header())];
             (StatusCode::NOT_MODIFIED, headers).into_response()
         })
     }
 
-    /// Which of so many bytes of what has this tag. Several ranges are answered with everything, which every client has to
-    /// understand; so is a range that is none.
-    pub fn wanted(&self, tag: &ETag, bytes: u64) -> Wanted {
-        // There is no range of what is not sent.
+    /// The requested range of a file of `bytes` bytes. Several ranges and malformed ones give the whole file, which every
+    /// client has to accept.
+    pub fn byte_range(&self, tag: &ETag, bytes: u64) -> ByteRange {
+        // A response to HEAD has no range.
         let Some(range) = self.headers.get(header::RANGE).filter(|_| self.is_get) else {
-            return Wanted::All;
+            return ByteRange::Full;
         };
-        // Another file cannot be continued. (A date is none that we have told.)
-        let goes_on = self.headers.get(header::IF_RANGE);
-        if goes_on.is_some_and(|known| tag.is_weak || known.as_bytes() != tag.opaque.as_bytes()) {
-            return Wanted::All;
+        // A range of another file cannot be continued. (We send no dates, so a date never matches.)
+        let if_range = self.headers.get(header::IF_RANGE);
+        if if_range.is_some_and(|known| tag.is_weak || known.as_bytes() != tag.opaque.as_bytes()) {
+            return ByteRange::Full;
         }
         let Ok(Ok(ranges)) = range.to_str().map(parse_range_header) else {
-            return Wanted::All;
+            return ByteRange::Full;
         };
         match ranges.validate(bytes).as_deref() {
-            Ok([one]) => Wanted::Some(*one.start()..*one.end() + 1),
-            Err(RangeUnsatisfiableError::Unsatisfiable) => Wanted::Nothing,
-            Ok(_) | Err(_) => Wanted::All,
+            Ok([one]) => ByteRange::Partial(*one.start()..*one.end() + 1),
+            Err(RangeUnsatisfiableError::Unsatisfiable) => ByteRange::Unsatisfiable,
+            Ok(_) | Err(_) => ByteRange::Full,
         }
     }
 }
@@ -158,7 +158,7 @@ impl Conditions {
 mod tests {
     use super::*;
 
-    fn asked(headers: &[(header::HeaderName, &str)]) -> Conditions {
+    fn conditions(headers: &[(header::HeaderName, &str)]) -> Conditions {
         let headers = headers
             .iter()
             .map(|(name, value)| (name.clone(), HeaderValue::from_str(value).unwrap()));
@@ -169,50 +169,50 @@ mod tests {
     }
 
     #[test]
-    fn a_range_is_of_the_bytes_that_there_are() {
-        let tag = ETag::of_bytes("00");
-        for (range, wanted) in [
-            ("bytes=0-0", Wanted::Some(0..1)),
-            ("bytes=2-5", Wanted::Some(2..6)),
-            ("bytes=7-", Wanted::Some(7..10)),
-            ("bytes=7-99", Wanted::Some(7..10)),
-            ("bytes=-3", Wanted::Some(7..10)),
-            ("bytes=-99", Wanted::Some(0..10)),
-            ("bytes=10-", Wanted::Nothing),
-            ("bytes=10-12", Wanted::Nothing),
-            ("bytes=-0", Wanted::Nothing),
-            // Several, and what is none at all.
-            ("bytes=0-1,4-5", Wanted::All),
-            ("bytes=5-2", Wanted::All),
-            ("bytes=a-b", Wanted::All),
-            ("bytes=", Wanted::All),
-            ("lines=1-2", Wanted::All),
-            ("bytes=-1-2", Wanted::All),
+    fn range_is_limited_to_file_length() {
+        let tag = ETag::from_hash("00");
+        for (range, expected) in [
+            ("bytes=0-0", ByteRange::Partial(0..1)),
+            ("bytes=2-5", ByteRange::Partial(2..6)),
+            ("bytes=7-", ByteRange::Partial(7..10)),
+            ("bytes=7-99", ByteRange::Partial(7..10)),
+            ("bytes=-3", ByteRange::Partial(7..10)),
+            ("bytes=-99", ByteRange::Partial(0..10)),
+            ("bytes=10-", ByteRange::Unsatisfiable),
+            ("bytes=10-12", ByteRange::Unsatisfiable),
+            ("bytes=-0", ByteRange::Unsatisfiable),
+            // Several ranges, and malformed ones.
+            ("bytes=0-1,4-5", ByteRange::Full),
+            ("bytes=5-2", ByteRange::Full),
+            ("bytes=a-b", ByteRange::Full),
+            ("bytes=", ByteRange::Full),
+            ("lines=1-2", ByteRange::Full),
+            ("bytes=-1-2", ByteRange::Full),
         ] {
-            let asked = asked(&[(header::RANGE, range)]);
-            assert_eq!(asked.wanted(&tag, 10), wanted, "{range}");
+            let request = conditions(&[(header::RANGE, range)]);
+            assert_eq!(request.byte_range(&tag, 10), expected, "{range}");
         }
-        let of_nothing = asked(&[(header::RANGE, "bytes=0-")]);
-        assert_eq!(of_nothing.wanted(&tag, 0), Wanted::Nothing);
+        let empty_file = conditions(&[(header::RANGE, "bytes=0-")]);
+        assert_eq!(empty_file.byte_range(&tag, 0), ByteRange::Unsatisfiable);
     }
 
     #[test]
-    fn a_range_goes_on_only_in_the_same_file() {
-        let tag = ETag::of_bytes("00");
-        for (known, wanted) in [
-            ("\"blake3-00\"", Wanted::Some(5..10)),
-            ("\"blake3-01\"", Wanted::All),
-            ("W/\"blake3-00\"", Wanted::All),
-            ("Wed, 21 Oct 2015 07:28:00 GMT", Wanted::All),
+    fn range_continues_only_the_same_file() {
+        let tag = ETag::from_hash("00");
+        for (known, expected) in [
+            ("\"blake3-00\"", ByteRange::Partial(5..10)),
+            ("\"blake3-01\"", ByteRange::Full),
+            ("W/\"blake3-00\"", ByteRange::Full),
+            ("Wed, 21 Oct 2015 07:28:00 GMT", ByteRange::Full),
         ] {
-            let asked = asked(&[(header::RANGE, "bytes=5-"), (header::IF_RANGE, known)]);
-            assert_eq!(asked.wanted(&tag, 10), wanted, "{known}");
+            let request = conditions(&[(header::RANGE, "bytes=5-"), (header::IF_RANGE, known)]);
+            assert_eq!(request.byte_range(&tag, 10), expected, "{known}");
         }
     }
 
     #[test]
-    fn who_has_it_is_told_so() {
-        let tag = ETag::of_bytes("00");
+    fn matching_tag_gives_not_modified() {
+        let tag = ETag::from_hash("00");
         for (known, has_it) in [
             ("\"blake3-00\"", true),
             ("W/\"blake3-00\"", true),
@@ -221,13 +221,13 @@ mod tests {
             ("\"blake3-01\"", false),
             ("blake3-00", false),
         ] {
-            let asked = asked(&[(header::IF_NONE_MATCH, known)]);
-            assert_eq!(asked.not_modified(&tag).is_some(), has_it, "{known}");
+            let request = conditions(&[(header::IF_NONE_MATCH, known)]);
+            assert_eq!(request.not_modified(&tag).is_some(), has_it, "{known}");
         }
     }
 
     #[test]
-    fn parts_of_a_tag_do_not_run_together() {
-        assert_ne!(ETag::of("a", &["b", "c"]), ETag::of("a", &["bc", ""]));
+    fn tag_distinguishes_boundaries_of_parts() {
+        assert_ne!(ETag::new("a", &["b", "c"]), ETag::new("a", &["bc", ""]));
     }
 }

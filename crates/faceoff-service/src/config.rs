@@ -1,30 +1,30 @@
-//! How the web side is configured.
+//! Configuration of the web server.
 
-use crate::{link_key::LinkKey, offer::Offer, pace::LeastRate, rates::RateLimits};
+use crate::{link_key::LinkKey, agent_resources::AgentResources, transfer_rate::MinTransferRate, rate_limits::RateLimits};
 use faceoff_metrics::{Metrics, Process};
 use faceoff_notify::WebhookRules;
 use faceoff_store::UploadQuota;
 use faceoff_types::{Clock, TimeLimits};
 use std::{path::PathBuf, time::Duration};
 
-/// How much the web side takes on at a time, and how long it waits.
+/// Limits and timeouts of the web server.
 #[derive(Debug, Clone, Copy)]
 pub struct HttpLimits {
-    /// Requests being answered at the same time; more are told to come back.
+    /// Requests that are handled at the same time; further ones get 503.
     pub requests: usize,
     /// Uploads of one team at the same time; each one writes to disk.
     pub team_uploads: usize,
-    /// Readers of games under way at the same time, each of whom holds a connection.
+    /// Readers of live games at the same time; each one holds a connection.
     pub live_readers: usize,
-    /// Readers of the stream of events at the same time, each of whom holds a connection.
+    /// Readers of the event stream at the same time; each one holds a connection.
     pub event_readers: usize,
-    /// Longest time to answer a request that is no upload.
-    pub answer: Duration,
-    /// How fast the body of an upload must come.
-    pub upload_rate: LeastRate,
-    /// Uploads of one team that may wait for their smoke run.
+    /// Longest time of a response that is not an upload or an archive.
+    pub request_timeout: Duration,
+    /// Minimum transfer rate of an upload.
+    pub min_upload_rate: MinTransferRate,
+    /// Submissions of one team that may wait for their validation run.
     pub pending_submissions: usize,
-    /// How much a team may upload and keep.
+    /// Bytes that a team may upload per day and store.
     pub upload_quota: UploadQuota,
 }
 
@@ -35,8 +35,8 @@ impl Default for HttpLimits {
             team_uploads: 2,
             live_readers: 256,
             event_readers: 512,
-            answer: Duration::from_secs(30),
-            upload_rate: LeastRate {
+            request_timeout: Duration::from_secs(30),
+            min_upload_rate: MinTransferRate {
                 bytes_per_s: 16 << 10,
                 grace: Duration::from_secs(30),
             },
@@ -46,41 +46,41 @@ impl Default for HttpLimits {
     }
 }
 
-/// What evaluates, as far as the web side tells of it.
+/// What runs evaluations, as far as the web server shows it.
 #[derive(Debug, Clone)]
 pub struct Capacity {
-    /// Units of work that the server's own slots play at the same time; 0: others play.
+    /// Jobs that the server's own slots run in parallel; 0: only remote workers run jobs.
     pub slots: u32,
-    /// How long an agent may take.
+    /// Time limits of agents.
     pub time: TimeLimits,
-    /// The runtimes that agents may name.
+    /// Runtimes that agents may name.
     pub runtimes: Vec<String>,
 }
 
-/// What [`router`](crate::router) needs besides the store.
+/// Everything that the handlers need besides the store.
 #[derive(Debug, Clone)]
 pub struct HttpConfig {
     /// Largest packed bundle, in bytes.
     pub max_bundle_bytes: u64,
-    /// Where people reach the server, without a slash at its end; links begin with it, and by https cookies are sent
-    /// over TLS only. None: links are paths.
+    /// The server's public URL without a trailing slash. Links begin with it; if it begins with https, cookies are sent
+    /// over TLS only. `None`: links are paths.
     pub public_url: Option<String>,
-    /// Existing folder for uploads under way, on a disk with room for some bundles.
+    /// Existing folder for unfinished uploads, on a disk with space for some bundles.
     pub upload_dir: PathBuf,
-    /// Stamps what is written, and tells which day it is.
+    /// Time of everything that is stored, and the current day.
     pub clock: Clock,
     pub limits: HttpLimits,
-    /// Where webhooks may be.
+    /// Which addresses webhooks may have.
     pub webhooks: WebhookRules,
-    /// Tells how long what waits will take.
+    /// For forecasts of durations.
     pub capacity: Capacity,
-    /// What agents find here.
-    pub offer: Offer,
-    /// How often somebody may ask.
-    pub rates: RateLimits,
-    /// What links are signed with.
+    /// Runtimes and resource limits of agents.
+    pub agent_resources: AgentResources,
+    /// Rate limits of requests.
+    pub rate_limits: RateLimits,
+    /// Signs download links.
     pub link_key: LinkKey,
     pub metrics: Metrics,
-    /// What the operating system counts of this process.
+    /// Resource usage of this process, from the operating system.
     pub process: fn() -> Process,
 }

@@ -1,18 +1,18 @@
-//! Tables for spreadsheets.
+//! CSV tables (RFC 4180).
 
 use axum::{
     http::header,
     response::{IntoResponse, Response},
 };
 
-/// RFC 7111, with the line of names.
+/// With the parameter of RFC 7111: the first line is a header.
 pub const MEDIA_TYPE: &str = "text/csv; charset=utf-8; header=present";
 
-/// Lines of fields; quoted where they must be.
+/// CSV lines; fields are quoted where necessary.
 pub struct Table(String);
 
 impl Table {
-    /// With the line of names.
+    /// A table with a header line.
     pub fn new(columns: &[&str]) -> Self {
         let mut table = Self(String::new());
         table.row(columns.iter().map(|column| (*column).to_owned()));
@@ -35,7 +35,7 @@ impl Table {
         self.0.push_str("\r\n");
     }
 
-    /// As a file of this name.
+    /// A response that downloads the table as a file.
     pub fn into_download(self, name: &'static str) -> Response {
         let headers = [
             (header::CONTENT_TYPE, MEDIA_TYPE.to_owned()),
@@ -52,15 +52,15 @@ impl Table {
     }
 }
 
-/// A stranger's words: what a spreadsheet would take for a formula begins with an apostrophe.
-pub fn words(text: &str) -> String {
+/// Text from users. A leading apostrophe keeps a spreadsheet from evaluating it as a formula.
+pub fn escape_formula(text: &str) -> String {
     match text.chars().next() {
         Some('=' | '+' | '-' | '@' | '\t' | '\r') => format!("'{text}"),
         _ => text.to_owned(),
     }
 }
 
-/// Of what there may be none.
+/// An empty field for `None`.
 pub fn or_empty(value: Option<impl ToString>) -> String {
     value.map(|value| value.to_string()).unwrap_or_default()
 }
@@ -70,11 +70,11 @@ mod tests {
     use super::*;
 
     #[test]
-    fn fields_are_quoted_and_formulas_are_words() {
+    fn fields_are_quoted_and_formulas_escaped() {
         let mut table = Table::new(&["a", "b"]);
-        table.row([words("=1+1"), "x, \"y\"\nz".to_owned()]);
+        table.row([escape_formula("=1+1"), "x, \"y\"\nz".to_owned()]);
         let text = String::from_utf8(table.into_bytes()).unwrap();
         assert_eq!(text, "a,b\r\n'=1+1,\"x, \"\"y\"\"\nz\"\r\n");
-        assert_eq!(words("plain"), "plain");
+        assert_eq!(escape_formula("plain"), "plain");
     }
 }

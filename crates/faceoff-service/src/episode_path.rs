@@ -1,4 +1,4 @@
-//! An episode, as paths name it.
+//! Path parameters that identify an episode.
 
 use crate::{
     extract::PathParams,
@@ -24,9 +24,9 @@ impl<S: Send + Sync> FromRequestParts<S> for EpisodePath {
         let PathParams([id, task, episode]) =
             PathParams::<String, 3>::from_request_parts(parts, state).await?;
         Ok(Self {
-            id: parsed(&id, "evaluation")?,
-            task: parsed(&task, "task")?,
-            episode: parsed(&episode, "episode")?,
+            id: parse(&id, "evaluation")?,
+            task: parse(&task, "task")?,
+            episode: parse(&episode, "episode")?,
         })
     }
 }
@@ -35,7 +35,7 @@ impl<S: Send + Sync> FromRequestParts<S> for EpisodePath {
 #[derive(Debug, Clone, Copy)]
 pub struct AblationPath {
     pub submission: SubmissionId,
-    /// Of which of the ablation's profiles.
+    /// The ablation's profile.
     pub profile: Profile,
     pub task: Task,
     /// Its number, from 0.
@@ -49,16 +49,16 @@ impl<S: Send + Sync> FromRequestParts<S> for AblationPath {
         let PathParams([id, profile, task, episode]) =
             PathParams::<String, 4>::from_request_parts(parts, state).await?;
         Ok(Self {
-            submission: parsed(&id, "submission")?,
-            profile: parsed(&profile, "profile")?,
-            task: parsed(&task, "task")?,
-            episode: parsed(&episode, "episode")?,
+            submission: parse(&id, "submission")?,
+            profile: parse(&profile, "profile")?,
+            task: parse(&task, "task")?,
+            episode: parse(&episode, "episode")?,
         })
     }
 }
 
-/// What cannot be one is none.
-fn parsed<T: FromStr<Err: Display>>(text: &str, what: &str) -> Result<T, Problem> {
+/// A parameter that cannot be parsed gives 404, as an unknown one does.
+fn parse<T: FromStr<Err: Display>>(text: &str, what: &str) -> Result<T, Problem> {
     text.parse().map_err(|error: T::Err| {
         Problem::new(ProblemKind::NotFound, format!("{what} {text:?}: {error}"))
     })

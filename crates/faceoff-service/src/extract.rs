@@ -1,4 +1,4 @@
-//! Extractors whose rejections are problems that name the place.
+//! Extractors whose rejections are problems that name the wrong field.
 
 use crate::{
     boxed,
@@ -18,7 +18,7 @@ use serde::de::DeserializeOwned;
 use serde_json::Value;
 use std::{fmt::Display, str::FromStr};
 
-/// Largest JSON body; the largest legitimate one has some hundred bytes.
+/// Largest JSON body; the largest legitimate one has a few hundred bytes.
 pub const MAX_JSON_BYTES: usize = 64 * 1024;
 
 #[derive(Debug)]
@@ -36,7 +36,7 @@ where
     }
 }
 
-/// A JSON body that may be left out altogether.
+/// A JSON body that may be empty.
 #[derive(Debug)]
 pub struct OptionalJson<T>(pub T);
 
@@ -56,7 +56,7 @@ where
     }
 }
 
-/// The body, and whether it says that it is JSON.
+/// The body, and whether its media type is JSON.
 #[boxed]
 async fn read(request: Request) -> Result<(bool, Bytes), Problem> {
     let is_json = request
@@ -75,7 +75,7 @@ fn too_large(rejection: &BytesRejection) -> Problem {
     if rejection.status() == StatusCode::PAYLOAD_TOO_LARGE {
         Problem::new(
             ProblemKind::TooLarge,
-            format!("the body of this request is at most {MAX_JSON_BYTES} bytes of JSON"),
+            format!("expected at most {MAX_JSON_BYTES} bytes of JSON, got more; send a smaller body"),
         )
         .with("limit_bytes", MAX_JSON_BYTES)
     } else {
@@ -96,17 +96,17 @@ fn parse<T: DeserializeOwned>((is_json, bytes): (bool, Bytes)) -> Result<T, Prob
             "expected a JSON body; send it with the header “Content-Type: application/json”",
         ));
     }
-    let does_not_fit = |error| {
+    let invalid_content = |error| {
         Problem::new(
             ProblemKind::InvalidContent,
             format!("the JSON does not fit: {error}"),
         )
     };
     let mut deserializer = serde_json::Deserializer::from_slice(&bytes);
-    // Many a type's own message does not say which field it is about.
+    // Error messages of some types do not name the field.
     let parsed = serde_path_to_error::deserialize(&mut deserializer).map_err(|error| {
         if error.inner().is_data() {
-            does_not_fit(error)
+            invalid_content(error)
         } else {
             Problem::new(
                 ProblemKind::InvalidRequest,
@@ -122,11 +122,11 @@ fn parse<T: DeserializeOwned>((is_json, bytes): (bool, Bytes)) -> Result<T, Prob
             format!("the body is not valid JSON: {error}"),
         )
     })?;
-    objects_only::check::<T>(&value).map_err(does_not_fit)?;
+    objects_only::check::<T>(&value).map_err(invalid_content)?;
     Ok(parsed)
 }
 
-/// A form of one of our own pages.
+/// A form submitted by a page of this server.
 #[derive(Debug)]
 pub struct PageForm<T>(pub T);
 
@@ -138,18 +138,18 @@ where
     type Rejection = Problem;
 
     async fn from_request(request: Request, state: &S) -> Result<Self, Problem> {
-        session::check_own_page(request.headers())?;
+        session::check_same_origin(request.headers())?;
         let Form(form) = Form::from_request(request, state)
             .await
             .map_err(|rejection| {
-                let detail = format!("the form is not understood: {}", rejection.body_text());
+                let detail = format!("the form is malformed: {}", rejection.body_text());
                 Problem::new(ProblemKind::InvalidRequest, detail)
             })?;
         Ok(Self(form))
     }
 }
 
-/// The parameters of the path, in its order.
+/// The path parameters, in order.
 #[derive(Debug)]
 pub struct PathParams<T, const N: usize>(pub [T; N]);
 
@@ -180,12 +180,12 @@ async fn path_params(parts: &mut Parts) -> Result<Vec<String>, Problem> {
     Ok(params.iter().map(|(_, text)| text.to_owned()).collect())
 }
 
-/// What cannot be an id is the id of nothing.
+/// An id that cannot be parsed gives 404, as an unknown one does.
 fn no_such_path(why: &dyn Display) -> Problem {
     Problem::new(ProblemKind::NotFound, why.to_string())
 }
 
-/// The single parameter of the path.
+/// The only path parameter.
 #[derive(Debug)]
 pub struct PathParam<T>(pub T);
 
@@ -197,8 +197,8 @@ where
     type Rejection = Problem;
 
     async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self, Problem> {
-        let PathParams([one]) = PathParams::from_request_parts(parts, state).await?;
-        Ok(Self(one))
+        let PathParams([param]) = PathParams::from_request_parts(parts, state).await?;
+        Ok(Self(param))
     }
 }
 

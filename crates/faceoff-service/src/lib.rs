@@ -1,40 +1,40 @@
-//! What API and pages both do: who calls, what they may see, how an answer is made from store and scoring, what changes
-//! the season, and how it is refused.
+//! The logic that API and pages share: authentication, visibility, response bodies built from store and scoring, changes
+//! of the season, and error responses.
 //!
-//! It unpacks no bundle, runs no agent and computes no score: those are the workers' and `faceoff-scoring`'s. It reads
-//! no clock and no environment that it was not given, and knows no route.
+//! This crate unpacks no bundle, runs no agent and computes no score; workers and `faceoff-scoring` do. It reads no clock
+//! and no environment that is not passed in, and defines no routes.
 
-pub mod acts;
+pub mod services;
 pub mod app;
-pub mod archived;
+pub mod archive_contents;
 pub mod auth;
 pub mod conditions;
 pub mod config;
 pub mod csv;
-pub mod ending;
+pub mod shutdown;
 pub mod episode_path;
 pub mod extract;
-mod kept;
-mod kept_analyses;
-pub mod kept_answers;
+mod tournament_cache;
+mod analysis_cache;
+pub mod answer_cache;
 pub mod link_key;
 pub mod network;
-pub mod offer;
-pub mod pace;
+pub mod agent_resources;
+pub mod transfer_rate;
 pub mod passwords;
 pub mod problem;
-pub mod rates;
+pub mod rate_limits;
 pub mod release;
-pub mod room;
+pub mod free_space;
 pub mod session;
-mod standing;
+mod aggregated_rows;
 mod summaries;
 pub mod text;
 pub mod timeouts;
-mod uploads;
+mod upload_slots;
 pub mod viewer;
 pub mod views;
-pub mod watched;
+pub mod request_log;
 
-/// What others await is boxed: the body of an `async fn` is compiled by each crate that awaits it, and by none before.
+/// Boxes the future of an `async fn` that other crates await. Without it each of these crates would compile the body.
 pub(crate) use async_recursion::async_recursion as boxed;

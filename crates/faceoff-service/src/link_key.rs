@@ -1,25 +1,25 @@
-//! What links and grants are signed with.
+//! The key that signs download links and grants.
 
 use faceoff_wire::grant::GrantKey;
 use std::fmt;
 
-/// What links of this server are signed with, beside their maker's token: whoever has a copy of the database alone can sign
-/// none.
+/// Signs download links, together with the hash of their maker's token: a copy of the database alone cannot sign any.
+/// The key of grants derives from it.
 #[derive(Clone)]
 pub struct LinkKey([u8; 32]);
 
 impl LinkKey {
-    /// A new one.
+    /// A new random key.
     ///
     /// # Errors
-    /// If the operating system has no randomness.
+    /// The operating system provides no randomness.
     pub fn generate() -> Result<Self, getrandom::Error> {
         let mut key = [0; 32];
         getrandom::fill(&mut key)?;
         Ok(Self(key))
     }
 
-    /// One that was kept as [`to_hex`](Self::to_hex); `None` of anything else.
+    /// Reads the format of [`to_hex`](Self::to_hex); `None` for anything else.
     #[must_use]
     pub fn from_hex(text: &str) -> Option<Self> {
         let mut key = [0; 32];
@@ -27,16 +27,16 @@ impl LinkKey {
         Some(Self(key))
     }
 
-    /// As 64 hexadecimal digits, to be kept secret.
+    /// 64 hexadecimal digits; secret.
     #[must_use]
     pub fn to_hex(&self) -> String {
         hex::encode(self.0)
     }
 
-    /// What grants of work orders are sealed with.
+    /// The key that seals grants of remote jobs.
     #[must_use]
-    pub fn of_grants(&self) -> GrantKey {
-        GrantKey::of(&self.0)
+    pub fn grant_key(&self) -> GrantKey {
+        GrantKey::from_secret(&self.0)
     }
 
     pub const fn bytes(&self) -> &[u8; 32] {

@@ -1,19 +1,19 @@
-//! Who counts as one, where somebody's share is counted.
+//! The network of an address, for limits per client.
 
 use std::net::{IpAddr, Ipv4Addr};
 
-/// Whoever has one IPv6 address has all 2⁶⁴ of its network, so these count as one.
+/// Addresses that count as one client. A client with one IPv6 address usually has all 2⁶⁴ of its network.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Network {
-    /// All of an address of version 4.
+    /// A whole IPv4 address.
     V4(Ipv4Addr),
-    /// The first half of an address of version 6.
+    /// The first 64 bits of an IPv6 address.
     V6([u16; 4]),
 }
 
 impl Network {
-    /// Where an address is.
-    pub fn of(address: IpAddr) -> Self {
+    /// The network of an address.
+    pub fn from_address(address: IpAddr) -> Self {
         match address.to_canonical() {
             IpAddr::V4(address) => Self::V4(address),
             IpAddr::V6(address) => {

@@ -1,7 +1,8 @@
-//! Passwords: hashed by Argon2id, and tried out slowly.
+//! Passwords: hashed by Argon2id, with a delay after wrong ones.
 //!
-//! A hash takes memory and tens of milliseconds, so that few are computed at a time; and whoever guesses a person's
-//! password has ever longer to wait. That delays whoever knows it, too: keys, sessions and links are not affected.
+//! A hash takes memory and tens of milliseconds, so only few are computed at a time. After several wrong passwords for
+//! a user each further attempt has to wait longer. The delay also affects the user; tokens, sessions and links work
+//! meanwhile.
 
 use crate::{
     boxed,
@@ -11,7 +12,7 @@ use argon2::{
     Argon2,
     password_hash::{PasswordHasher, PasswordVerifier, phc::PasswordHash},
 };
-use faceoff_types::PersonId;
+use faceoff_types::UserId;
 use jiff::{SignedDuration, Timestamp};
 use std::{
     collections::HashMap,
@@ -21,36 +22,36 @@ use tokio::sync::Semaphore;
 
 /// Shortest password, in characters.
 pub const MIN_CHARS: usize = 12;
-/// Longest one, in bytes: hashing takes time with the length.
+/// Longest password, in bytes: the time of hashing grows with the length.
 const MAX_BYTES: usize = 1024;
-/// Hashes at a time; each takes 19 MiB.
-const AT_A_TIME: usize = 2;
-/// Who may wait for their turn.
-const WAITING: usize = 16;
-/// Wrong passwords of a person that cost no wait.
-const FREE: u32 = 5;
-/// The wait after one more, which doubles with each.
+/// Hashes that are computed in parallel; each takes 19 MiB.
+const MAX_PARALLEL: usize = 2;
+/// Requests that may wait for a hash.
+const MAX_WAITING: usize = 16;
+/// Wrong passwords for a user without a delay.
+const FREE_ATTEMPTS: u32 = 5;
+/// Delay after one more; doubles with each further one.
 const FIRST_WAIT: SignedDuration = SignedDuration::from_secs(2);
 const LONGEST_WAIT: SignedDuration = SignedDuration::from_mins(5);
 
-/// The places for hashing, and who has guessed how often.
+/// Limits concurrent hashing, and counts wrong passwords by user.
 #[derive(Debug)]
 pub struct Passwords {
-    places: Semaphore,
+    hashing: Semaphore,
     waiting: Semaphore,
-    wrong: Mutex<HashMap<PersonId, Wrong>>,
+    failures: Mutex<HashMap<UserId, Failures>>,
 }
 
-/// Wrong passwords since the last right one.
+/// Wrong passwords since the last correct one.
 #[derive(Debug, Clone, Copy)]
-struct Wrong {
+struct Failures {
     count: u32,
     last: Timestamp,
 }
 
-impl Wrong {
+impl Failures {
     fn wait_until(self) -> Timestamp {
-        let Some(doublings) = self.count.checked_sub(FREE) else {
+        let Some(doublings) = self.count.checked_sub(FREE_ATTEMPTS) else {
             return Timestamp::MIN;
         };
         let factor = 1_i32.checked_shl(doublings).unwrap_or(i32::MAX).max(1);
@@ -62,14 +63,14 @@ impl Wrong {
 impl Default for Passwords {
     fn default() -> Self {
         Self {
-            places: Semaphore::new(AT_A_TIME),
-            waiting: Semaphore::new(WAITING),
-            wrong: Mutex::new(HashMap::new()),
+            hashing: Semaphore::new(MAX_PARALLEL),
+            waiting: Semaphore::new(MAX_WAITING),
+            failures: Mutex::new(HashMap::new()),
         }
     }
 }
 
-/// Refuses a password that would be too easily guessed, or takes too long.
+/// Refuses a password that is too short, or too long to hash.
 pub fn check(password: &str) -> Result<(), Problem> {
     let chars = password.chars().count();
     if chars < MIN_CHARS || password.len() > MAX_BYTES {
@@ -82,18 +83,18 @@ pub fn check(password: &str) -> Result<(), Problem> {
 }
 
 impl Passwords {
-    /// One after another, off the threads that answer requests.
-    async fn hashing<T: Send + 'static>(
+    /// Runs `work` on a blocking thread, [`MAX_PARALLEL`] at a time.
+    async fn run_hashing<T: Send + 'static>(
         &self,
         work: impl FnOnce() -> T + Send + 'static,
     ) -> Result<T, Problem> {
         let Ok(_waiting) = self.waiting.try_acquire() else {
             return Err(Problem::new(
                 ProblemKind::Busy,
-                "many people sign in at the moment; try again in 2 s",
+                "too many sign-ins at the moment; try again in 2 s",
             ));
         };
-        let _place = self.places.acquire().await.map_err(Problem::internal)?;
+        let _permit = self.hashing.acquire().await.map_err(Problem::internal)?;
         tokio::task::spawn_blocking(work)
             .await
             .map_err(Problem::internal)
@@ -103,52 +104,52 @@ impl Passwords {
     #[boxed]
     pub async fn hash(&self, password: String) -> Result<String, Problem> {
         check(&password)?;
-        let hashed = self.hashing(move || {
+        let hashed = self.run_hashing(move || {
             let hash = Argon2::default().hash_password(password.as_bytes());
             hash.map(|hash| hash.to_string())
         });
         hashed.await?.map_err(Problem::internal)
     }
 
-    /// Is it the password of whoever has this name? `known` is that person and the PHC string of theirs. Takes as long
-    /// if there is no such person.
+    /// Verifies a password; returns the user if it is correct. `known` is the user and their PHC string. Takes the same
+    /// time if there is no such user.
     #[boxed]
     pub async fn verify(
         &self,
-        known: Option<(PersonId, String)>,
+        known: Option<(UserId, String)>,
         password: String,
         now: Timestamp,
-    ) -> Result<Option<PersonId>, Problem> {
+    ) -> Result<Option<UserId>, Problem> {
         if let Some((id, _)) = &known {
             self.check_wait(*id, now)?;
         }
         let (id, hash) = known.unzip();
-        let matches = self.hashing(move || match hash {
+        let matches = self.run_hashing(move || match hash {
             Some(hash) => PasswordHash::new(&hash).is_ok_and(|hash| {
                 Argon2::default()
                     .verify_password(password.as_bytes(), &hash)
                     .is_ok()
             }),
             None => {
-                // For the time alone.
+                // Only so that it takes the same time.
                 let _ = Argon2::default().hash_password(password.as_bytes());
                 false
             }
         });
         let matches = matches.await?;
         let Some(id) = id else { return Ok(None) };
-        let mut wrong = self.wrong();
+        let mut failures = self.failures();
         if matches {
-            wrong.remove(&id);
+            failures.remove(&id);
             return Ok(Some(id));
         }
-        let count = wrong.get(&id).map_or(0, |wrong| wrong.count) + 1;
-        wrong.insert(id, Wrong { count, last: now });
+        let count = failures.get(&id).map_or(0, |failed| failed.count) + 1;
+        failures.insert(id, Failures { count, last: now });
         Ok(None)
     }
 
-    fn check_wait(&self, id: PersonId, now: Timestamp) -> Result<(), Problem> {
-        let until = self.wrong().get(&id).map(|wrong| wrong.wait_until());
+    fn check_wait(&self, id: UserId, now: Timestamp) -> Result<(), Problem> {
+        let until = self.failures().get(&id).map(|failed| failed.wait_until());
         let Some(until) = until.filter(|until| *until > now) else {
             return Ok(());
         };
@@ -156,15 +157,14 @@ impl Passwords {
         let problem = Problem::new(
             ProblemKind::TooManySignIns,
             format!(
-                "wrong passwords came for this name, one after another; try again in {seconds} s, or ask an organiser \
-                 for a link"
+                "too many wrong passwords for this name; try again in {seconds} s, or ask an organiser for a link"
             ),
         );
         Err(problem.retry_after(seconds))
     }
 
-    fn wrong(&self) -> MutexGuard<'_, HashMap<PersonId, Wrong>> {
-        self.wrong.lock().unwrap_or_else(PoisonError::into_inner)
+    fn failures(&self) -> MutexGuard<'_, HashMap<UserId, Failures>> {
+        self.failures.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
@@ -173,7 +173,7 @@ mod tests {
     use super::*;
 
     #[tokio::test]
-    async fn a_password_is_known_again_and_guessing_gets_slower() {
+    async fn wrong_passwords_delay_further_attempts() {
         let passwords = Passwords::default();
         let mut now: Timestamp = "2026-03-01T10:00:00Z".parse().unwrap();
         let hash = passwords
@@ -181,7 +181,7 @@ mod tests {
             .await
             .unwrap();
         assert!(hash.starts_with("$argon2id$"), "{hash}");
-        let id = PersonId::new();
+        let id = UserId::new();
         let known = || Some((id, hash.clone()));
         let verify =
             async |password: &str, now| passwords.verify(known(), password.into(), now).await;
@@ -189,7 +189,7 @@ mod tests {
             verify("correct horse battery", now).await.unwrap(),
             Some(id)
         );
-        for _ in 0..FREE {
+        for _ in 0..FREE_ATTEMPTS {
             assert_eq!(verify("wrong", now).await.unwrap(), None);
         }
         let refused = verify("correct horse battery", now).await.unwrap_err();
@@ -203,22 +203,26 @@ mod tests {
             verify("correct horse battery", now).await.unwrap(),
             Some(id)
         );
-        assert_eq!(verify("wrong", now).await.unwrap(), None, "forgiven");
-        let nobody = passwords.verify(None, "wrong".into(), now).await;
-        assert_eq!(nobody.unwrap(), None);
+        assert_eq!(
+            verify("wrong", now).await.unwrap(),
+            None,
+            "the count restarts"
+        );
+        let unknown = passwords.verify(None, "wrong".into(), now).await;
+        assert_eq!(unknown.unwrap(), None);
     }
 
     #[test]
-    fn the_wait_is_bounded() {
+    fn delay_is_bounded() {
         let now = "2026-03-01T10:00:00Z".parse().unwrap();
-        for count in [FREE + 10, FREE + 40, u32::MAX] {
-            let wrong = Wrong { count, last: now };
-            assert_eq!(wrong.wait_until(), now + LONGEST_WAIT, "{count}");
+        for count in [FREE_ATTEMPTS + 10, FREE_ATTEMPTS + 40, u32::MAX] {
+            let failures = Failures { count, last: now };
+            assert_eq!(failures.wait_until(), now + LONGEST_WAIT, "{count}");
         }
     }
 
     #[test]
-    fn short_and_endless_passwords_are_refused() {
+    fn short_and_long_passwords_are_refused() {
         assert!(check(&"é".repeat(MIN_CHARS)).is_ok());
         assert!(check(&"a".repeat(MIN_CHARS - 1)).is_err());
         assert!(check(&"a".repeat(MAX_BYTES + 1)).is_err());

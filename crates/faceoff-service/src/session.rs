@@ -1,21 +1,21 @@
-//! The cookie of whoever has signed in, and how a request of our own pages is told from a foreign page's.
+//! The session cookie, and the protection against requests from other sites (CSRF).
 
 use crate::{
     config::HttpConfig,
     problem::{Problem, ProblemKind},
 };
 use axum::http::{HeaderMap, HeaderValue, header};
-use faceoff_store::SESSION;
+use faceoff_store::SESSION_LIFETIME;
 
 const NAME: &str = "faceoff_session";
 
-/// The session's secret, if one came.
-pub fn cookie(headers: &HeaderMap) -> Option<&str> {
-    named(headers, NAME)
+/// The session's secret from the request's cookies.
+pub fn session_cookie(headers: &HeaderMap) -> Option<&str> {
+    cookie_value(headers, NAME)
 }
 
-/// A cookie's value, if one of that name came.
-pub fn named<'a>(headers: &'a HeaderMap, wanted: &str) -> Option<&'a str> {
+/// Value of the cookie with this name.
+pub fn cookie_value<'a>(headers: &'a HeaderMap, wanted: &str) -> Option<&'a str> {
     headers
         .get_all(header::COOKIE)
         .iter()
@@ -25,14 +25,14 @@ pub fn named<'a>(headers: &'a HeaderMap, wanted: &str) -> Option<&'a str> {
         .find_map(|(name, value)| (name == wanted && !value.is_empty()).then_some(value))
 }
 
-/// The header that makes a browser keep the session, or forget it (`None`).
+/// Value of `Set-Cookie` that stores the session in a browser, or removes it (`None`).
 ///
 /// # Errors
-/// Our fault: the value is no header's.
+/// `Internal`: the value is not valid in a header.
 pub fn set_cookie(config: &HttpConfig, session: Option<&str>) -> Result<HeaderValue, Problem> {
-    let secure = secure(config);
+    let secure = secure_attribute(config);
     let (value, age) = match session {
-        Some(session) => (session, SESSION.as_secs()),
+        Some(session) => (session, SESSION_LIFETIME.as_secs()),
         None => ("", 0),
     };
     HeaderValue::try_from(format!(
@@ -41,8 +41,8 @@ pub fn set_cookie(config: &HttpConfig, session: Option<&str>) -> Result<HeaderVa
     .map_err(Problem::internal)
 }
 
-/// What a cookie says beside: over TLS it is sent over nothing else.
-pub fn secure(config: &HttpConfig) -> &'static str {
+/// The cookie attribute that restricts a cookie to TLS, if the server is reached over TLS.
+pub fn secure_attribute(config: &HttpConfig) -> &'static str {
     let by_tls = config
         .public_url
         .as_deref()
@@ -50,9 +50,9 @@ pub fn secure(config: &HttpConfig) -> &'static str {
     if by_tls { "; Secure" } else { "" }
 }
 
-/// Refuses what a foreign page made a browser send. Browsers say where a request comes from; what says nothing is
-/// refused, too: programs send tokens.
-pub fn check_own_page(headers: &HeaderMap) -> Result<(), Problem> {
+/// Refuses a request that a page of another site triggered. Browsers send the origin; a request without it is refused,
+/// too, because API clients use tokens.
+pub fn check_same_origin(headers: &HeaderMap) -> Result<(), Problem> {
     let text = |name: &str| headers.get(name).and_then(|value| value.to_str().ok());
     let is_own = match (text("sec-fetch-site"), text("origin")) {
         (Some(site), _) => site == "same-origin",
@@ -67,8 +67,8 @@ pub fn check_own_page(headers: &HeaderMap) -> Result<(), Problem> {
     }
     Err(Problem::new(
         ProblemKind::Forbidden,
-        "the request comes with a cookie, or from a form, and not from a page of this server; sign in here, or send \
-         a token in the header Authorization",
+        "expected a request from a page of this server, got one with a cookie or a form from elsewhere; sign in here, or \
+         send a token in the header Authorization",
     ))
 }
 
@@ -84,25 +84,25 @@ mod tests {
     }
 
     #[test]
-    fn the_session_is_found_among_other_cookies() {
+    fn session_is_found_among_other_cookies() {
         let both = headers(&[("cookie", "a=b; faceoff_session=x; c=d")]);
-        assert_eq!(cookie(&both), Some("x"));
-        assert_eq!(cookie(&headers(&[("cookie", "faceoff_session=")])), None);
+        assert_eq!(session_cookie(&both), Some("x"));
+        assert_eq!(session_cookie(&headers(&[("cookie", "faceoff_session=")])), None);
         assert_eq!(
-            cookie(&headers(&[("cookie", "other_faceoff_session=x")])),
+            session_cookie(&headers(&[("cookie", "other_faceoff_session=x")])),
             None
         );
-        assert_eq!(cookie(&HeaderMap::new()), None);
+        assert_eq!(session_cookie(&HeaderMap::new()), None);
     }
 
     #[test]
-    fn a_foreign_page_is_told_from_ours() {
+    fn cross_site_request_is_refused() {
         let own = [
             headers(&[("sec-fetch-site", "same-origin")]),
             headers(&[("origin", "https://a.example:1"), ("host", "a.example:1")]),
         ];
         for headers in own {
-            assert!(check_own_page(&headers).is_ok(), "{headers:?}");
+            assert!(check_same_origin(&headers).is_ok(), "{headers:?}");
         }
         let foreign = [
             HeaderMap::new(),
@@ -118,7 +118,7 @@ mod tests {
             ]),
         ];
         for headers in foreign {
-            assert!(check_own_page(&headers).is_err(), "{headers:?}");
+            assert!(check_same_origin(&headers).is_err(), "{headers:?}");
         }
     }
 }

@@ -1,5 +1,5 @@
-//! The episode summaries of played runs: made once from the stored outcomes, then kept in the database
-//! and in memory. A board or an ablation never reads outcomes twice.
+//! Episode summaries of completed runs: computed once from the stored outcomes, then stored in the database and in
+//! memory. A board or an ablation never reads outcomes twice.
 
 use crate::{boxed, problem::Problem};
 use faceoff_scoring::EpisodeSummary;
@@ -10,10 +10,10 @@ use std::{
     sync::{Arc, Mutex, MutexGuard},
 };
 
-/// Summaries held in memory; enough for the boards of several seasons of teams.
+/// Summaries in memory; enough for the boards of several seasons.
 const CACHED: usize = 1000;
 
-/// Summaries by run. A run that has been played never changes, so neither do they.
+/// Summaries by run. A completed run never changes, so neither does its summary.
 pub type RunSummaries = HashMap<RunId, Arc<EpisodeSummary>>;
 
 #[derive(Debug)]
@@ -32,17 +32,17 @@ impl Summaries {
         }
     }
 
-    /// The summary of one run that has been played.
+    /// The summary of one completed run.
     #[boxed]
-    pub async fn of_run(&self, run: RunId) -> Result<Arc<EpisodeSummary>, Problem> {
-        let summary = self.of(&[run]).await?.remove(&run);
+    pub async fn load_run(&self, run: RunId) -> Result<Arc<EpisodeSummary>, Problem> {
+        let summary = self.load(&[run]).await?.remove(&run);
         summary.ok_or_else(|| Problem::internal(format_args!("run {run} has no summary")))
     }
 
-    /// The summaries of `runs`, all of which have been played: one read for those that are not in memory.
+    /// The summaries of completed runs: one database read for those that are not in memory.
     #[boxed]
-    pub async fn of(&self, runs: &[RunId]) -> Result<RunSummaries, Problem> {
-        let mut summaries = self.in_memory(runs);
+    pub async fn load(&self, runs: &[RunId]) -> Result<RunSummaries, Problem> {
+        let mut summaries = self.cached(runs);
         let missing = |summaries: &RunSummaries| -> Vec<RunId> {
             let missing = runs.iter().filter(|run| !summaries.contains_key(run));
             missing.copied().collect()
@@ -55,15 +55,15 @@ impl Summaries {
                 .await?;
             for (run, json) in stored {
                 match serde_json::from_str(&json) {
-                    Ok(summary) => self.keep(&mut summaries, run, summary),
+                    Ok(summary) => self.insert(&mut summaries, run, summary),
                     Err(error) => {
-                        tracing::warn!(%run, %error, "a stored summary is damaged; making it again");
+                        tracing::warn!(%run, %error, "a stored summary is damaged; computing it again");
                     }
                 }
             }
             for run in missing(&summaries) {
                 let summary = self.summarise(run).await?;
-                self.keep(&mut summaries, run, summary);
+                self.insert(&mut summaries, run, summary);
             }
         }
         Ok(summaries)
@@ -72,33 +72,33 @@ impl Summaries {
     async fn summarise(&self, run: RunId) -> Result<EpisodeSummary, Problem> {
         let outcomes = self.store.outcomes(run).await?;
         let bounds = self.store.run_variation(run).await?.tier_bounds;
-        // some ten milliseconds of computation, which other requests need not wait for
-        let summary = tokio::task::spawn_blocking(move || EpisodeSummary::of(&outcomes, &bounds))
+        // Takes some ten milliseconds, so it runs off the threads that handle requests.
+        let summary = tokio::task::spawn_blocking(move || EpisodeSummary::from_outcomes(&outcomes, &bounds))
             .await
             .map_err(Problem::internal)?
             .map_err(|error| Problem::internal(format_args!("run {run}: {error}")))?;
         let json = serde_json::to_string(&summary).map_err(Problem::internal)?;
-        let kept =
+        let stored =
             self.store
-                .keep_episode_summary(run, EpisodeSummary::VERSION, &json, self.clock.now());
-        // It can be made again, and memory has it: no page fails for want of a disk.
-        if let Err(error) = kept.await {
-            tracing::warn!(%run, %error, "a summary could not be kept");
+                .store_episode_summary(run, EpisodeSummary::VERSION, &json, self.clock.now());
+        // It can be computed again, and is in memory: no page fails because the disk is full.
+        if let Err(error) = stored.await {
+            tracing::warn!(%run, %error, "a summary could not be stored");
         }
         Ok(summary)
     }
 
-    fn in_memory(&self, runs: &[RunId]) -> RunSummaries {
+    fn cached(&self, runs: &[RunId]) -> RunSummaries {
         let cached = self.lock();
         let known = |run: &RunId| Some((*run, Arc::clone(cached.get(run)?)));
         runs.iter().filter_map(known).collect()
     }
 
-    fn keep(&self, summaries: &mut RunSummaries, run: RunId, summary: EpisodeSummary) {
+    fn insert(&self, summaries: &mut RunSummaries, run: RunId, summary: EpisodeSummary) {
         let summary = Arc::new(summary);
         let mut cached = self.lock();
         if cached.len() >= CACHED {
-            // rare, and all of it is in the database
+            // Rare, and all summaries are in the database.
             cached.clear();
         }
         cached.insert(run, Arc::clone(&summary));
@@ -106,7 +106,7 @@ impl Summaries {
     }
 
     fn lock(&self) -> MutexGuard<'_, RunSummaries> {
-        // whoever panicked left whole entries behind
+        // A panic cannot leave an incomplete entry behind.
         self.cached
             .lock()
             .unwrap_or_else(|poisoned| poisoned.into_inner())

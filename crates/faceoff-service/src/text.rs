@@ -1,16 +1,16 @@
-//! What people write: trimmed, bounded, and without what would make a page or a terminal do something.
+//! Validation of text from users: trimmed, limited in length, and without control characters.
 
 use crate::problem::Problem;
 
-/// A text of one line.
-pub fn line(field: &str, text: &str, most_chars: usize) -> Result<String, Problem> {
+/// Text of one line.
+pub fn single_line(field: &str, text: &str, most_chars: usize) -> Result<String, Problem> {
     let text = text.trim();
     let chars = text.chars().count();
     if !(1..=most_chars).contains(&chars) {
         let detail = format!("expected 1 to {most_chars} characters, got {chars}");
         return Err(Problem::invalid(field, detail));
     }
-    match text.chars().find(|c| !faceoff_types::is_harmless(*c)) {
+    match text.chars().find(|c| !faceoff_types::is_printable(*c)) {
         Some(bad) => Err(Problem::invalid(
             field,
             format!("expected one line of text, got the character {bad:?}"),
@@ -19,8 +19,8 @@ pub fn line(field: &str, text: &str, most_chars: usize) -> Result<String, Proble
     }
 }
 
-/// A text of several lines.
-pub fn lines(field: &str, text: &str, most_chars: usize) -> Result<String, Problem> {
+/// Text of one or more lines.
+pub fn multi_line(field: &str, text: &str, most_chars: usize) -> Result<String, Problem> {
     let text = text.replace("\r\n", "\n");
     let text = text.trim();
     let chars = text.chars().count();
@@ -28,7 +28,7 @@ pub fn lines(field: &str, text: &str, most_chars: usize) -> Result<String, Probl
         let detail = format!("expected 1 to {most_chars} characters, got {chars}");
         return Err(Problem::invalid(field, detail));
     }
-    let is_fine = |c: char| matches!(c, '\n' | '\t') || faceoff_types::is_harmless(c);
+    let is_fine = |c: char| matches!(c, '\n' | '\t') || faceoff_types::is_printable(c);
     match text.chars().find(|c| !is_fine(*c)) {
         Some(bad) => Err(Problem::invalid(
             field,
@@ -38,9 +38,9 @@ pub fn lines(field: &str, text: &str, most_chars: usize) -> Result<String, Probl
     }
 }
 
-/// An address that a page may lead to.
+/// An http or https address for a link on a page.
 pub fn link(field: &str, text: &str) -> Result<String, Problem> {
-    let text = line(field, text, 300)?;
+    let text = single_line(field, text, 300)?;
     let rest = text
         .strip_prefix("https://")
         .or_else(|| text.strip_prefix("http://"));

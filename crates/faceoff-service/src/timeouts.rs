@@ -1,4 +1,4 @@
-//! How long a handler may take.
+//! Time limit of handlers.
 
 use crate::{
     boxed,
@@ -11,16 +11,16 @@ use axum::{
 };
 use std::time::Duration;
 
-/// Answers `Busy` when a handler takes longer than `patience`.
+/// Responds with `Busy` if a handler takes longer than `timeout`.
 #[boxed]
-pub async fn time_out(State(patience): State<Duration>, request: Request, next: Next) -> Response {
-    match tokio::time::timeout(patience, next.run(request)).await {
+pub async fn time_out(State(timeout): State<Duration>, request: Request, next: Next) -> Response {
+    match tokio::time::timeout(timeout, next.run(request)).await {
         Ok(response) => response,
         Err(_) => Problem::new(
             ProblemKind::Busy,
             format!(
-                "the answer took longer than {} s; try again later",
-                patience.as_secs_f64()
+                "the response took longer than {} s; try again later",
+                timeout.as_secs_f64()
             ),
         )
         .into_response(),

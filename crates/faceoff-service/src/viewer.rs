@@ -1,41 +1,41 @@
-//! Who looks at what everybody may look at: nobody needs a token, and the organiser's shows more.
+//! The viewer of a public resource: no token is needed, and an organiser's shows more.
 
 use crate::{
     app::App,
-    auth::{Anybody, Caller},
+    auth::{OptionalCaller, Caller},
     problem::{Problem, ProblemKind},
 };
 use axum::{extract::FromRequestParts, http::request::Parts};
-use faceoff_notify::Reader;
+use faceoff_notify::Audience;
 use faceoff_types::TeamId;
 
-/// A caller, with or without a token.
+/// The caller of a public resource, with or without a token.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Viewer {
     Organiser,
-    /// Who speaks for a team.
+    /// A member of a team, or an API client with its token.
     Team(TeamId),
-    Anybody,
+    Visitor,
 }
 
 impl Viewer {
-    /// Of a caller with a token.
-    pub fn of(caller: &Caller) -> Self {
+    /// A caller with a token.
+    pub fn new(caller: &Caller) -> Self {
         match caller.team() {
             None => Self::Organiser,
             Some(team) => Self::Team(team.id),
         }
     }
 
-    /// What it is to ask for something of others: whoever has not said who they are is asked that first.
-    pub const fn refusal(self) -> ProblemKind {
+    /// The kind of problem for a resource that the viewer may not see. A visitor is asked to authenticate first.
+    pub const fn denial_kind(self) -> ProblemKind {
         match self {
-            Self::Anybody => ProblemKind::Unauthenticated,
+            Self::Visitor => ProblemKind::Unauthenticated,
             Self::Team(_) | Self::Organiser => ProblemKind::Forbidden,
         }
     }
 
-    /// Refuses everybody but organisers, of whom `what` is.
+    /// Refuses all viewers but organisers; `what` names the resource.
     ///
     /// # Errors
     /// `Unauthenticated` or `Forbidden`.
@@ -44,24 +44,24 @@ impl Viewer {
             return Ok(());
         }
         Err(Problem::new(
-            self.refusal(),
-            format!("{what} is for the organiser: it needs the organiser's token"),
+            self.denial_kind(),
+            format!("{what} is for organisers only: it needs an organiser's token"),
         ))
     }
 }
 
 impl From<Caller> for Viewer {
     fn from(caller: Caller) -> Self {
-        Self::of(&caller)
+        Self::new(&caller)
     }
 }
 
-impl From<Viewer> for Reader {
+impl From<Viewer> for Audience {
     fn from(viewer: Viewer) -> Self {
         match viewer {
             Viewer::Organiser => Self::Organiser,
             Viewer::Team(team) => Self::Team(team),
-            Viewer::Anybody => Self::Anybody,
+            Viewer::Visitor => Self::Public,
         }
     }
 }
@@ -70,7 +70,7 @@ impl FromRequestParts<App> for Viewer {
     type Rejection = Problem;
 
     async fn from_request_parts(parts: &mut Parts, app: &App) -> Result<Self, Problem> {
-        let Anybody(caller) = Anybody::from_request_parts(parts, app).await?;
-        Ok(caller.as_ref().map_or(Self::Anybody, Self::of))
+        let OptionalCaller(caller) = OptionalCaller::from_request_parts(parts, app).await?;
+        Ok(caller.as_ref().map_or(Self::Visitor, Self::new))
     }
 }

@@ -46,7 +46,7 @@ fn held_arm(c: &mut Criterion) {
 
 /// One control step of two agents.
 fn game(c: &mut Criterion) {
-    let hold = Interpolation::Cubic.held(&INITIAL_Q);
+    let hold = Interpolation::Cubic.hold_position(&INITIAL_Q);
     let mut game = Game::new(GameSetup {
         interpolation: [Interpolation::Cubic; 2],
         factors: Factors::NONE,
@@ -65,7 +65,7 @@ fn game(c: &mut Criterion) {
 /// A control step of many worlds, on one thread and on all.
 fn batch(c: &mut Criterion) {
     const WORLDS: u32 = 64;
-    let hold = Interpolation::Cubic.held(&INITIAL_Q);
+    let hold = Interpolation::Cubic.hold_position(&INITIAL_Q);
     let actions = hold[..2 * JOINTS].repeat(WORLDS as usize);
     let mut group = c.benchmark_group("batch_of_64");
     group.throughput(Throughput::Elements(u64::from(WORLDS)));

@@ -1,5 +1,5 @@
-//! How long a season's board takes to read: 200 teams that were evaluated on each of 120 days, with a
-//! new submission every tenth day. The goal is 10 ms; `cargo bench -p faceoff-store`.
+//! Time to read a season's board: 200 teams, evaluated on each of 120 days, with a new submission
+//! every tenth day. The goal is 10 ms. Run it with `cargo bench -p faceoff-store`.
 #![expect(clippy::unwrap_used, reason = "a benchmark fails by panicking")]
 
 use criterion::{Criterion, criterion_group, criterion_main};
@@ -17,9 +17,9 @@ use uuid::Uuid;
 const TEAMS: usize = 200;
 const DAYS: i64 = 120;
 const DAYS_PER_SUBMISSION: i64 = 10;
-/// What the sandbox keeps of an agent's standard error.
+/// Maximum size of the stored standard error of an agent.
 const LOG_BYTES: usize = 64 * 1024;
-/// Of a stored summary of 3 × 1000 episodes.
+/// Size of a stored summary of 3 × 1000 episodes.
 const SUMMARY_BYTES: usize = 1500;
 
 fn result(score: f64) -> EvaluationResult {
@@ -42,7 +42,7 @@ fn result(score: f64) -> EvaluationResult {
         ruleset: RULESET.into(),
         profile: Profile::Evaluation,
         seed: Seed::from_number(1),
-        tasks: Task::ALL.map(|of| (of, task.clone())).into(),
+        tasks: Task::ALL.map(|name| (name, task.clone())).into(),
         score,
         penalty_points: 327.5,
         tier: Tier::Deployable,
@@ -51,7 +51,7 @@ fn result(score: f64) -> EvaluationResult {
     }
 }
 
-/// Writes the season by SQL in one transaction: through the store it would be a hundred thousand
+/// Inserts the season by SQL in one transaction; the store's operations would need a hundred thousand
 /// commits.
 async fn fill(folder: &Path, stage: StageId) {
     let url = format!("sqlite://{}", folder.join("faceoff.sqlite3").display());
@@ -96,7 +96,7 @@ async fn fill(folder: &Path, stage: StageId) {
                 .await
                 .unwrap();
             }
-            let (run, unit) = (RunId::new().to_string(), Uuid::now_v7().to_string());
+            let (run, job) = (RunId::new().to_string(), Uuid::now_v7().to_string());
             sqlx::query(
                 r#"INSERT INTO runs (id, profile, seed, tasks, episodes_per_task, episodes_per_shard, max_faults,
                                      keeps_recordings, state, recordings_removed_at)
@@ -111,7 +111,7 @@ async fn fill(folder: &Path, stage: StageId) {
                 "INSERT INTO units (id, kind, state, claimable_at, worker, nonce)
                  VALUES (?, 'shard', 'done', 0, 'w', 'n')",
             )
-            .bind(&unit)
+            .bind(&job)
             .execute(&mut *tx)
             .await
             .unwrap();
@@ -122,7 +122,7 @@ async fn fill(folder: &Path, stage: StageId) {
             )
             .bind(ShardId::new().to_string())
             .bind(&run)
-            .bind(&unit)
+            .bind(&job)
             .execute(&mut *tx)
             .await
             .unwrap();
@@ -194,7 +194,7 @@ fn board(criterion: &mut Criterion) {
     criterion.bench_function("board of 200 teams × 120 days", |bencher| {
         bencher.iter(|| black_box(runtime.block_on(store.board(stage, 1)).unwrap()));
     });
-    criterion.bench_function("its episode summaries", |bencher| {
+    criterion.bench_function("episode summaries of the board", |bencher| {
         bencher.iter(|| black_box(runtime.block_on(store.episode_summaries(&runs, 1)).unwrap()));
     });
 }

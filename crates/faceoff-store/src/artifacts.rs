@@ -18,13 +18,13 @@ use std::{
 };
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
 
-/// The bytes of an artifact, in order.
+/// The bytes of an artifact, in order, in pieces.
 pub type ArtifactStream = BoxStream<'static, Result<Bytes>>;
 
-/// What follows a dataset's key in that of its clips: they come and go with it.
+/// Suffix of the key of a dataset's clips, which are stored and deleted with the dataset.
 const CLIPS: &str = ".clips";
 
-/// Where clips of ablations are that are not over.
+/// Key prefix of the clips of running ablations.
 const ABLATION_PARTS: &str = "ablation-parts";
 
 /// Bytes in memory per piece of a copy.
@@ -39,12 +39,12 @@ pub struct Artifacts {
 }
 
 impl Artifacts {
-    /// Artifacts in a folder, created if need be.
+    /// Opens the artifacts of a folder, which is created if necessary.
     pub(crate) fn open(folder: &Path) -> Result<Self> {
         std::fs::create_dir_all(folder)
             .map_err(|error| StoreError::Artifacts(format!("{}: {error}", folder.display())))?;
-        // A database row that names an artifact must never outlive it: file and folder are on disk
-        // before a put returns.
+        // A database row must never name an artifact that a power cut has lost: file and folder are
+        // synced to disk before a put returns.
         let objects = LocalFileSystem::new_with_prefix(folder)
             .map_err(artifact_error)?
             .with_fsync(true)
@@ -55,8 +55,8 @@ impl Artifacts {
         })
     }
 
-    /// Stores a copy of a file under `key`, replacing what was there. It appears whole or not at all,
-    /// whenever the process is killed.
+    /// Stores a copy of a file under `key`, replacing an earlier one. It appears whole or not at all,
+    /// even if the process is killed.
     #[boxed]
     pub async fn put_file(&self, key: &str, file: &Path) -> Result<()> {
         let failed = |error: std::io::Error| StoreError::artifact(file.display(), &error);
@@ -78,14 +78,14 @@ impl Artifacts {
                 }
             };
             upload.write(&piece[..read]);
-            // a bound on what is in memory when the disk is slower than the source
+            // limits memory when the disk is slower than the source
             upload.wait_for_capacity(2).await.map_err(artifact_error)?;
         }
         upload.finish().await.map_err(artifact_error)?;
         Ok(())
     }
 
-    /// Stores bytes under `key`, replacing what was there; they appear whole or not at all.
+    /// Stores bytes under `key`, replacing an earlier artifact; they appear whole or not at all.
     #[boxed]
     pub async fn put_bytes(&self, key: &str, bytes: Vec<u8>) -> Result<()> {
         let key = parse(key)?;
@@ -94,31 +94,31 @@ impl Artifacts {
         Ok(())
     }
 
-    /// Stores a dataset, and first what its replays are drawn from: whoever finds the dataset finds them.
+    /// Stores a dataset, and before it the clips for its replays, so that a stored dataset always has them.
     #[boxed]
     pub async fn put_dataset(&self, key: &str, archive: &Path, clips: Option<&Path>) -> Result<()> {
         if let Some(clips) = clips {
-            self.put_file(&Self::clips_of(key), clips).await?;
+            self.put_file(&Self::clips_key(key), clips).await?;
         }
         self.put_file(key, archive).await
     }
 
-    /// The key of what a dataset's replays are drawn from. Not all datasets have it: those of older programs do not.
+    /// The key of the clips for a dataset's replays. Datasets of older versions have none.
     #[must_use]
-    pub fn clips_of(dataset: &str) -> String {
+    pub fn clips_key(dataset: &str) -> String {
         format!("{dataset}{CLIPS}")
     }
 
-    /// Removes a dataset and what its replays are drawn from; what does not exist is no error.
+    /// Removes a dataset and its clips. Missing ones are no error.
     #[boxed]
     pub async fn delete_dataset(&self, key: &str) -> Result<()> {
-        self.delete(&Self::clips_of(key)).await?;
+        self.delete(&Self::clips_key(key)).await?;
         self.delete(key).await
     }
 
-    /// The key of the clips of a shard of an ablation, until all are played.
+    /// The key of the clips of an ablation's shard, which are stored until all shards are played.
     #[must_use]
-    pub fn ablation_part(
+    pub fn ablation_part_key(
         id: AblationId,
         profile: Profile,
         task: Task,
@@ -126,25 +126,25 @@ impl Artifacts {
     ) -> String {
         format!(
             "{}/{profile}.{task}.{first_episode}",
-            Self::ablation_parts(id)
+            Self::ablation_parts_prefix(id)
         )
     }
 
-    /// What the keys of all such parts of an ablation begin with.
+    /// The key prefix of all clips of an ablation's shards.
     #[must_use]
-    pub fn ablation_parts(id: AblationId) -> String {
+    pub fn ablation_parts_prefix(id: AblationId) -> String {
         format!("{ABLATION_PARTS}/{id}")
     }
 
-    /// The key of the clips that are kept of an ablation's episodes in a profile.
+    /// The key of the clips of a finished ablation's episodes in a profile.
     #[must_use]
-    pub fn ablation_clips(id: AblationId, profile: Profile) -> String {
+    pub fn ablation_clips_key(id: AblationId, profile: Profile) -> String {
         format!("ablations/{id}/{profile}{CLIPS}")
     }
 
-    /// The ablations of which parts are there.
+    /// The ablations that have clips of shards.
     #[boxed]
-    pub async fn ablations_in_parts(&self) -> Result<Vec<AblationId>> {
+    pub async fn ablations_with_parts(&self) -> Result<Vec<AblationId>> {
         let folder = parse(ABLATION_PARTS)?;
         let listed = self.objects.list_with_delimiter(Some(&folder));
         let folders = listed.await.map_err(artifact_error)?.common_prefixes;
@@ -154,10 +154,10 @@ impl Artifacts {
         Ok(ids.collect())
     }
 
-    /// The parts of an ablation: each profile with a key.
+    /// The clips of an ablation's shards: profile and key of each.
     #[boxed]
-    pub async fn parts_of_ablation(&self, id: AblationId) -> Result<Vec<(Profile, String)>> {
-        let folder = parse(&Self::ablation_parts(id))?;
+    pub async fn list_ablation_parts(&self, id: AblationId) -> Result<Vec<(Profile, String)>> {
+        let folder = parse(&Self::ablation_parts_prefix(id))?;
         let listed = self.objects.list_with_delimiter(Some(&folder));
         let parts = listed.await.map_err(artifact_error)?.objects;
         let named = parts.iter().filter_map(|part| {
@@ -188,17 +188,17 @@ impl Artifacts {
         }
     }
 
-    /// Where an artifact lies, for whoever reads parts of it. It must not be written to.
+    /// The path of an artifact's file, to read parts of it. It must not be written to.
     ///
     /// # Errors
-    /// [`StoreError::Artifacts`] if `key` is none.
-    pub fn path_of(&self, key: &str) -> Result<PathBuf> {
+    /// [`StoreError::Artifacts`] if `key` is not a valid key.
+    pub fn local_path(&self, key: &str) -> Result<PathBuf> {
         Ok(self.folder.join(parse(key)?.as_ref()))
     }
 
-    /// Length of an artifact, in bytes; `None` if there is none of this key.
+    /// Length of an artifact, in bytes; `None` if it does not exist.
     #[boxed]
-    pub async fn bytes_of(&self, key: &str) -> Result<Option<u64>> {
+    pub async fn size_bytes(&self, key: &str) -> Result<Option<u64>> {
         match self.objects.head(&parse(key)?).await {
             Ok(found) => Ok(Some(found.size)),
             Err(object_store::Error::NotFound { .. }) => Ok(None),
@@ -218,7 +218,7 @@ impl Artifacts {
         Ok((bytes, found.into_stream().map_err(artifact_error).boxed()))
     }
 
-    /// Some of an artifact's bytes, for a download: the others are not read.
+    /// A range of an artifact's bytes, for a download. Only these are read.
     #[boxed]
     pub async fn read_range(&self, key: &str, range: Range<u64>) -> Result<ArtifactStream> {
         let wanted = GetOptions::new().with_range(Some(range));
@@ -255,8 +255,7 @@ impl Artifacts {
         Ok(())
     }
 
-    /// Copies every artifact `prefix/NAME` to `folder/NAME`. [`StoreError::NotFound`] if there is
-    /// none.
+    /// Copies every artifact `prefix/NAME` to `folder/NAME`. [`StoreError::NotFound`] if none exists.
     #[boxed]
     pub async fn get_folder(&self, prefix: &str, folder: &Path) -> Result<()> {
         let listing = self
@@ -295,8 +294,8 @@ impl Artifacts {
         self.delete_others(prefix, "").await
     }
 
-    /// Removes every artifact under `prefix/` but the one with the key `kept`, or those under `kept/`, or the clips of a
-    /// dataset of that key.
+    /// Removes every artifact under `prefix/` except the one with the key `kept`, those under `kept/`, and the clips of
+    /// the dataset `kept`.
     #[boxed]
     pub async fn delete_others(&self, prefix: &str, kept: &str) -> Result<()> {
         let listed: Vec<_> = self
@@ -318,26 +317,26 @@ impl Artifacts {
         Ok(())
     }
 
-    /// Removes what a killed process has left half written, if it was begun before `before`. Returns
-    /// how many files.
+    /// Removes incomplete files that a killed process has left, if they were started before `before`.
+    /// Returns the number of files.
     #[boxed]
     pub async fn remove_abandoned(&self, before: Timestamp) -> Result<usize> {
         let folder = Arc::clone(&self.folder);
-        tokio::task::spawn_blocking(move || remove_staged(&folder, before.into()))
+        tokio::task::spawn_blocking(move || remove_incomplete(&folder, before.into()))
             .await
             .unwrap_or_else(|panic| Err(std::io::Error::other(panic)))
             .map_err(|error| StoreError::Artifacts(format!("removing half-written files: {error}")))
     }
 }
 
-/// `LocalFileSystem` writes to `NAME#NUMBER` beside the file and renames that when it is whole; its
-/// keys cannot hold a `#`.
-fn remove_staged(folder: &Path, before: SystemTime) -> std::io::Result<usize> {
+/// `LocalFileSystem` writes to `NAME#NUMBER` beside the file and renames that when it is complete; its
+/// keys cannot contain a `#`.
+fn remove_incomplete(folder: &Path, before: SystemTime) -> std::io::Result<usize> {
     let mut removed = 0;
     for entry in std::fs::read_dir(folder)? {
         let entry = entry?;
         if entry.file_type()?.is_dir() {
-            removed += remove_staged(&entry.path(), before)?;
+            removed += remove_incomplete(&entry.path(), before)?;
             continue;
         }
         let name = entry.file_name();

@@ -1,14 +1,14 @@
-//! What the database has beside it: changes are appended to a log (`-wal`) and copied into the database
+//! Checkpoints: changes are appended to a write-ahead log (`-wal`) and copied into the database
 //! by checkpoints.
 //!
-//! SQLite copies by itself every thousand pages, but starts the log anew only when no reader uses it; with
-//! readers that overlap there is no such moment, and the log would grow as long as they come. So beyond
-//! a bound the readers of this process are kept waiting for once.
+//! SQLite copies automatically every thousand pages, but restarts the log only when no reader uses it.
+//! With overlapping readers there is no such moment, and the log would grow without bound. So beyond a
+//! certain size this process blocks its new readers once.
 
 use crate::{
     database::{BUSY_TIMEOUT, Database, READERS},
     error::Result,
-    log::LOG_BOUND_BYTES,
+    log::MAX_LOG_BYTES,
 };
 use sqlx::{Sqlite, pool::PoolConnection};
 use std::{
@@ -16,22 +16,22 @@ use std::{
     time::Duration,
 };
 
-/// How long new readers are kept waiting for those of this process that are under way, and a
-/// checkpoint for those of others.
-const READERS_PATIENCE: Duration = Duration::from_secs(2);
+/// How long new readers are blocked while this process's running reads end, and how long a checkpoint
+/// waits for readers of other processes.
+const READER_TIMEOUT: Duration = Duration::from_secs(2);
 
-/// Lets the next one empty the log, however this one ends.
-struct Emptying<'a>(&'a AtomicBool);
+/// Clears the flag on drop, so that the log can be emptied again however this attempt ends.
+struct EmptyingGuard<'a>(&'a AtomicBool);
 
-impl Drop for Emptying<'_> {
+impl Drop for EmptyingGuard<'_> {
     fn drop(&mut self) {
         self.0.store(false, Ordering::Release);
     }
 }
 
 impl Database {
-    /// After a write: empties the log, beside what comes next, if it has grown beyond its bound.
-    pub(crate) fn log_has_grown(&self) {
+    /// Called after a write: empties the log in the background if it exceeds its size limit.
+    pub(crate) fn empty_log_if_large(&self) {
         if self.log.bytes() >= self.log.due_bytes.load(Ordering::Relaxed)
             && !self.log.emptying.load(Ordering::Acquire)
         {
@@ -40,10 +40,10 @@ impl Database {
         }
     }
 
-    /// Now and then: copies what can be copied without keeping anybody waiting, and empties a log
-    /// that has stayed beyond its bound because of somebody who is gone now.
+    /// Called periodically: copies what can be copied without blocking. Empties a log that has stayed
+    /// beyond its limit because of a reader that has ended since.
     pub(crate) async fn checkpoint(&self) -> Result<()> {
-        if self.log.bytes() >= LOG_BOUND_BYTES {
+        if self.log.bytes() >= MAX_LOG_BYTES {
             self.empty_log().await;
             return Ok(());
         }
@@ -58,25 +58,25 @@ impl Database {
         if self.log.emptying.swap(true, Ordering::AcqRel) {
             return;
         }
-        let _emptying = Emptying(&self.log.emptying);
+        let _guard = EmptyingGuard(&self.log.emptying);
         let before = self.log.bytes();
         let emptied = self.truncate_log().await;
-        let failed_before = self.log.due_bytes.load(Ordering::Relaxed) > LOG_BOUND_BYTES;
+        let failed_before = self.log.due_bytes.load(Ordering::Relaxed) > MAX_LOG_BYTES;
         match emptied {
             Ok(true) => {
-                self.log.due_bytes.store(LOG_BOUND_BYTES, Ordering::Relaxed);
+                self.log.due_bytes.store(MAX_LOG_BYTES, Ordering::Relaxed);
                 if failed_before {
                     tracing::info!(bytes = before, "the database's log is emptied");
                 }
             }
             Ok(false) | Err(_) => {
-                let due_bytes = before.saturating_add(LOG_BOUND_BYTES / 4);
+                let due_bytes = before.saturating_add(MAX_LOG_BYTES / 4);
                 self.log.due_bytes.store(due_bytes, Ordering::Relaxed);
                 if !failed_before {
                     tracing::warn!(
                         bytes = before,
                         cause = emptied.err().map_or_else(
-                            || "somebody else reads the database".to_owned(),
+                            || "another process reads the database".to_owned(),
                             |error| error.to_string()
                         ),
                         "the database's log cannot be emptied and grows; trying again"
@@ -86,13 +86,13 @@ impl Database {
         }
     }
 
-    /// False: a reader of another process is in the way.
+    /// Returns false if a reader of another process blocks the checkpoint.
     async fn truncate_log(&self) -> Result<bool> {
         let mut writer = self.write.acquire().await?;
-        // With all of this process's readers in hand there is nobody to wait for.
-        let _readers = tokio::time::timeout(READERS_PATIENCE, self.all_readers()).await;
-        // Writers wait meanwhile, so that another process's reader must not be waited for long.
-        sqlx::query(sqlx::AssertSqlSafe(busy_timeout(READERS_PATIENCE)))
+        // While it holds all of this process's connections, no reader of this process is active.
+        let _readers = tokio::time::timeout(READER_TIMEOUT, self.all_readers()).await;
+        // Writers are blocked meanwhile, so the wait for another process's reader must be short.
+        sqlx::query(sqlx::AssertSqlSafe(busy_timeout(READER_TIMEOUT)))
             .execute(&mut *writer)
             .await?;
         let busy: Result<i64, _> = sqlx::query_scalar("PRAGMA wal_checkpoint(TRUNCATE)")
@@ -113,6 +113,6 @@ impl Database {
     }
 }
 
-fn busy_timeout(patience: Duration) -> String {
-    format!("PRAGMA busy_timeout = {}", patience.as_millis())
+fn busy_timeout(timeout: Duration) -> String {
+    format!("PRAGMA busy_timeout = {}", timeout.as_millis())
 }

@@ -1,5 +1,5 @@
-//! How values are written to and read from columns. Ids, names, tasks, profiles and days go through
-//! `sqlx::types::Text`; what is no value of its type fails to decode and surfaces as
+//! Conversions between Rust values and columns. Ids, names, tasks, profiles and days use
+//! `sqlx::types::Text`. A stored value that does not decode to its type is reported as
 //! [`StoreError::Damaged`](crate::StoreError::Damaged).
 
 use jiff::Timestamp;

@@ -1,6 +1,6 @@
 use crate::{
     error::{Result, StoreError},
-    log::{LOG_BOUND_BYTES, Log},
+    log::{MAX_LOG_BYTES, Log},
     schema::{self, MIGRATIONS, Upgrade},
 };
 use futures::future::BoxFuture;
@@ -14,67 +14,67 @@ use std::{path::Path, sync::Arc, time::Duration};
 /// How long a writer waits for the writer of another process.
 pub(crate) const BUSY_TIMEOUT: Duration = Duration::from_secs(30);
 
-/// Readers at a time; a board is read in well under a millisecond.
+/// Concurrent readers; a board is read in well under a millisecond.
 pub(crate) const READERS: u32 = 4;
 
-/// May a connection that comes back be used again? SQLite rolls back by itself when the disk is full. The
-/// library's own rollback fails then, it believes in the transaction for good, and no other can begin:
-/// such a connection is replaced.
-fn is_sound(
+/// May a released connection be used again? SQLite rolls back automatically when the disk is full. The
+/// library's own rollback then fails, and it believes forever that the transaction is open, so that no
+/// other can begin. Such a connection is replaced.
+fn is_reusable(
     connection: &mut SqliteConnection,
     _: PoolConnectionMetadata,
 ) -> BoxFuture<'_, sqlx::Result<bool>> {
     Box::pin(async move {
-        // after the rollback that a dropped transaction has sent ahead
+        // waits for the rollback that a dropped transaction has queued
         connection.ping().await?;
         Ok(!connection.is_in_transaction())
     })
 }
 
-/// The pools: readers see the last committed state and never wait for the writer.
+/// The connection pools. Readers see the last committed state and never wait for the writer.
 #[derive(Debug, Clone)]
 pub(crate) struct Database {
     pub(crate) read: SqlitePool,
     pub(crate) write: SqlitePool,
     pub(crate) file: Arc<Path>,
     pub(crate) log: Arc<Log>,
-    /// What opening it has changed.
+    /// The migration that was run on opening, if any.
     pub(crate) upgrade: Option<Upgrade>,
 }
 
 impl Database {
-    /// Opens and migrates the file, creating it if need be. The caller makes sure that no other
-    /// process does the same at the same time: SQLite has no lock for a set of migrations.
+    /// Opens and migrates the file, creating it if necessary. The caller makes sure that no other
+    /// process does so at the same time: SQLite has no lock for a set of migrations.
     pub(crate) async fn open(file: &Path) -> Result<Self> {
         let options = SqliteConnectOptions::new()
             .filename(file)
             .create_if_missing(true)
             .foreign_keys(true)
             .journal_mode(SqliteJournalMode::Wal)
-            // NORMAL would survive kill -9 too, but a power cut could take back a commit that a
-            // team was told of. Writes are a few per second, so the fsync costs nothing that shows.
+            // NORMAL would survive kill -9 too, but a power cut could undo a commit that was already
+            // confirmed to a team. With a few writes per second the fsync costs nothing measurable.
             .synchronous(SqliteSynchronous::Full)
             .busy_timeout(BUSY_TIMEOUT)
-            // what is left of the log's file when SQLite starts it anew
-            .pragma("journal_size_limit", LOG_BOUND_BYTES.to_string())
-            // a read that sorts must not fail for want of disk
+            // size to which SQLite truncates the log file when it restarts the log
+            .pragma("journal_size_limit", MAX_LOG_BYTES.to_string())
+            // a read that sorts must not fail on a full disk
             .pragma("temp_store", "MEMORY");
         let write = SqlitePoolOptions::new()
             .max_connections(1)
             // writers queue here rather than in SQLite's polling busy handler
             .acquire_timeout(2 * BUSY_TIMEOUT)
-            .after_release(is_sound)
+            .after_release(is_reusable)
             .connect_with(options.clone())
             .await?;
-        let before = schema::before(&mut *write.acquire().await?).await?;
+        let before = schema::check_migratable(&mut *write.acquire().await?).await?;
         MIGRATIONS
             .run(&write)
             .await
             .map_err(|error| StoreError::Database(error.into()))?;
-        let upgrade = schema::after(&mut *write.acquire().await?, before).await?;
+        let upgrade = schema::record_program(&mut *write.acquire().await?, before).await?;
         let read = SqlitePoolOptions::new()
             .max_connections(READERS)
-            .after_release(is_sound)
+            .after_release(is_reusable)
             .connect_with(options.create_if_missing(false).pragma("query_only", "ON"))
             .await?;
         let mut log = file.as_os_str().to_owned();
@@ -88,16 +88,16 @@ impl Database {
         })
     }
 
-    /// Begins a write. IMMEDIATE: a transaction that reads first and asks for the write lock later
-    /// fails at once, whatever the busy timeout, if another wrote in between.
+    /// Begins a write transaction. It is IMMEDIATE: a transaction that takes the write lock only after a
+    /// read fails at once if another wrote in between, regardless of the busy timeout.
     pub(crate) async fn begin(&self) -> Result<Transaction<'static, Sqlite>> {
         Ok(self.write.begin_with("BEGIN IMMEDIATE").await?)
     }
 
-    /// Writes what changes nothing, to the disk, as every commit does.
+    /// Commits a write to the disk that changes nothing.
     pub(crate) async fn probe_write(&self) -> Result<()> {
         let mut transaction = self.begin().await?;
-        // Nobody uses this number; setting it writes a page even if it stays the same.
+        // The number is unused; setting it writes a page even if the value is unchanged.
         sqlx::query("PRAGMA user_version = 0")
             .execute(&mut *transaction)
             .await?;

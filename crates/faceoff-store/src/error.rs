@@ -1,29 +1,29 @@
 use crate::program::Program;
-use faceoff_types::tells_of_full_disk;
+use faceoff_types::is_full_disk;
 use jiff::{Timestamp, civil::Date};
 use sqlx::error::DatabaseError;
 use std::{error::Error, fmt::Display};
 
-/// Why the store could not do what was asked.
+/// Why an operation of the store failed.
 #[derive(Debug, thiserror::Error)]
 pub enum StoreError {
-    /// No such team, submission, evaluation or artifact.
+    /// There is no team, submission, evaluation or artifact of this id.
     #[error("{0} not found")]
     NotFound(&'static str),
-    /// The outcomes of a run that has long been over; its summary and its dataset have what is asked for.
+    /// The outcomes of an old run were removed; its summary and its dataset remain.
     #[error("the run's single outcomes were removed at {at}; its dataset has them")]
-    Cleared {
+    OutcomesRemoved {
         at: Timestamp,
     },
     /// Names that differ only in case count as the same.
     #[error("a team named {0:?} exists already")]
     TeamNameTaken(String),
-    /// The day has had its cut, and has no other.
-    #[error("{day} had its cut at {cut_at}")]
-    DayHasCut {
-        /// The day, or a later one.
+    /// The cutoff of the day, or of a later one, has passed.
+    #[error("the cutoff of {day} was at {cutoff_at}")]
+    CutoffPassed {
+        /// The requested day, or a later one.
         day: Date,
-        cut_at: Timestamp,
+        cutoff_at: Timestamp,
     },
     /// Names that differ only in case count as the same.
     #[error("a stage named {0:?} exists already")]
@@ -31,82 +31,82 @@ pub enum StoreError {
     /// Names that differ only in case count as the same.
     #[error("a tournament named {0:?} exists already")]
     TournamentNameTaken(String),
-    /// The team has asked for as many games that do not count as it may on one UTC day.
-    #[error("{used} of {limit} games that do not count were asked for today")]
-    FreeGamesSpent {
+    /// The team has requested as many test games and friendly games as it may on one UTC day.
+    #[error("{used} of {limit} test and friendly games were requested today")]
+    GameQuotaExceeded {
         limit: u32,
         used: u32,
     },
-    /// The stage's days do not start yet, or no longer.
+    /// The stage is not open yet, or is closed.
     #[error("the stage {name:?} {}", match closed_at {
         Some(at) => format!("closed at {at}"),
         None => format!("opens at {opens_at}"),
     })]
     StageNotOpen {
         name: String,
-        /// From when on they start.
+        /// When the stage opens, or opened.
         opens_at: Timestamp,
-        /// When it closed, if it did.
+        /// When the stage closed, if it did.
         closed_at: Option<Timestamp>,
     },
-    /// The team neither uploads nor plays.
+    /// A disqualified team can neither upload nor compete.
     #[error("the team was disqualified at {at}: {reason}")]
     Disqualified {
         at: Timestamp,
-        /// As everybody may read it.
+        /// Shown publicly.
         reason: String,
     },
-    /// The team takes no part any more, by its own wish.
+    /// The team has withdrawn from the season.
     #[error("the team retired at {at}")]
     Retired {
         at: Timestamp,
     },
-    /// Nobody of the team has accepted the terms as they are now.
-    #[error("nobody of the team has accepted version {version} of the terms")]
-    TermsOwed {
+    /// No member of the team has accepted the current terms.
+    #[error("no member of the team has accepted version {version} of the terms")]
+    TermsNotAccepted {
         version: u32,
     },
     /// Names that differ only in case count as the same.
-    #[error("a person named {0:?} exists already")]
-    PersonNameTaken(String),
-    /// The link is worth nothing; the text says why.
+    #[error("a user named {0:?} exists already")]
+    UserNameTaken(String),
+    /// The invitation link is expired, used or revoked; the text says which.
     #[error("{0}")]
-    InvitationSpent(String),
-    /// The season is over: nothing more is uploaded or evaluated.
+    InvitationInvalid(String),
+    /// The season is closed: it accepts no uploads and runs no evaluations.
     #[error("the season was closed at {closed_at}")]
     SeasonClosed {
         closed_at: Timestamp,
     },
-    /// The season is an archive's: nothing of it changes.
+    /// The season was imported from an archive and is read-only.
     #[error("the season is archived as it was at {made_at}")]
     Archived {
-        /// The moment that the archive shows.
+        /// When the archive was made.
         made_at: Timestamp,
-        /// When it was taken in here.
+        /// When it was imported into this data folder.
         imported_at: Option<Timestamp>,
     },
-    /// The team has uploaded as much as it may on one UTC day.
+    /// The team has used its upload quota of the UTC day.
     #[error(
         "{used_bytes} of {limit_bytes} bytes of the day are used; the bundle has {bundle_bytes}"
     )]
-    DayQuotaSpent {
+    DailyQuotaExceeded {
         limit_bytes: u64,
         used_bytes: u64,
         bundle_bytes: u64,
     },
-    /// The team's bundles fill the room that it has.
+    /// The team's bundles fill its storage quota.
     #[error("{used_bytes} of {limit_bytes} bytes are stored; the bundle has {bundle_bytes}")]
-    StoredQuotaSpent {
+    StorageQuotaExceeded {
         limit_bytes: u64,
         used_bytes: u64,
         bundle_bytes: u64,
     },
-    /// What was asked does not fit the entity's state; the text says what does.
+    /// The request does not fit the entity's state; the text says what does.
     #[error("{0}")]
     Conflict(String),
-    /// A disk is full: what was asked is not done, or may not be, and can be once there is room.
+    /// A disk is full. The operation was not done, or may not be; it can be repeated once there is space.
     #[error("the disk is full: {0}")]
-    FullDisk(String),
+    DiskFull(String),
     /// A later version of the program has migrated the database.
     #[error(
         "the database is of a later version of Faceoff: {} has its migration {schema}, this is {} and knows {}; use that \
@@ -115,7 +115,7 @@ pub enum StoreError {
     )]
     NewerDatabase {
         schema: i64,
-        /// What opened it last.
+        /// The version that opened it last.
         program: Option<String>,
         this: Program,
     },
@@ -124,12 +124,12 @@ pub enum StoreError {
     /// The object store failed.
     #[error("artifacts: {0}")]
     Artifacts(String),
-    /// A stored value cannot be what this program wrote.
+    /// A stored value is not one that this program writes.
     #[error("stored value is damaged: {0}")]
     Damaged(String),
 }
 
-/// What the store's functions answer.
+/// Result of the store's functions.
 pub(crate) type Result<T, E = StoreError> = std::result::Result<T, E>;
 
 impl From<sqlx::Error> for StoreError {
@@ -138,13 +138,13 @@ impl From<sqlx::Error> for StoreError {
             sqlx::Error::ColumnDecode { index, source } => {
                 Self::Damaged(format!("column {index}: {source}"))
             }
-            sqlx::Error::Database(error) if is_full(&*error) => Self::FullDisk(error.to_string()),
+            sqlx::Error::Database(error) if is_full(&*error) => Self::DiskFull(error.to_string()),
             error => Self::Database(error),
         }
     }
 }
 
-/// SQLITE_FULL; and SQLITE_IOERR_SHMSIZE: the index of the log could not grow.
+/// SQLITE_FULL, or SQLITE_IOERR_SHMSIZE: the index of the write-ahead log could not grow.
 fn is_full(error: &dyn DatabaseError) -> bool {
     const CODES: [&str; 2] = ["13", "4874"];
     error
@@ -153,17 +153,17 @@ fn is_full(error: &dyn DatabaseError) -> bool {
 }
 
 impl StoreError {
-    /// An artifact that could not be read or written, and why.
-    pub(crate) fn artifact(what: impl Display, error: &(dyn Error + 'static)) -> Self {
-        let text = format!("{what}: {error}");
-        if tells_of_full_disk(error) {
-            Self::FullDisk(text)
+    /// The error for an artifact that could not be read or written.
+    pub(crate) fn artifact(context: impl Display, error: &(dyn Error + 'static)) -> Self {
+        let text = format!("{context}: {error}");
+        if is_full_disk(error) {
+            Self::DiskFull(text)
         } else {
             Self::Artifacts(text)
         }
     }
 
-    /// Was a uniqueness constraint broken, one whose columns contain `column`?
+    /// Did the statement violate a uniqueness constraint whose columns contain `column`?
     pub(crate) fn is_duplicate(error: &sqlx::Error, column: &str) -> bool {
         error
             .as_database_error()

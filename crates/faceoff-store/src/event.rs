@@ -1,4 +1,4 @@
-//! What is recorded of every change: who did what to what. The audit log, and what feeds read.
+//! Events: the record of every change, with its actor and its subject. They form the audit log and the feeds.
 
 mod actor;
 mod kinds;
@@ -11,7 +11,7 @@ pub use parse::ParseEventError;
 pub use subject::Subject;
 
 use faceoff_types::{
-    DivisionName, EvaluationId, InvitationId, LeftAs, PersonName, ProposalId, Retention,
+    DivisionName, EvaluationId, InvitationId, DepartureKind, UserName, ProposalId, Retention,
     RoundNumber, RunId, ShardId, StageId, StageName, StageRules, StageSettings, SubmissionId, Task,
     TeamId, TeamName, TokenId, TournamentRules, TournamentSettings, WebhookId, Zone,
 };
@@ -19,520 +19,500 @@ use jiff::{Timestamp, civil::Date};
 use serde::{Deserialize, Serialize};
 use uuid::Uuid;
 
-/// What happened. The variants' names and fields are stored: new ones may be added, old ones stay.
+/// The kind of a change, with its data. The names of variants and fields are stored: new ones may be added, old ones
+/// must stay.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 pub enum Event {
     /// The organiser invited a team.
     TeamCreated {
-        /// As it was at the invitation.
+        /// The team's name at the invitation.
         name: TeamName,
     },
-    /// The team has another token; all that it had are void.
+    /// The team got a new token; its earlier ones are revoked.
     TokenReplaced,
-    /// The subject has another token.
+    /// A token was created for the subject.
     TokenCreated {
         token: TokenId,
-        /// What its owner calls it.
+        /// The token's label, chosen by its owner.
         name: String,
-        /// From then on it is worth nothing.
+        /// When the token expires; `None`: never.
         expires_at: Option<Timestamp>,
     },
-    /// A token has another secret; the old one is void.
+    /// A token got a new secret; the old one is invalid.
     TokenRotated {
         token: TokenId,
-        /// What its owner calls it.
+        /// The token's label, chosen by its owner.
         name: String,
     },
-    /// A token is worth nothing any more.
     TokenRevoked {
         token: TokenId,
-        /// What its owner calls it.
+        /// The token's label, chosen by its owner.
         name: String,
     },
-    /// Somebody may join by a link.
+    /// An invitation link was created.
     Invited {
         invitation: InvitationId,
         /// `organiser`, `member`, `founder` or `return`.
         role: String,
         note: String,
-        /// From then on it is worth nothing.
         expires_at: Timestamp,
     },
-    /// The link is worth nothing any more.
     InvitationRevoked {
         invitation: InvitationId,
     },
-    /// They followed a link.
+    /// A user accepted an invitation.
     PersonJoined {
-        /// As they are called.
-        name: PersonName,
-        /// Whose member they are; none: an organiser.
+        name: UserName,
+        /// The team of a member; `None` for an organiser.
         team: Option<TeamId>,
     },
-    /// They may do nothing any more.
+    /// The user's account was closed.
     PersonLeft {
-        /// As they were called.
-        name: PersonName,
+        name: UserName,
     },
-    /// They signed in on a page.
+    /// The user signed in in a browser.
     SignedIn,
-    /// They have another password.
+    /// The user set a password.
     PasswordSet,
-    /// They accepted the terms.
+    /// The user accepted the terms.
     TermsAccepted {
         version: u32,
     },
-    /// There are other terms.
+    /// A new version of the terms was published.
     TermsPublished {
         /// From 1.
         version: u32,
     },
-    /// Teams can be in these.
+    /// The season's divisions were set.
     DivisionsSet {
-        /// In their order.
+        /// In display order.
         divisions: Vec<DivisionName>,
     },
-    /// Anybody may register a team.
+    /// Registration of teams is open to everyone.
     RegistrationOpened,
-    /// Teams come by invitation only.
+    /// Teams can join by invitation only.
     RegistrationClosed,
-    /// A team wants to take part.
+    /// A registration was submitted.
     TeamRegistered {
-        /// What it wants to be called.
+        /// The requested team name.
         name: TeamName,
     },
     RegistrationApproved {
         team: TeamId,
     },
     RegistrationRefused {
-        /// As who registered may read it.
+        /// Shown to the person who registered.
         reason: String,
     },
-    /// The team has another name.
+    /// The team was renamed.
     TeamRenamed {
         from: TeamName,
         to: TeamName,
     },
-    /// The team tells something else of itself.
+    /// The team's profile was changed.
     TeamDescribed {
-        /// Where it is from.
         affiliation: Option<String>,
         link: Option<String>,
-        /// The division that it is in.
         division: Option<DivisionName>,
     },
-    /// The team is a reference agent of the organisers from now on, which no board ranks.
+    /// The team became a baseline: a reference agent of the organisers, which no board ranks.
     TeamMadeBaseline,
-    /// The team is ranked as others are, and no baseline any more.
+    /// The team is ranked again and is no longer a baseline.
     TeamMadeRanked,
-    /// The team plays no more, by its own wish.
+    /// The team withdrew from the season.
     TeamRetired,
-    /// The team plays again.
+    /// The team rejoined the season.
     TeamReturned,
-    /// Everybody was told something.
+    /// An announcement was published.
     Announced {
-        /// What it is called.
         title: String,
     },
+    /// A team asked the organisers a question.
     Asked {
         team: TeamId,
     },
-    /// The organisers have answered.
+    /// The organisers answered a question.
     Answered {
-        /// May everybody read it?
+        /// Are question and answer public?
         public: bool,
     },
-    /// A bundle came, and its smoke run is queued.
+    /// A bundle was uploaded, and its validation run is queued.
     SubmissionUploaded {
         team: TeamId,
-        /// BLAKE3 of the archive.
+        /// BLAKE3 of the bundle.
         bundle_blake3: String,
     },
-    /// The smoke run found that the agent can be evaluated.
+    /// The validation run passed: the agent can be evaluated.
     SubmissionValid {
         /// The name in its manifest.
         agent_name: String,
     },
-    /// The smoke run found a fault of the team's.
+    /// The validation run failed by a fault of the submission.
     SubmissionInvalid {
-        /// What is wrong and where.
+        /// The fault and its location.
         reason: String,
     },
-    /// The smoke run could not be done, by our fault.
+    /// The validation run was given up by a platform fault.
     SubmissionNotValidated {
         reason: String,
     },
-    /// It is what its team enters at the next cut: the newest that is valid, or the team's choice.
+    /// It became its team's active submission, evaluated from the next cutoff on: the newest valid one, or the team's
+    /// choice.
     SubmissionActivated,
-    /// It does not play a day, since the stage does not take its runtime.
+    /// It was excluded from a day, because the stage does not accept its runtime.
     SubmissionNotTaken {
         stage: StageId,
         day: Date,
-        /// What the stage takes, and what came.
+        /// The runtimes that the stage accepts, and the submission's.
         reason: String,
     },
-    /// Its team has taken it back: it enters no further day.
+    /// Its team withdrew it: it is not evaluated on later days.
     SubmissionWithdrawn,
-    /// Its archive is removed; what it has played stays.
+    /// Its bundle was removed on request; its results stay.
     SubmissionDeleted {
-        /// As its team reads it.
+        /// Shown to its team.
         reason: String,
     },
-    /// Nobody plays it any more, and its archive is removed.
+    /// It is not needed any more, and its bundle was removed.
     ArchiveRemoved {
         reason: String,
     },
-    /// Its team calls it so.
+    /// Its team set or removed its label.
     SubmissionLabelled {
-        /// None any more, if it is null.
+        /// `None` if the label was removed.
         label: Option<String>,
     },
-    /// Its team has written something else about it, or nothing any more.
+    /// Its team changed or removed its note.
     SubmissionNoted,
-    /// A submission is to play a day.
+    /// An evaluation of a submission was queued.
     EvaluationQueued {
         team: TeamId,
         submission: SubmissionId,
-        /// Whose day; unknown of those from before there were stages.
+        /// The stage of the day; `None` for events from before there were stages.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         stage: Option<StageId>,
         day: Date,
         run: RunId,
-        /// The evaluation that is played again.
+        /// The evaluation that is repeated.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         rerun_of: Option<EvaluationId>,
     },
-    /// Its first shard was claimed.
+    /// The evaluation's first shard was claimed.
     EvaluationBegun,
-    /// Its last shard was committed; scoring is queued.
+    /// The evaluation's last shard was committed; scoring is queued.
     EvaluationFinalising,
-    /// Score and dataset are there.
+    /// The evaluation has a score and a dataset.
     EvaluationFinished {
         score: f64,
         /// BLAKE3 of the dataset's archive.
         dataset_blake3: String,
     },
-    /// Too many agent faults; no score.
+    /// The evaluation ended without a score after too many agent faults.
     EvaluationAgentFailed,
-    /// Our fault, given up.
+    /// The evaluation was given up after platform faults.
     EvaluationPlatformFailed {
         reason: String,
     },
     EvaluationCancelled {
-        /// As it was told to the team.
+        /// Shown to the team.
         reason: String,
     },
-    /// Its day's deadline came before it was played; the turn is given back.
+    /// The day's deadline passed before the evaluation was complete.
     EvaluationNotPlayed {
-        /// As it was told to the team.
+        /// Shown to the team.
         reason: String,
     },
-    /// Its result does not count any more; the turn is given back.
+    /// The evaluation's result no longer counts.
     EvaluationVoided {
-        /// As everybody may read it.
+        /// Public.
         reason: String,
     },
-    /// Its team has made its dataset public.
+    /// The team published the evaluation's dataset.
     EvaluationPublished,
-    /// Its dataset is removed; its result stays.
+    /// The evaluation's dataset was removed; its result stays.
     DatasetRemoved {
         reason: String,
     },
-    /// All of a day does not count any more; each of its evaluations has an event of its own.
+    /// All results of a day were voided; each of its evaluations has its own event.
     DayVoided {
-        /// As everybody may read it.
+        /// Public.
         reason: String,
     },
-    /// It neither plays nor is ranked from now on.
+    /// The team is neither evaluated nor ranked from now on.
     TeamDisqualified {
-        /// As everybody may read it.
+        /// Public.
         reason: String,
     },
-    /// It plays and is ranked again.
+    /// The team is evaluated and ranked again.
     TeamReinstated {
         reason: String,
     },
-    /// A submission is to be taken apart, profile by profile.
+    /// An ablation of a submission was requested.
     AblationOrdered {
         submission: SubmissionId,
-        /// Of each task in each profile.
+        /// Episodes of each task in each profile.
         episodes_per_task: u32,
     },
-    /// All of its runs are played.
+    /// All runs of the ablation are complete.
     AblationFinished,
-    /// It ended without a result.
+    /// The ablation ended without a result.
     AblationFailed {
-        /// Whose fault it was and which.
+        /// The fault, and whether it is the agent's or the platform's.
         reason: String,
     },
-    /// Evaluations are to be played without counting.
+    /// A trial or a proposed re-evaluation was queued.
     ProposalMade {
         stage: StageId,
         evaluations: u32,
         reason: String,
     },
-    /// All of its evaluations are over.
+    /// All evaluations of the proposal have ended.
     ProposalPlayed,
-    /// What it has played counts; each of its evaluations has an event of its own.
+    /// The proposal's results count from now on; each of its evaluations has its own event.
     ProposalApplied,
-    /// What it has played will never count.
+    /// The proposal's results will never count.
     ProposalDropped,
-    /// It was played as a part of a proposal, and counts from now on.
+    /// An evaluation of a proposal counts from now on.
     EvaluationApplied {
         proposal: ProposalId,
     },
-    /// Episodes were played and their outcomes stored.
+    /// A shard was played and the outcomes of its episodes stored.
     ShardCommitted {
-        /// What they are a part of.
         run: RunId,
         shard: ShardId,
         task: Task,
-        /// The first one.
         first_episode: u32,
-        /// One past the last one.
+        /// One past the last episode.
         end_episode: u32,
         /// Episodes that ended by a fault of the agent.
         agent_faults: u32,
     },
-    /// A fault of ours: the unit of work will be tried again, or was given up.
+    /// A job failed by a platform fault; it is retried, or was given up.
     UnitGivenBack {
-        /// The unit, as the server's log names it.
+        /// Id of the job, as in the server's log.
         unit: Uuid,
-        /// Reported failures of this unit so far.
+        /// Reported failures of this job so far.
         failures: u32,
         reason: String,
     },
-    /// The cut of a day: its evaluations were queued, each with an event of its own.
+    /// The day's cutoff: its evaluations were queued, each with its own event.
     DayStarted {
         evaluations: u32,
     },
-    /// The day's deadline has come: what was left of it is ended, each with an event of its own.
+    /// The day's deadline passed: its open evaluations were ended, each with its own event.
     DayOverdue {
-        /// How many were not played.
+        /// Evaluations that were not complete.
         not_played: u32,
     },
-    /// The day's seed is public: its last evaluation has ended (before there were cuts: its first
-    /// dataset was handed out).
+    /// The day's seed is public: its last evaluation has ended (before there were cutoffs: its first
+    /// dataset was downloaded).
     DayReleased,
-    /// A day that was missed on its date starts after all.
+    /// A day that was missed on its date was started later.
     MissedDayStarted {
-        /// As everybody may read it.
+        /// Public.
         reason: String,
     },
-    /// It is a turn beside the day's own.
+    /// The evaluation is an extra one, beside the team's regular one of the day.
     ExtraTurnGiven {
-        /// As everybody may read it.
+        /// Public.
         reason: String,
     },
-    /// The stage's boards show from now on what they show now.
+    /// The stage's boards are frozen in their current state.
     BoardsFrozen {
-        /// As everybody may read it.
+        /// Public.
         reason: String,
     },
-    /// The stage's boards show everything again.
+    /// The stage's boards are updated again.
     BoardsUnfrozen,
-    /// The season has another stage.
     StageCreated {
-        /// As it was then.
         name: StageName,
-        /// From when on its days start.
         opens_at: Timestamp,
-        /// Until when; none: it has no end yet.
+        /// `None`: no end is set.
         closes_at: Option<Timestamp>,
-        /// Where its days are dates.
+        /// Time zone of the stage's dates.
         zone: Zone,
-        /// What scores depend on.
+        /// Everything that scores depend on.
         rules: StageRules,
-        /// What they do not depend on.
+        /// Everything that scores do not depend on.
         settings: StageSettings,
     },
-    /// The stage's name, times or settings are others: all of them as they are now.
+    /// The stage's name, times or settings were changed; all new values are given.
     StageChanged {
         name: StageName,
-        /// From when on its days start.
         opens_at: Timestamp,
-        /// Until when; none: it has no end yet.
+        /// `None`: no end is set.
         closes_at: Option<Timestamp>,
-        /// Where its days are dates.
+        /// Time zone of the stage's dates.
         zone: Zone,
-        /// What no score depends on.
+        /// Everything that scores do not depend on.
         settings: StageSettings,
     },
-    /// The stage keeps other files of what it has played.
+    /// The retention of the stage's files was changed.
     StageRetentionChanged {
-        /// From now on.
         retention: Retention,
     },
-    /// The stage has other rules from now on; before it opens, from its opening on.
+    /// The stage's rules were changed: at once, or from its opening on if it is not open yet.
     StageRulesChanged {
-        /// From 1; before the opening, the one that there was.
+        /// From 1. Before the opening, a change replaces the rules of the same revision.
         revision: u32,
         rules: StageRules,
     },
-    /// Its one day after the close has had its cut; the day has an event of its own.
+    /// The cutoff of the stage's final day, the only day after its close. The day has its own event.
     StageFinalStarted {
         day: Date,
     },
-    /// Its result is signed off: nothing of it changes any more.
+    /// The stage is signed off: its results are final.
     StageFinalised,
-    /// The season has another tournament.
     TournamentOpened {
-        /// As it was then.
         name: StageName,
-        /// What results depend on.
+        /// Everything that results depend on.
         rules: Box<TournamentRules>,
-        /// What they do not depend on.
+        /// Everything that results do not depend on.
         settings: TournamentSettings,
-        /// Its first teams.
+        /// The teams at the opening.
         teams: Vec<TeamId>,
     },
-    /// It is otherwise: all of it as it is now.
+    /// The tournament was changed; all new values are given.
     TournamentChanged {
         name: StageName,
-        /// What results depend on.
+        /// Everything that results depend on.
         rules: Box<TournamentRules>,
-        /// What they do not depend on.
+        /// Everything that results do not depend on.
         settings: TournamentSettings,
-        /// The agent to test against.
+        /// The opponent in test games.
         baseline: Option<SubmissionId>,
     },
-    /// No game of it begins from now on.
+    /// No game of the tournament starts until it is resumed.
     TournamentPaused {
-        /// As everybody may read it.
+        /// Public.
         reason: String,
     },
-    /// Its games begin again.
     TournamentResumed,
-    /// Nothing of it changes any more.
+    /// The tournament's results are final.
     TournamentClosed,
-    /// Teams are in it from now on.
+    /// Teams were added to the tournament.
     TeamsEntered {
         teams: Vec<TeamId>,
     },
-    /// A team is not in it any more, before anything was played.
+    /// A team was removed from the tournament before its first round.
     TeamOut {
         team: TeamId,
-        /// As everybody may read it.
+        /// Public.
         reason: String,
     },
-    /// A team plays no more in it; each of its games that is called off has an event of its own.
+    /// A team left the running tournament; each of its cancelled games has its own event.
     TeamLeftTournament {
         team: TeamId,
-        left_as: LeftAs,
-        /// The first round whose games with it do not count.
+        left_as: DepartureKind,
+        /// The first round in which its games do not count.
         from_round: RoundNumber,
-        /// As everybody may read it.
+        /// Public.
         reason: String,
     },
-    /// What its teams have active is fixed, and its games are queued.
+    /// The round's submissions are fixed, and its games are queued.
     RoundStarted {
         round: RoundNumber,
         games: u32,
     },
-    /// The last of its games has ended.
+    /// The round's last game has ended.
     RoundOver {
         round: RoundNumber,
     },
-    /// The schedule is to be played again, without counting.
+    /// Replays of the schedule were requested; they do not count.
     ReplaysOrdered {
         times: u32,
         games: u32,
     },
-    /// What was not played of it is called off.
+    /// The replays that had not been played were cancelled.
     ReplaysCancelled {
         games: u32,
     },
-    /// A game that does not count waits.
+    /// A test game or a friendly game was queued.
     FreeGameQueued {
         team: TeamId,
-        /// Against whom; none: the baseline.
+        /// The opponent in a friendly game; `None`: a test game against the baseline.
         opponent: Option<TeamId>,
     },
-    /// A slot plays it.
+    /// A slot started the game.
     GameBegun {
-        /// Which attempt, from 1.
+        /// From 1.
         attempt: u32,
     },
-    /// It has a result.
+    /// The game has a result.
     GamePlayed {
         attempt: u32,
     },
-    /// Our fault, given up: it has no result.
+    /// The game was given up after platform faults: it has no result.
     GameBroken {
         reason: String,
     },
-    /// Its result counts no more.
+    /// The game's result no longer counts.
     GameVoided {
-        /// As everybody may read it.
+        /// Public.
         reason: String,
     },
-    /// It is to be played again.
+    /// The game is to be played again.
     GameQueuedAgain,
-    /// It is not played.
     GameCancelled {
-        /// As everybody may read it.
+        /// Public.
         reason: String,
     },
-    /// Does the team play no friendly games that others ask for?
+    /// The team changed whether it accepts friendly games that other teams request.
     FriendlyGamesDeclined {
-        /// Or does it again.
+        /// True if it declines them.
         declines: bool,
     },
-    /// A program is told of what happens.
     WebhookCreated {
         webhook: WebhookId,
-        /// What its owner calls it.
+        /// The webhook's label, chosen by its owner.
         name: String,
     },
-    /// It is somewhere else, told of something else, called otherwise, or told again.
+    /// The webhook's address, events or name were changed, or it was enabled again.
     WebhookChanged {
         webhook: WebhookId,
-        /// What its owner calls it.
+        /// The webhook's label, chosen by its owner.
         name: String,
     },
-    /// It has another secret.
+    /// The webhook got a new secret.
     WebhookRotated {
         webhook: WebhookId,
-        /// What its owner calls it.
+        /// The webhook's label, chosen by its owner.
         name: String,
     },
-    /// It is told nothing any more, by its owner's wish.
+    /// The webhook was deleted by its owner.
     WebhookRemoved {
         webhook: WebhookId,
-        /// What its owner called it.
+        /// The webhook's label, chosen by its owner.
         name: String,
     },
-    /// It is told nothing any more, since it takes nothing.
+    /// The webhook was disabled, because its deliveries kept failing.
     WebhookDied {
         webhook: WebhookId,
         reason: String,
     },
-    /// Nothing of the queue is begun from now on.
+    /// No job of the queue starts until it is resumed.
     QueuePaused {
-        /// As everybody may read it.
+        /// Public.
         reason: String,
     },
-    /// The queue goes on.
     QueueResumed,
-    /// Nothing is taken of a worker on another machine any more.
+    /// Results of a remote worker are rejected from now on.
     WorkerBanned {
-        /// What it is called.
         worker: String,
         reason: String,
-        /// How many shards that it played are played again.
+        /// Number of its shards that are repeated.
         again: u32,
     },
-    /// A worker's work is taken again.
+    /// Results of the remote worker are accepted again.
     WorkerReadmitted {
-        /// What it is called.
         worker: String,
     },
-    /// The season has another name.
+    /// The season was renamed.
     SeasonNamed {
         name: String,
     },
-    /// The secret is public and nothing more is evaluated.
+    /// The season is closed: its secret is public, and no evaluations start.
     SeasonClosed,
 }
 
@@ -541,26 +521,25 @@ pub enum Event {
 pub struct EventRecord {
     /// Rises with every event of the data folder, in the order of the commits.
     pub id: i64,
-    /// By the clock of whoever wrote it.
+    /// By the clock of the process that wrote it.
     pub at: Timestamp,
     pub actor: Actor,
-    /// What it is about.
     pub subject: Subject,
     pub event: Event,
 }
 
-/// What a listener of this process hears.
+/// A notification to this process's listeners.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Change {
-    /// It is in the events table.
+    /// A stored event.
     Recorded(Box<EventRecord>),
-    /// Work on the subject has advanced. Nothing is recorded of it: it comes every second from every
-    /// slot, the next one replaces it, and what matters in the end is in the shard's commit.
+    /// A job on the subject has made progress. It is not stored: it comes every second from every
+    /// slot, each one replaces the last, and the shard's commit has the final numbers.
     Progress(Subject),
 }
 
 impl Change {
-    /// What to look at again.
+    /// The subject whose data has changed.
     #[must_use]
     pub const fn subject(&self) -> Subject {
         match self {

@@ -1,77 +1,76 @@
-//! Is the store fit for work? Asked by whoever watches the server.
+//! Health of the database and of the queue, for monitoring.
 
 use crate::{
     boxed,
     error::Result,
-    queue::{self, Standing},
+    queue::{self, QueueGauges},
     store::Store,
     tables::rulings::Ruling,
 };
 use jiff::{SignedDuration, Timestamp};
 use std::sync::atomic::Ordering;
 
-/// Answers about the database are as good as new for so long; a stranger who asks often costs no more
-/// writes than this.
+/// The result of a write probe is reused for this time: frequent requests, which need no account, cause
+/// no more writes than this.
 const PROBE_EVERY: SignedDuration = SignedDuration::from_secs(1);
 
-/// Work that waits for longer than this while nobody works or looks for work is stuck.
+/// The queue is stuck if a job has waited for longer than this while no job runs and no worker polls.
 const STUCK_AFTER: SignedDuration = SignedDuration::from_secs(60);
 
-/// How the store stands.
+/// Health of the store.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Health {
-    /// Can the database be written? It was tried.
+    /// Did the last write probe of the database succeed?
     pub database_writable: bool,
-    /// Does work get done?
     pub queue: QueueHealth,
 }
 
-/// How the queue stands.
+/// Health of the queue.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum QueueHealth {
-    /// What can be done is being done.
-    Moving {
-        /// Units under a lease that runs.
+    /// Jobs are processed.
+    Running {
+        /// Jobs under a valid lease.
         running: u32,
-        /// Units that could be begun.
+        /// Jobs that can be claimed.
         waiting: u32,
-        /// Units that found no room again and again, although the disk is not short of it: they need more.
-        without_room: u32,
+        /// Jobs that ran out of disk space repeatedly although enough is free: they need more.
+        out_of_space: u32,
     },
-    /// Nothing is begun: there is too little [`Room`](crate::Room).
+    /// No job starts: there is too little [`FreeSpace`](crate::FreeSpace).
+    DiskFull {
+        /// Jobs that could be claimed otherwise.
+        waiting: u32,
+    },
+    /// No job starts: an organiser has paused the queue.
     Paused {
-        /// Units that could be begun otherwise.
-        waiting: u32,
-    },
-    /// Nothing is begun: the organiser holds it.
-    Held {
-        /// Units under a lease that runs.
+        /// Jobs under a valid lease.
         running: u32,
-        /// Units that could be begun otherwise.
+        /// Jobs that could be claimed otherwise.
         waiting: u32,
-        /// Since when, and why.
+        /// Time and reason of the pause.
         ruling: Ruling,
     },
-    /// Work waits, and nobody comes for it.
+    /// Jobs can be claimed, and no worker polls for them.
     Stuck {
-        /// Units that could be begun.
+        /// Jobs that can be claimed.
         waiting: u32,
-        /// Since when the first of them.
+        /// Since when the first of them can be claimed.
         since: Timestamp,
     },
-    /// The database does not tell.
+    /// The database cannot be read.
     Unknown,
 }
 
 impl Store {
-    /// A worker of this process looked for work just now, and the queue answered.
-    pub fn looked_for_work(&self, now: Timestamp) {
-        self.pulse
-            .looked_at
+    /// Records that a worker of this process polled for a job and the queue answered.
+    pub fn record_poll(&self, now: Timestamp) {
+        self.probes
+            .last_poll_ms
             .store(now.as_millisecond(), Ordering::Relaxed);
     }
 
-    /// How the store stands. Nothing that anybody can see is changed by the question.
+    /// Health of the store. The write probe changes no data.
     #[boxed]
     pub async fn health(&self, now: Timestamp) -> Health {
         Health {
@@ -81,56 +80,56 @@ impl Store {
     }
 
     async fn is_writable(&self, now: Timestamp) -> bool {
-        // one probe at a time: who comes meanwhile gets its answer
-        let mut probed = self.pulse.probed.lock().await;
-        if let Some((at, writable)) = *probed
+        // one probe at a time: concurrent callers wait and get its result
+        let mut last = self.probes.last_write.lock().await;
+        if let Some((at, writable)) = *last
             && now.duration_since(at).abs() < PROBE_EVERY
         {
             return writable;
         }
         let outcome = self.database.probe_write().await;
         if let Err(error) = &outcome
-            && !matches!(*probed, Some((_, false)))
+            && !matches!(*last, Some((_, false)))
         {
             tracing::error!(%error, "the database cannot be written");
         }
-        *probed = Some((now, outcome.is_ok()));
+        *last = Some((now, outcome.is_ok()));
         outcome.is_ok()
     }
 
     async fn queue_health(&self, now: Timestamp) -> Result<QueueHealth> {
-        let Standing {
+        let QueueGauges {
             running,
             waiting,
             waiting_since,
-            without_room,
-        } = queue::standing(&mut *self.database.read.acquire().await?, now).await?;
-        if self.room.is_short() {
-            return Ok(QueueHealth::Paused { waiting });
+            out_of_space,
+        } = queue::gauges(&mut *self.database.read.acquire().await?, now).await?;
+        if self.free_space.is_short() {
+            return Ok(QueueHealth::DiskFull { waiting });
         }
         if let Some(ruling) = self.season().await?.paused {
-            return Ok(QueueHealth::Held {
+            return Ok(QueueHealth::Paused {
                 running,
                 waiting,
                 ruling,
             });
         }
-        let since_looked = now
+        let since_poll_ms = now
             .as_millisecond()
-            .saturating_sub(self.pulse.looked_at.load(Ordering::Relaxed));
-        let long = |since: Timestamp| now.duration_since(since) > STUCK_AFTER;
+            .saturating_sub(self.probes.last_poll_ms.load(Ordering::Relaxed));
+        let is_overdue = |since: Timestamp| now.duration_since(since) > STUCK_AFTER;
         Ok(match waiting_since {
             Some(since)
                 if running == 0
-                    && long(since)
-                    && i128::from(since_looked) > STUCK_AFTER.as_millis() =>
+                    && is_overdue(since)
+                    && i128::from(since_poll_ms) > STUCK_AFTER.as_millis() =>
             {
                 QueueHealth::Stuck { waiting, since }
             }
-            _ => QueueHealth::Moving {
+            _ => QueueHealth::Running {
                 running,
                 waiting,
-                without_room,
+                out_of_space,
             },
         })
     }

@@ -1,16 +1,16 @@
-//! What Faceoff remembers: teams, submissions, evaluations, shards and the queue of work in SQLite,
+//! Persistence of Faceoff: teams, submissions, evaluations, shards and the job queue in SQLite;
 //! bundles, recordings and datasets as artifacts in an object store.
 //!
-//! SQL stays in here, in three levels: the queue, whose units know nothing of what they are for; the
-//! tables, with their rows; the operations, which are transactions over both. Reads stand beside the
-//! operations. Every change goes through one function, which also appends to the events table and
-//! then wakes listeners, so that a process killed at any point leaves either all of it or nothing.
+//! All SQL is in this crate, in three layers. The queue holds jobs without knowing their purpose. The
+//! tables define the rows. The operations are transactions over both. The queries read rows for the API
+//! and the pages. Every change goes through one function, which also appends to the events table and
+//! then wakes listeners. A process killed at any point leaves either the whole change or none of it.
 //! The store runs no agent, computes no score and reads no clock: instants are passed in. Per-step
 //! data never enters the database.
 //!
 //! # Durability
-//! Write-ahead log with `synchronous = FULL`: what a function has returned survives `kill -9` and a
-//! power cut. SQLite has one writer, so there is one write connection, and every transaction on it
+//! Write-ahead log with `synchronous = FULL`: a change that a function has reported survives `kill -9`
+//! and a power cut. SQLite has one writer, so there is one write connection. Every transaction on it
 //! begins IMMEDIATE: it waits for another process's writer instead of failing half way.
 //!
 //! # Queries
@@ -29,10 +29,10 @@ mod live;
 mod log;
 mod operations;
 mod program;
-mod pulse;
+mod health_probes;
 mod queue;
-mod reads;
-mod room;
+mod queries;
+mod free_space;
 mod schema;
 mod signals;
 mod store;
@@ -40,88 +40,88 @@ mod tables;
 mod workers;
 mod write;
 
-/// What others await is boxed. The body of an `async fn` is compiled by each crate that awaits it, and by none
-/// before: the web side, the workers and every file of tests compiled the store's again. A call costs an allocation.
+/// Boxes the futures of public functions. Each crate that awaits an `async fn` compiles its body; boxed, only the store
+/// does. This saves the server, the workers and every test from compiling it. A call costs one allocation.
 pub(crate) use async_recursion::async_recursion as boxed;
 
 pub use artifacts::{ArtifactStream, Artifacts};
 pub use error::StoreError;
 pub use event::{Actor, Change, Event, EventRecord, ParseEventError, Subject};
 pub use health::{Health, QueueHealth};
-pub use live::{LIVE_GAMES_KEPT, LiveGames, LiveMark, LiveNews, LiveWatch};
-pub use log::LOG_BOUND_BYTES;
+pub use live::{MAX_FINISHED_LIVE_GAMES, LiveGames, LiveCursor, LiveUpdate, LiveSubscription};
+pub use log::MAX_LOG_BYTES;
 pub use operations::{
     announcements::MAX_OPEN_QUESTIONS,
     backup::CheckedDatabase,
     claim::MAX_LEASES,
-    commit::Committed,
-    describe_submission::SubmissionWords,
-    give_back::MAX_ATTEMPTS,
-    invitations::{Code, Joined, Joining, MAX_OPEN_INVITATIONS, NewInvitation},
+    commit::CommitOutcome,
+    submission_description::SubmissionDescription,
+    lease_release::MAX_ATTEMPTS,
+    invitations::{CodeStatus, JoinOutcome, JoinRequest, MAX_OPEN_INVITATIONS, NewInvitation},
     proposals::Reevaluation,
-    purpose::Lot,
-    registrations::{MAX_WAITING, NewRegistration},
+    purpose::JobFilter,
+    registrations::{MAX_PENDING_REGISTRATIONS, NewRegistration},
     rerun::RERUN_PAUSES_S,
-    retention::{FILES_KEPT, Removed},
+    retention::{FILES_KEPT_FOR, RemovalSummary},
     runs::RunOwner,
     snapshot::Snapshot,
     stages::{NewStage, StageChange},
     teams::TeamChange,
-    tidy::{RECORDINGS_KEPT, UNCHECKED_KEPT},
-    tokens::{Holder, LAST_USE, MAX_TOKENS, NewToken, Refusal, SESSION, Who},
+    cleanup::{RECORDINGS_KEPT_FOR, UNCHECKED_KEPT_FOR},
+    tokens::{VerifiedToken, LAST_USE_INTERVAL, MAX_TOKENS, NewToken, TokenRejection, SESSION_LIFETIME, Principal},
     tournament::{
-        entrants::Leaving,
+        entrants::DepartureRequest,
         open::{NewTournament, TournamentChange},
         replays::MAX_REPLAYS,
     },
     webhooks::{
-        AttemptMeans, DELIVERIES_KEPT, FAILING_FOR, MAX_ORGANISER_WEBHOOKS, MAX_TEAM_WEBHOOKS,
-        MAX_WAITING_DELIVERIES, NewWebhook, OLD_SECRET, PlannedDeliveries, WebhookChange,
+        DeliveryOutcome, DELIVERIES_KEPT_FOR, DISABLED_AFTER, MAX_ORGANISER_WEBHOOKS, MAX_TEAM_WEBHOOKS,
+        MAX_PENDING_DELIVERIES, NewWebhook, OLD_SECRET_VALID_FOR, PlannedDeliveries, WebhookChange,
     },
-    work::{Claimed, RunSeeds, Work},
+    jobs::{ClaimedJob, RunSeeds, Job},
 };
 pub use program::Program;
-pub use queue::Claim;
-pub use reads::{
+pub use queue::JobClaim;
+pub use queries::{
     board::{BoardRecord, BoardScope},
-    concerns::Concern,
-    evaluations::EvaluationsOf,
-    numbers::Numbers,
-    outlook::{OpenWork, Outlook, QueuePlace},
+    subject_contexts::SubjectContext,
+    evaluations::EvaluationFilter,
+    gauges::Gauges,
+    queue_forecast::{EvaluationBacklog, QueueForecast, QueuePosition},
     runs::RunFaults,
-    standings::BoardDays,
-    storage::{Counted, TeamStorage},
-    tournaments::{GamesOf, TournamentRecord},
-    worker_bans::PlayedBy,
+    board_days::BoardDays,
+    storage::{StorageScope, TeamStorage},
+    tournaments::{GameFilter, TournamentRecord},
+    worker_bans::WorkerResults,
 };
-pub use room::{DiskSpace, Room};
+pub use free_space::{DiskSpace, FreeSpace};
 pub use schema::Upgrade;
 pub use store::Store;
 pub use tables::{
     ablations::{Ablation, AblationState},
     announcements::Announcement,
-    archived::{Archived, Edition, KeptArtifact, KeptOf, ParseEditionError},
+    archive::{ArchivedSeason, Edition, ArchivedArtifact, ArtifactOwner, ParseEditionError},
     bundles::{UploadQuota, UploadUsage},
     days::Day,
     deliveries::{Delivery, DeliveryAttempt, DeliveryState},
-    drafts::Draft,
-    entrants::{Entrant, Leave},
+    proposed_evaluations::ProposedEvaluation,
+    entrants::{Entrant, Departure},
     evaluations::{Evaluation, EvaluationState},
     events::EventFilter,
-    finalised::Finalised,
+    sign_offs::SignOff,
     game_attempts::{AttemptEnd, AttemptOutcome, GameAttempt},
-    games::{Game, GameCommit, GamePurpose, GameRecording, GameResultRow, GameState, Meeting},
-    invitations::{Invitation, InvitationState, InvitedAs},
-    measured::Measured,
-    needed::Needed,
-    people::Person,
+    games::{Game, GameCommit, GamePurpose, GameRecording, GameResultRow, GameState, ScheduleEntry},
+    invitations::{Invitation, InvitationState, InvitationRole},
+    job_durations::JobDurations,
+    required_artifacts::RequiredArtifact,
+    users::User,
     plan::RunPlan,
-    proposals::{Proposal, ProposalKind, Settled},
+    proposals::{Proposal, ProposalKind, ProposalOutcome},
     questions::{Question, Reply},
     registrations::{Registration, RegistrationState},
     rounds::{DrawnMatchday, DrawnRound, RoundBye, TournamentRound},
     rulings::Ruling,
-    runs::{Clearable, Run},
+    runs::{ClearableRun, Run},
     season::Season,
     shards::{Shard, ShardCommit},
     stages::{Revision, Stage, StagePhase},
@@ -130,10 +130,10 @@ pub use tables::{
     terms::Terms,
     tokens::{Token, TokenKind, TokenOwner},
     tournaments::Tournament,
-    webhooks::{DeadWebhook, Webhook, WebhookKeys},
+    webhooks::{DisabledWebhook, Webhook, WebhookSecrets},
     worker_bans::WorkerBan,
 };
 pub use workers::{
-    NoWorkerName, Storing, WORKER_SILENT, WorkTold, WorkerAbout, WorkerBusy, WorkerHeard,
+    ParseWorkerNameError, UploadGuard, WORKER_TIMEOUT, SlotReport, WorkerInfo, SlotStatus, WorkerStatus,
     WorkerName, Workers,
 };

@@ -1,67 +1,67 @@
-//! Games as they are played, for those who watch: in memory alone, since what counts is stored in the end.
+//! Live games, for viewers. The data is in memory only: the result is stored at the end.
 
 use crate::boxed;
-use faceoff_types::{GameHappening, GameId, LiveGame, LiveHappening, LivePosition};
+use faceoff_types::{GameEvent, GameId, LiveGame, LiveEvent, LivePosition};
 use std::{
     collections::VecDeque,
     sync::{Arc, Mutex, MutexGuard, PoisonError},
 };
 use tokio::sync::watch;
 
-/// How many games that are over are kept, so that who comes late still gets the end.
-pub const LIVE_GAMES_KEPT: usize = 32;
+/// Number of finished games that are kept, so that late viewers still see their end.
+pub const MAX_FINISHED_LIVE_GAMES: usize = 32;
 
-/// The games that this process's slots play, and the last ones that they played. Cloning is cheap. Who tells of a
-/// game never waits for who watches it.
+/// The games that this process's slots play, and the last finished ones. Cloning is cheap. Updating a game never waits for
+/// its viewers.
 #[derive(Debug, Clone, Default)]
 pub struct LiveGames {
-    /// Those begun last are at the end.
-    games: Arc<Mutex<VecDeque<Known>>>,
+    /// In the order in which they were last started.
+    games: Arc<Mutex<VecDeque<GameChannel>>>,
 }
 
-/// A game that is kept, and who may be told of it.
-type Known = (GameId, watch::Sender<Told>);
+/// A game with the channel to its viewers.
+type GameChannel = (GameId, watch::Sender<LiveAttempt>);
 
-/// What was told of an attempt at a game.
+/// The live data of an attempt at a game.
 #[derive(Debug)]
-struct Told {
-    stands: LiveGame,
-    happenings: Vec<LiveHappening>,
+struct LiveAttempt {
+    state: LiveGame,
+    events: Vec<LiveEvent>,
 }
 
-/// Somebody who watches a game.
+/// A viewer's subscription to a game.
 #[derive(Debug, Clone)]
-pub struct LiveWatch {
-    told: watch::Receiver<Told>,
+pub struct LiveSubscription {
+    attempt: watch::Receiver<LiveAttempt>,
 }
 
-/// How far somebody has read: in which attempt, and how many happenings of it. Those that happen later are greater.
+/// A viewer's position in a game: the attempt, and the number of its events that were read. Later positions are greater.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub struct LiveMark {
+pub struct LiveCursor {
     /// From 1.
     pub attempt: u32,
-    /// Happenings read; so the number of the last one, from 1.
-    pub happenings: u32,
+    /// Number of events read, which is also the number of the last one, from 1.
+    pub events: u32,
 }
 
-/// What somebody has not read yet.
+/// The part of a game that a viewer has not read yet.
 #[derive(Debug, Clone, PartialEq)]
-pub struct LiveNews {
-    /// How the game stands.
-    pub stands: LiveGame,
-    /// What happened after the mark that was given; all of the attempt, if that is of another attempt or none was.
-    pub happenings: Vec<LiveHappening>,
-    /// Before the first of these happenings.
-    pub after: LiveMark,
-    /// After the last of them.
-    pub mark: LiveMark,
+pub struct LiveUpdate {
+    /// The current state of the game.
+    pub state: LiveGame,
+    /// The events after the viewer's cursor; all of the attempt if there was none, or one of another attempt.
+    pub events: Vec<LiveEvent>,
+    /// The position before the first of these events.
+    pub start: LiveCursor,
+    /// The position after the last of them.
+    pub end: LiveCursor,
 }
 
 impl LiveGames {
-    /// A slot begins a game: what was told of earlier attempts is forgotten.
+    /// Starts an attempt at a game; its earlier attempts are forgotten.
     pub fn begin(&self, game: GameId, attempt: u32, steps: u32) {
-        let begun = Told {
-            stands: LiveGame {
+        let new = LiveAttempt {
+            state: LiveGame {
                 game,
                 attempt,
                 steps,
@@ -70,139 +70,138 @@ impl LiveGames {
                 position: None,
                 is_over: false,
             },
-            happenings: Vec::new(),
+            events: Vec::new(),
         };
         let mut games = self.games();
         let at = games.iter().position(|(known, _)| *known == game);
         match at.and_then(|at| games.remove(at)) {
-            Some((_, told)) => {
-                told.send_replace(begun);
-                games.push_back((game, told));
+            Some((_, channel)) => {
+                channel.send_replace(new);
+                games.push_back((game, channel));
             }
-            None => games.push_back((game, watch::Sender::new(begun))),
+            None => games.push_back((game, watch::Sender::new(new))),
         }
-        forget_the_oldest(&mut games);
+        remove_oldest_finished(&mut games);
     }
 
-    /// Tells what happened, and where things are. Of another attempt than the last one begun, or of one that is over,
-    /// it is not heard.
+    /// Adds events, and updates the position. Ignored if the attempt has ended or is not the newest one.
     pub fn advance(
         &self,
         game: GameId,
         attempt: u32,
-        happenings: Vec<LiveHappening>,
+        events: Vec<LiveEvent>,
         position: Option<LivePosition>,
     ) {
-        self.tell(game, attempt, |told| {
-            for happening in happenings {
-                told.hear(happening);
+        self.update(game, attempt, |current| {
+            for event in events {
+                current.record(event);
             }
-            told.stands.position = position.or(told.stands.position);
+            current.state.position = position.or(current.state.position);
         });
     }
 
-    /// Nothing more is told of an attempt. One whose end was not told was broken off.
-    pub fn over(&self, game: GameId, attempt: u32) {
-        self.tell(game, attempt, |told| {
-            told.hear(LiveHappening {
-                step: told.stands.position.map_or(0, |position| position.step),
-                what: GameHappening::BrokenOff,
+    /// Ends an attempt. If its last event was not reported, it was broken off.
+    pub fn end_attempt(&self, game: GameId, attempt: u32) {
+        self.update(game, attempt, |current| {
+            current.record(LiveEvent {
+                step: current.state.position.map_or(0, |position| position.step),
+                event: GameEvent::Aborted,
             });
         });
     }
 
-    /// To watch a game; none if no slot of this process has begun it, or many others since it was over.
+    /// Subscribes to a game. `None` if no slot of this process has started it, or if it was forgotten since its end.
     #[must_use]
-    pub fn watch(&self, game: GameId) -> Option<LiveWatch> {
-        let told = self.find(game)?;
-        Some(LiveWatch {
-            told: told.subscribe(),
+    pub fn subscribe(&self, game: GameId) -> Option<LiveSubscription> {
+        let channel = self.find(game)?;
+        Some(LiveSubscription {
+            attempt: channel.subscribe(),
         })
     }
 
-    fn tell(&self, game: GameId, attempt: u32, change: impl FnOnce(&mut Told)) {
-        let Some(told) = self.find(game) else {
+    fn update(&self, game: GameId, attempt: u32, change: impl FnOnce(&mut LiveAttempt)) {
+        let Some(channel) = self.find(game) else {
             return;
         };
-        told.send_if_modified(|told| {
-            let is_heard = told.stands.attempt == attempt && !told.stands.is_over;
-            if is_heard {
-                change(told);
+        channel.send_if_modified(|current| {
+            let is_running = current.state.attempt == attempt && !current.state.is_over;
+            if is_running {
+                change(current);
             }
-            is_heard
+            is_running
         });
     }
 
-    fn find(&self, game: GameId) -> Option<watch::Sender<Told>> {
+    fn find(&self, game: GameId) -> Option<watch::Sender<LiveAttempt>> {
         let games = self.games();
-        let (_, told) = games.iter().rfind(|(known, _)| *known == game)?;
-        Some(told.clone())
+        let (_, channel) = games.iter().rfind(|(known, _)| *known == game)?;
+        Some(channel.clone())
     }
 
-    fn games(&self) -> MutexGuard<'_, VecDeque<Known>> {
-        // A panic in between leaves a list that is whole.
+    fn games(&self) -> MutexGuard<'_, VecDeque<GameChannel>> {
+        // A panic of another thread leaves the list consistent.
         self.games.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
-/// Of those that are over, all but the last [`LIVE_GAMES_KEPT`].
-fn forget_the_oldest(games: &mut VecDeque<Known>) {
-    let is_over = |told: &watch::Sender<Told>| told.borrow().stands.is_over;
+/// Removes the oldest finished games, except the last [`MAX_FINISHED_LIVE_GAMES`].
+fn remove_oldest_finished(games: &mut VecDeque<GameChannel>) {
+    let is_over = |channel: &watch::Sender<LiveAttempt>| channel.borrow().state.is_over;
     let mut excess = games
         .iter()
-        .filter(|(_, told)| is_over(told))
+        .filter(|(_, channel)| is_over(channel))
         .count()
-        .saturating_sub(LIVE_GAMES_KEPT);
-    games.retain(|(_, told)| {
-        let goes = excess > 0 && is_over(told);
-        excess -= usize::from(goes);
-        !goes
+        .saturating_sub(MAX_FINISHED_LIVE_GAMES);
+    games.retain(|(_, channel)| {
+        let is_removed = excess > 0 && is_over(channel);
+        excess -= usize::from(is_removed);
+        !is_removed
     });
 }
 
-impl Told {
-    fn hear(&mut self, happening: LiveHappening) {
-        match &happening.what {
-            GameHappening::Goal { score, .. } | GameHappening::Ended { score, .. } => {
-                self.stands.score = *score;
+impl LiveAttempt {
+    fn record(&mut self, event: LiveEvent) {
+        match &event.event {
+            GameEvent::Goal { score, .. } | GameEvent::Ended { score, .. } => {
+                self.state.score = *score;
             }
-            GameHappening::Foul { by, score } => {
-                self.stands.fouls[by.index()] += 1;
-                self.stands.score = *score;
+            GameEvent::Foul { by, score } => {
+                self.state.fouls[by.index()] += 1;
+                self.state.score = *score;
             }
             _ => {}
         }
-        self.stands.is_over = happening.what.is_last();
-        self.happenings.push(happening);
+        self.state.is_over = event.event.is_last();
+        self.events.push(event);
     }
 }
 
-impl LiveWatch {
-    /// What somebody who has read as far as `seen` has not read yet; what comes later is [`changed`](Self::changed).
-    pub fn news(&mut self, seen: Option<LiveMark>) -> LiveNews {
-        let told = self.told.borrow_and_update();
-        let attempt = told.stands.attempt;
+impl LiveSubscription {
+    /// Everything after the viewer's position `seen`. [`changed`](Self::changed) waits for more.
+    pub fn read_since(&mut self, seen: Option<LiveCursor>) -> LiveUpdate {
+        let current = self.attempt.borrow_and_update();
+        let attempt = current.state.attempt;
         let read = seen
             .filter(|seen| seen.attempt == attempt)
-            .map_or(0, |seen| seen.happenings as usize);
-        let happenings = told.happenings.get(read..).unwrap_or_default().to_vec();
-        let mark = |happenings: usize| LiveMark {
+            .map_or(0, |seen| seen.events as usize);
+        let events = current.events.get(read..).unwrap_or_default().to_vec();
+        let cursor = |events: usize| LiveCursor {
             attempt,
-            happenings: u32::try_from(happenings).unwrap_or(u32::MAX),
+            events: u32::try_from(events).unwrap_or(u32::MAX),
         };
-        LiveNews {
-            stands: told.stands.clone(),
-            after: mark(told.happenings.len() - happenings.len()),
-            mark: mark(told.happenings.len()),
-            happenings,
+        LiveUpdate {
+            state: current.state.clone(),
+            start: cursor(current.events.len() - events.len()),
+            end: cursor(current.events.len()),
+            events,
         }
     }
 
-    /// Waits until something was told since the last [`news`](Self::news). False: nothing will be, the game is
-    /// forgotten. After the end of an attempt another one may begin.
+    /// Waits for an update since the last [`read_since`](Self::read_since). Returns false if the game was forgotten: then
+    /// there will be none. After the end of an attempt another one may start.
     #[boxed]
     pub async fn changed(&mut self) -> bool {
-        self.told.changed().await.is_ok()
+        self.attempt.changed().await.is_ok()
     }
 }
 
@@ -219,114 +218,114 @@ mod tests {
         })
     }
 
-    fn happening(step: u32, what: GameHappening) -> LiveHappening {
-        LiveHappening { step, what }
+    fn event(step: u32, event: GameEvent) -> LiveEvent {
+        LiveEvent { step, event }
     }
 
-    const fn goal(score: [u32; 2]) -> GameHappening {
+    const fn goal(score: [u32; 2]) -> GameEvent {
         let by = Side::First;
-        GameHappening::Goal { by, score }
+        GameEvent::Goal { by, score }
     }
 
-    const fn mark(attempt: u32, happenings: u32) -> LiveMark {
-        LiveMark {
+    const fn cursor(attempt: u32, events: u32) -> LiveCursor {
+        LiveCursor {
             attempt,
-            happenings,
+            events,
         }
     }
 
     #[tokio::test]
-    async fn who_watches_misses_no_happening_and_sees_the_newest_position() {
+    async fn subscription_reads_all_events_and_newest_position() {
         let live = LiveGames::default();
         let game = GameId::new();
-        assert!(live.watch(game).is_none());
+        assert!(live.subscribe(game).is_none());
         live.begin(game, 1, 500);
-        let mut watch = live.watch(game).unwrap();
-        let first = watch.news(None);
-        assert_eq!((first.mark, first.happenings.len()), (mark(1, 0), 0));
-        assert_eq!((first.stands.steps, first.stands.position), (500, None));
+        let mut subscription = live.subscribe(game).unwrap();
+        let first = subscription.read_since(None);
+        assert_eq!((first.end, first.events.len()), (cursor(1, 0), 0));
+        assert_eq!((first.state.steps, first.state.position), (500, None));
 
-        live.advance(game, 1, vec![happening(90, goal([1, 0]))], at(90));
+        live.advance(game, 1, vec![event(90, goal([1, 0]))], at(90));
         live.advance(game, 1, Vec::new(), at(100));
         live.advance(
             game,
             1,
-            vec![happening(
+            vec![event(
                 120,
-                GameHappening::Foul {
+                GameEvent::Foul {
                     by: Side::Second,
                     score: [2, 0],
                 },
             )],
             None,
         );
-        assert!(watch.changed().await);
-        let second = watch.news(Some(first.mark));
-        assert_eq!(second.happenings.len(), 2);
-        assert_eq!((second.after, second.mark), (mark(1, 0), mark(1, 2)));
-        assert_eq!(second.stands.position, at(100), "the newest stays");
-        assert_eq!((second.stands.score, second.stands.fouls), ([2, 0], [0, 1]));
-        // who falls behind, or comes back, goes on where it was
-        assert_eq!(watch.news(Some(mark(1, 1))).happenings.len(), 1);
-        assert_eq!(watch.news(Some(second.mark)).happenings, []);
-        assert_eq!(watch.news(Some(mark(1, 9))).happenings, [], "no such mark");
-        assert_eq!(watch.news(Some(mark(7, 1))).happenings.len(), 2);
+        assert!(subscription.changed().await);
+        let second = subscription.read_since(Some(first.end));
+        assert_eq!(second.events.len(), 2);
+        assert_eq!((second.start, second.end), (cursor(1, 0), cursor(1, 2)));
+        assert_eq!(second.state.position, at(100), "the newest stays");
+        assert_eq!((second.state.score, second.state.fouls), ([2, 0], [0, 1]));
+        // a viewer that falls behind, or returns, continues at its cursor
+        assert_eq!(subscription.read_since(Some(cursor(1, 1))).events.len(), 1);
+        assert_eq!(subscription.read_since(Some(second.end)).events, []);
+        assert_eq!(subscription.read_since(Some(cursor(1, 9))).events, [], "no such cursor");
+        assert_eq!(subscription.read_since(Some(cursor(7, 1))).events.len(), 2);
     }
 
     #[tokio::test]
-    async fn a_new_attempt_begins_anew_and_nothing_is_heard_of_an_earlier_one() {
+    async fn new_attempt_starts_over_and_ignores_earlier_ones() {
         let live = LiveGames::default();
         let game = GameId::new();
         live.begin(game, 1, 500);
-        live.advance(game, 1, vec![happening(90, goal([1, 0]))], at(90));
-        let mut watch = live.watch(game).unwrap();
-        let seen = watch.news(None);
-        live.over(game, 1);
-        assert!(watch.changed().await);
-        let broken = watch.news(Some(seen.mark));
-        assert_eq!(broken.happenings, [happening(90, GameHappening::BrokenOff)]);
-        assert!(broken.stands.is_over);
+        live.advance(game, 1, vec![event(90, goal([1, 0]))], at(90));
+        let mut subscription = live.subscribe(game).unwrap();
+        let seen = subscription.read_since(None);
+        live.end_attempt(game, 1);
+        assert!(subscription.changed().await);
+        let broken = subscription.read_since(Some(seen.end));
+        assert_eq!(broken.events, [event(90, GameEvent::Aborted)]);
+        assert!(broken.state.is_over);
 
         live.begin(game, 2, 500);
-        live.advance(game, 1, vec![happening(95, goal([2, 0]))], at(95));
-        live.over(game, 1);
-        assert!(watch.changed().await);
-        let anew = watch.news(Some(broken.mark));
-        assert_eq!((anew.mark, anew.happenings.len()), (mark(2, 0), 0));
-        assert_eq!((anew.stands.score, anew.stands.is_over), ([0; 2], false));
-        assert!(anew.mark > broken.mark);
+        live.advance(game, 1, vec![event(95, goal([2, 0]))], at(95));
+        live.end_attempt(game, 1);
+        assert!(subscription.changed().await);
+        let restarted = subscription.read_since(Some(broken.end));
+        assert_eq!((restarted.end, restarted.events.len()), (cursor(2, 0), 0));
+        assert_eq!((restarted.state.score, restarted.state.is_over), ([0; 2], false));
+        assert!(restarted.end > broken.end);
 
-        let end = GameHappening::Ended {
+        let end = GameEvent::Ended {
             score: [3, 1],
             winner: Some(Side::First),
             forfeits: [None; 2],
         };
-        live.advance(game, 2, vec![happening(500, end.clone())], at(500));
-        // its end was told: it was not broken off
-        live.over(game, 2);
-        let last = watch.news(Some(anew.mark));
-        assert_eq!(last.happenings, [happening(500, end)]);
-        assert_eq!((last.stands.score, last.stands.is_over), ([3, 1], true));
+        live.advance(game, 2, vec![event(500, end.clone())], at(500));
+        // its end was reported: it was not broken off
+        live.end_attempt(game, 2);
+        let last = subscription.read_since(Some(restarted.end));
+        assert_eq!(last.events, [event(500, end)]);
+        assert_eq!((last.state.score, last.state.is_over), ([3, 1], true));
     }
 
     #[tokio::test]
-    async fn games_that_are_over_are_forgotten_one_day_and_those_under_way_never() {
+    async fn finished_games_are_forgotten_and_running_ones_are_not() {
         let live = LiveGames::default();
-        let games: Vec<GameId> = (0..LIVE_GAMES_KEPT + 3).map(|_| GameId::new()).collect();
+        let games: Vec<GameId> = (0..MAX_FINISHED_LIVE_GAMES + 3).map(|_| GameId::new()).collect();
         live.begin(games[0], 1, 10);
-        let mut early = live.watch(games[0]).unwrap();
-        live.over(games[0], 1);
-        early.news(None);
+        let mut early = live.subscribe(games[0]).unwrap();
+        live.end_attempt(games[0], 1);
+        early.read_since(None);
         live.begin(games[1], 1, 10);
         for game in &games[2..] {
             live.begin(*game, 1, 10);
-            live.over(*game, 1);
+            live.end_attempt(*game, 1);
         }
         live.begin(GameId::new(), 1, 10);
-        assert!(live.watch(games[0]).is_none());
-        assert!(!early.changed().await, "who still watches is told");
-        assert!(live.watch(games[1]).is_some(), "it is under way");
-        assert!(live.watch(games[2]).is_none());
-        assert!(live.watch(games[3]).is_some());
+        assert!(live.subscribe(games[0]).is_none());
+        assert!(!early.changed().await, "its subscriptions end");
+        assert!(live.subscribe(games[1]).is_some(), "it is running");
+        assert!(live.subscribe(games[2]).is_none());
+        assert!(live.subscribe(games[3]).is_some());
     }
 }

@@ -3,17 +3,17 @@ use std::{
     sync::atomic::{AtomicBool, AtomicU64},
 };
 
-/// The size from which the log is copied and emptied although there are readers; four times of what
-/// SQLite copies by itself. What one transaction writes comes on top.
-pub const LOG_BOUND_BYTES: u64 = 16 << 20;
+/// The size from which the write-ahead log is emptied although there are readers: four times the size at
+/// which SQLite copies automatically. One transaction can exceed it.
+pub const MAX_LOG_BYTES: u64 = 16 << 20;
 
-/// The log's file, and how it stands with emptying it.
+/// The file of the write-ahead log, and the state of emptying it.
 #[derive(Debug)]
 pub(crate) struct Log {
     file: PathBuf,
     pub(crate) emptying: AtomicBool,
-    /// The size at which emptying is tried; above the bound after a failure, so that not every write
-    /// tries.
+    /// The size at which emptying is tried. It is above the limit after a failure, so that not every
+    /// write tries again.
     pub(crate) due_bytes: AtomicU64,
 }
 
@@ -22,11 +22,11 @@ impl Log {
         Self {
             file,
             emptying: AtomicBool::new(false),
-            due_bytes: AtomicU64::new(LOG_BOUND_BYTES),
+            due_bytes: AtomicU64::new(MAX_LOG_BYTES),
         }
     }
 
-    /// Its size; 0 before the first write.
+    /// Size of the file; 0 before the first write.
     pub(crate) fn bytes(&self) -> u64 {
         self.file.metadata().map_or(0, |found| found.len())
     }

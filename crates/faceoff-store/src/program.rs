@@ -1,6 +1,6 @@
-//! Which program this is, and which had a database open.
+//! The version of the program that opens a database.
 
-/// A version of the program, and the newest migration that it knew.
+/// A version of the program, with the newest migration that it knows.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Program {
     /// As in `faceoff --version`.

@@ -1,4 +1,4 @@
-//! The database's schema: brought up to this program's, and refused where it is a later one's.
+//! The database schema: migrated to this program's version, refused if it is from a later one.
 
 use crate::{
     error::{Result, StoreError},
@@ -9,12 +9,12 @@ use sqlx::{SqliteConnection, migrate::Migrator};
 
 pub(crate) static MIGRATIONS: Migrator = sqlx::migrate!("../../migrations");
 
-/// A database of an earlier version was brought up to this one's.
+/// A migration from an earlier version's schema to this one's.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Upgrade {
-    /// What opened it last; `None` of a version that did not say.
+    /// The version that opened the database last; `None` if it did not record itself.
     pub from: Option<String>,
-    /// Its newest migration before.
+    /// Its newest migration before the upgrade.
     pub from_schema: i64,
     pub to: Program,
 }
@@ -35,7 +35,7 @@ fn newest() -> i64 {
         .unwrap_or_default()
 }
 
-/// Of all migrations, in their order.
+/// Hash of all migrations, in order.
 pub(crate) fn digest() -> blake3::Hash {
     let mut digest = blake3::Hasher::new();
     for migration in MIGRATIONS.iter() {
@@ -44,17 +44,18 @@ pub(crate) fn digest() -> blake3::Hash {
     digest.finalize()
 }
 
-/// What a database says of itself before it is migrated.
+/// State of a database before it is migrated.
 #[derive(Debug)]
-pub(crate) struct Before {
+pub(crate) struct SchemaBefore {
     applied: Option<i64>,
     last: Option<Program>,
 }
 
-/// [`StoreError::NewerDatabase`] if a later version has migrated it: then nothing may be changed.
-pub(crate) async fn before(connection: &mut SqliteConnection) -> Result<Before> {
+/// Reads the state of a database before its migration. [`StoreError::NewerDatabase`] if a later version has migrated it:
+/// then nothing may be changed.
+pub(crate) async fn check_migratable(connection: &mut SqliteConnection) -> Result<SchemaBefore> {
     let (applied, last) = (
-        applied(connection).await?,
+        newest_applied(connection).await?,
         programs::last(connection).await?,
     );
     let this = this_program();
@@ -64,14 +65,14 @@ pub(crate) async fn before(connection: &mut SqliteConnection) -> Result<Before> 
             program: last.map(|program| program.version),
             this,
         }),
-        _ => Ok(Before { applied, last }),
+        _ => Ok(SchemaBefore { applied, last }),
     }
 }
 
-/// Notes, once it is migrated, who has it open.
-pub(crate) async fn after(
+/// Records, after the migration, that this version has opened the database.
+pub(crate) async fn record_program(
     connection: &mut SqliteConnection,
-    before: Before,
+    before: SchemaBefore,
 ) -> Result<Option<Upgrade>> {
     let this = this_program();
     if before.last.as_ref() != Some(&this) {
@@ -87,8 +88,8 @@ pub(crate) async fn after(
         }))
 }
 
-/// The newest migration that was run; `None` of an empty database.
-pub(crate) async fn applied(connection: &mut SqliteConnection) -> Result<Option<i64>> {
+/// The newest migration that was run; `None` for an empty database.
+pub(crate) async fn newest_applied(connection: &mut SqliteConnection) -> Result<Option<i64>> {
     let found: i64 = sqlx::query_scalar(
         "SELECT COUNT(*) FROM sqlite_master WHERE type = 'table' AND name = '_sqlx_migrations'",
     )

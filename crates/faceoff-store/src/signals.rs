@@ -2,44 +2,44 @@ use crate::event::Change;
 use std::sync::atomic::{AtomicU64, Ordering};
 use tokio::sync::{broadcast, watch};
 
-/// How many changes a receiver may be behind before it misses the oldest.
+/// How many changes a receiver may be behind before it loses the oldest.
 const BACKLOG: usize = 256;
 
 /// Wakes this process's listeners after a commit. Only [`write`](crate::write) fires them.
 #[derive(Debug)]
 pub(crate) struct Signals {
     changes: broadcast::Sender<Change>,
-    work: watch::Sender<u64>,
-    /// How many changes were committed.
-    made: AtomicU64,
+    jobs: watch::Sender<u64>,
+    /// How many transactions with visible changes were committed.
+    commits: AtomicU64,
 }
 
 impl Signals {
     pub(crate) fn new() -> Self {
         Self {
             changes: broadcast::Sender::new(BACKLOG),
-            work: watch::Sender::new(0),
-            made: AtomicU64::new(0),
+            jobs: watch::Sender::new(0),
+            commits: AtomicU64::new(0),
         }
     }
 
-    /// Something that is told of was committed, or may have been.
-    pub(crate) fn committed(&self) {
-        self.made.fetch_add(1, Ordering::Release);
+    /// Counts a commit of visible changes, also one that may have failed.
+    pub(crate) fn count_commit(&self) {
+        self.commits.fetch_add(1, Ordering::Release);
     }
 
-    pub(crate) fn made(&self) -> u64 {
-        self.made.load(Ordering::Acquire)
+    pub(crate) fn commits(&self) -> u64 {
+        self.commits.load(Ordering::Acquire)
     }
 
-    pub(crate) fn changed(&self, change: Change) {
-        // no listener is no fault
+    pub(crate) fn send(&self, change: Change) {
+        // it fails only if there is no listener
         let _ = self.changes.send(change);
     }
 
-    /// Tells idle workers that a unit may be claimed.
-    pub(crate) fn work_added(&self) {
-        self.work
+    /// Wakes idle workers: a job may be claimed.
+    pub(crate) fn job_added(&self) {
+        self.jobs
             .send_modify(|count| *count = count.wrapping_add(1));
     }
 
@@ -47,7 +47,7 @@ impl Signals {
         self.changes.subscribe()
     }
 
-    pub(crate) fn work(&self) -> watch::Receiver<u64> {
-        self.work.subscribe()
+    pub(crate) fn jobs(&self) -> watch::Receiver<u64> {
+        self.jobs.subscribe()
     }
 }

@@ -1,6 +1,6 @@
 use crate::{
     artifacts::Artifacts, boxed, database::Database, error::Result, event::Change, live::LiveGames,
-    pulse::Pulse, room::Room, schema::Upgrade, signals::Signals, tables::archived::Archived,
+    health_probes::HealthProbes, free_space::FreeSpace, schema::Upgrade, signals::Signals, tables::archive::ArchivedSeason,
     workers::Workers,
 };
 use std::sync::Arc;
@@ -13,87 +13,87 @@ pub struct Store {
     pub(crate) database: Database,
     pub(crate) signals: Arc<Signals>,
     pub(crate) artifacts: Artifacts,
-    pub(crate) room: Arc<Room>,
-    pub(crate) pulse: Arc<Pulse>,
+    pub(crate) free_space: Arc<FreeSpace>,
+    pub(crate) probes: Arc<HealthProbes>,
     pub(crate) live: LiveGames,
     pub(crate) workers: Workers,
-    pub(crate) archived: Option<Arc<Archived>>,
+    pub(crate) archive: Option<Arc<ArchivedSeason>>,
 }
 
 impl Store {
-    /// With other disks to watch, or more to keep free, than nothing of the data folder's.
+    /// Sets which disks to watch and how much to keep free on them. By default nothing is watched.
     #[must_use]
-    pub fn with_room(self, room: Room) -> Self {
+    pub fn with_free_space(self, free_space: FreeSpace) -> Self {
         Self {
-            room: Arc::new(room),
+            free_space: Arc::new(free_space),
             ..self
         }
     }
 
-    /// Is there room for more work and uploads? The store stores what it is given; workers and the web
-    /// side ask.
+    /// Free disk space for more jobs and uploads. The store itself does not check it; workers and the
+    /// server do.
     #[must_use]
-    pub fn room(&self) -> &Room {
-        &self.room
+    pub fn free_space(&self) -> &FreeSpace {
+        &self.free_space
     }
 
-    /// The season is an archive's and never changes, if it is.
+    /// The archive from which the season was imported, if it was. Such a season is read-only.
     #[must_use]
-    pub fn archived(&self) -> Option<&Archived> {
-        self.archived.as_deref()
+    pub fn archived_season(&self) -> Option<&ArchivedSeason> {
+        self.archive.as_deref()
     }
 
-    /// The database was of an earlier version when this handle opened it.
+    /// The migration that opening this handle has run, if the database was of an earlier version.
     #[must_use]
     pub const fn upgrade(&self) -> Option<&Upgrade> {
         self.database.upgrade.as_ref()
     }
 
-    /// Copies the database's log into the database, as far as nobody must wait for it. Run it now and
-    /// then; a log that grows too long is emptied without it.
+    /// Copies the write-ahead log into the database, as far as possible without blocking. Run it
+    /// periodically; a log that grows too long is emptied without it.
     #[boxed]
     pub async fn checkpoint(&self) -> Result<()> {
         self.database.checkpoint().await
     }
 
-    /// Bundles, recordings and datasets.
+    /// The object store of bundles, recordings and datasets.
     #[must_use]
     pub const fn artifacts(&self) -> &Artifacts {
         &self.artifacts
     }
 
-    /// Games as this process's slots play them.
+    /// Live state of the games that this process's slots play.
     #[must_use]
     pub const fn live_games(&self) -> &LiveGames {
         &self.live
     }
 
-    /// Workers on other machines, as this process hears of them.
+    /// Remote workers that this process has heard of.
     #[must_use]
     pub const fn workers(&self) -> &Workers {
         &self.workers
     }
 
-    /// What changes from now on, of this process's doing, told after the commit. A receiver that falls
-    /// behind loses the oldest and is told so (`Lagged`): it reads [`Store::events_after`] from the
-    /// last id that it has seen, which also has what other processes wrote.
+    /// Changes that this process makes from now on, sent after the commit. A receiver that falls
+    /// behind loses the oldest and gets `Lagged`. It then reads [`Store::events_after`] from the
+    /// last id that it has seen, which also includes what other processes wrote.
     #[must_use]
     pub fn events(&self) -> broadcast::Receiver<Change> {
         self.signals.changes()
     }
 
-    /// How often this process has changed the season so far: what was read before is as good as new while that stays.
+    /// How often this process has changed the season so far. While the number is the same, earlier reads are current.
     #[must_use]
-    pub fn changes_made(&self) -> u64 {
-        self.signals.made()
+    pub fn change_count(&self) -> u64 {
+        self.signals.commits()
     }
 
-    /// Changes whenever this process adds work to the queue. Look at the value before claiming and
-    /// wait for its change after an empty claim: nothing can be missed in between. Units that become
-    /// claimable by the passing of time (an expired lease, the end of a back-off) send nothing.
+    /// Changes whenever this process adds a job to the queue. Read the value before claiming and
+    /// wait for its change after an empty claim: nothing can be missed in between. Jobs that become
+    /// claimable with time (an expired lease, the end of a back-off) send nothing.
     #[must_use]
-    pub fn work_signal(&self) -> watch::Receiver<u64> {
-        self.signals.work()
+    pub fn job_signal(&self) -> watch::Receiver<u64> {
+        self.signals.jobs()
     }
 
     /// Waits for running queries and closes the database. Dropping the handle is as safe, but does

@@ -1,4 +1,4 @@
-//! Workers on other machines, as far as this process has heard of them: in memory alone, since whose work is stands in the queue.
+//! Remote workers that this process has heard of. The data is in memory only: the queue has the leases.
 
 use jiff::{SignedDuration, Timestamp};
 use std::{
@@ -9,27 +9,27 @@ use std::{
 };
 use uuid::Uuid;
 
-/// Nothing was heard of a worker for so long: it has gone, or is cut off. A slot that has nothing to do asks every few seconds.
-pub const WORKER_SILENT: SignedDuration = SignedDuration::from_secs(30);
-/// After this it is forgotten.
-const FORGOTTEN: SignedDuration = SignedDuration::from_hours(24);
-/// So many are remembered at most.
-const MOST: usize = 10_000;
+/// A worker that was not heard of for this time is offline or disconnected. Idle slots poll every few seconds.
+pub const WORKER_TIMEOUT: SignedDuration = SignedDuration::from_secs(30);
+/// A worker that was not heard of for this time is forgotten.
+const FORGET_AFTER: SignedDuration = SignedDuration::from_hours(24);
+/// Maximum number of workers in memory.
+const MAX_WORKERS: usize = 10_000;
 
-/// What the holders of leases elsewhere begin with.
-const ELSEWHERE: &str = "remote/";
+/// Prefix of the lease holders that are remote workers.
+const REMOTE_PREFIX: &str = "remote/";
 
-/// How long a worker's name may be.
-const LONGEST_NAME: usize = 64;
+/// Maximum length of a worker's name.
+const MAX_NAME_LEN: usize = 64;
 
-/// What a worker elsewhere is called: 1 to 64 of a-z, A-Z, 0-9, - and _, so that it can be a token of a subject of NATS.
+/// Name of a remote worker: 1 to 64 of a-z, A-Z, 0-9, - and _, so that it can be a token of a NATS subject.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 pub struct WorkerName(String);
 
-/// A text that is no [`WorkerName`].
+/// A text that is not a [`WorkerName`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("expected a worker's name: 1 to {LONGEST_NAME} of a-z, A-Z, 0-9, - and _")]
-pub struct NoWorkerName;
+#[error("expected a worker's name: 1 to {MAX_NAME_LEN} of a-z, A-Z, 0-9, - and _")]
+pub struct ParseWorkerNameError;
 
 impl WorkerName {
     #[must_use]
@@ -37,17 +37,17 @@ impl WorkerName {
         &self.0
     }
 
-    /// The worker whose slot holds a lease, if one elsewhere does.
+    /// The remote worker of a lease holder; `None` if the holder is not the slot of a remote worker.
     #[must_use]
-    pub fn of_holder(holder: &str) -> Option<Self> {
-        let (worker, _) = holder.strip_prefix(ELSEWHERE)?.split_once('/')?;
+    pub fn from_holder(holder: &str) -> Option<Self> {
+        let (worker, _) = holder.strip_prefix(REMOTE_PREFIX)?.split_once('/')?;
         worker.parse().ok()
     }
 
-    /// What its leases name, and below it its slots.
+    /// The worker as a lease holder, and the prefix of its slots as lease holders.
     #[must_use]
     pub fn holder(&self) -> String {
-        format!("{ELSEWHERE}{}", self.0)
+        format!("{REMOTE_PREFIX}{}", self.0)
     }
 }
 
@@ -58,341 +58,361 @@ impl fmt::Display for WorkerName {
 }
 
 impl FromStr for WorkerName {
-    type Err = NoWorkerName;
+    type Err = ParseWorkerNameError;
 
-    fn from_str(text: &str) -> Result<Self, NoWorkerName> {
+    fn from_str(text: &str) -> Result<Self, ParseWorkerNameError> {
         let allowed = |c: char| c.is_ascii_alphanumeric() || matches!(c, '-' | '_');
-        let is_name = (1..=LONGEST_NAME).contains(&text.len()) && text.chars().all(allowed);
-        is_name.then(|| Self(text.to_owned())).ok_or(NoWorkerName)
+        let is_name = (1..=MAX_NAME_LEN).contains(&text.len()) && text.chars().all(allowed);
+        is_name.then(|| Self(text.to_owned())).ok_or(ParseWorkerNameError)
     }
 }
 
-/// What is known of workers elsewhere. Cloning is cheap.
+/// The remote workers that this process knows. Cloning is cheap.
 #[derive(Debug, Clone, Default)]
-pub struct Workers(Arc<Mutex<Known>>);
+pub struct Workers(Arc<Mutex<WorkersState>>);
 
 #[derive(Debug, Default)]
-struct Known {
-    workers: BTreeMap<String, WorkerHeard>,
-    /// By what it keeps the server from.
-    troubles: BTreeMap<String, String>,
-    /// By the names of those of whom nothing is taken: why.
+struct WorkersState {
+    workers: BTreeMap<String, WorkerStatus>,
+    /// Causes, by the task that the server cannot do.
+    problems: BTreeMap<String, String>,
+    /// Reasons of bans, by worker.
     banned: BTreeMap<String, String>,
-    /// Orders whose files are being stored, or must not change any more, by their nonces.
-    files: HashMap<Uuid, Files>,
-    /// Workers that gave back what they could not play, by name.
-    failing: HashMap<String, Failing>,
-    is_used: bool,
+    /// Files of leased jobs that are being uploaded or are closed, by the nonces of the leases.
+    files: HashMap<Uuid, JobFiles>,
+    /// Failures in a row, by worker.
+    failing: HashMap<String, Failures>,
+    are_enabled: bool,
 }
 
-/// A worker whose units fail one after the other, as it is remembered.
+/// Failures in a row of a worker.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
-struct Failing {
-    /// Units in a row that it could not play; one that nobody can play is one, however often it comes back.
-    units: BTreeSet<Uuid>,
-    /// It gets nothing before this.
+struct Failures {
+    /// Jobs that it failed to run; a job that fails repeatedly counts once.
+    jobs: BTreeSet<Uuid>,
+    /// End of its back-off: it gets no job before.
     until: Option<Timestamp>,
 }
 
-/// After so many units in a row that a worker could not play it gets none for a while …
-const FAILS_IN_A_ROW: usize = 3;
-/// … and twice as long each time that it fails again, up to an hour.
-const RESTS: SignedDuration = SignedDuration::from_mins(1);
-const RESTS_AT_MOST: SignedDuration = SignedDuration::from_hours(1);
+/// After this number of failed jobs in a row a worker backs off.
+const MAX_FAILURES: usize = 3;
+/// The first back-off, which doubles with each further failure.
+const BACKOFF: SignedDuration = SignedDuration::from_mins(1);
+const MAX_BACKOFF: SignedDuration = SignedDuration::from_hours(1);
 
-/// How the files of an order stand.
+/// State of the files of a leased job.
 #[derive(Debug, Default)]
-struct Files {
-    being_stored: u32,
+struct JobFiles {
+    uploads: u32,
     are_closed: bool,
 }
 
-/// A file of an order is being stored until this is dropped.
+/// Guard of the upload of a job's file, which ends when the guard is dropped.
 #[derive(Debug)]
-pub struct Storing {
+pub struct UploadGuard {
     nonce: Uuid,
     workers: Workers,
 }
 
-impl Drop for Storing {
+impl Drop for UploadGuard {
     fn drop(&mut self) {
-        let mut known = self.workers.known();
-        if let Some(files) = known.files.get_mut(&self.nonce) {
-            files.being_stored = files.being_stored.saturating_sub(1);
-            if files.being_stored == 0 && !files.are_closed {
-                known.files.remove(&self.nonce);
+        let mut state = self.workers.lock();
+        if let Some(files) = state.files.get_mut(&self.nonce) {
+            files.uploads = files.uploads.saturating_sub(1);
+            if files.uploads == 0 && !files.are_closed {
+                state.files.remove(&self.nonce);
             }
         }
     }
 }
 
-/// What a worker says of itself.
+/// A worker's information about itself.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub struct WorkerAbout {
-    /// The version of its program.
+pub struct WorkerInfo {
+    /// Version of its program.
     pub version: String,
-    /// Units that it works at at the same time.
+    /// Number of jobs that it runs at the same time.
     pub slots: u32,
-    /// What its owner calls it by beside its name.
+    /// Labels set by its operator.
     pub labels: Vec<String>,
 }
 
-/// A worker, as it was heard of.
+/// State of a remote worker, as last heard.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct WorkerHeard {
-    /// What it is called.
+pub struct WorkerStatus {
     pub name: String,
-    /// What it says of itself.
-    pub about: WorkerAbout,
-    /// When this process heard of it first.
-    pub first_at: Timestamp,
-    /// When it did last.
-    pub last_at: Timestamp,
-    /// Why it gets no work, if it gets none.
-    pub refused: Option<String>,
-    /// What its slots do, by their names; those that do nothing are not here.
-    pub busy: BTreeMap<String, WorkerBusy>,
+    pub info: WorkerInfo,
+    /// When this process first heard of it.
+    pub first_seen_at: Timestamp,
+    /// When this process last heard of it.
+    pub last_seen_at: Timestamp,
+    /// Why it gets no jobs; `None` if it does.
+    pub refusal: Option<String>,
+    /// The slots that run a job, by name.
+    pub busy_slots: BTreeMap<String, SlotStatus>,
 }
 
-/// What a slot elsewhere does.
+/// State of a busy slot of a remote worker.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct WorkerBusy {
-    pub unit: Uuid,
-    /// What it is, in words; none if it was begun before this process.
-    pub what: Option<String>,
-    /// Since when, as far as this process knows.
+pub struct SlotStatus {
+    pub job: Uuid,
+    /// Description of the job for people; `None` if it was claimed before this process started.
+    pub description: Option<String>,
+    /// When this process first heard of the job.
     pub since: Timestamp,
-    /// What keeps the slot from handing in what came of it.
-    pub trouble: Option<String>,
+    /// What prevents the slot from sending its result.
+    pub problem: Option<String>,
 }
 
-/// What is told of a unit that is worked at.
+/// A slot's report about its running job.
 #[derive(Debug, Clone, Copy, Default)]
-pub struct WorkTold<'a> {
-    /// What it is, in words, if that is known.
-    pub what: Option<&'a str>,
-    /// What keeps the slot from handing in what came of it.
-    pub trouble: Option<&'a str>,
+pub struct SlotReport<'a> {
+    /// Description of the job for people, if it is known.
+    pub description: Option<&'a str>,
+    /// What prevents the slot from sending its result.
+    pub problem: Option<&'a str>,
 }
 
-impl WorkerHeard {
-    fn first(name: &str, now: Timestamp) -> Self {
+impl WorkerStatus {
+    fn new(name: &str, now: Timestamp) -> Self {
         Self {
             name: name.to_owned(),
-            about: WorkerAbout::default(),
-            first_at: now,
-            last_at: now,
-            refused: None,
-            busy: BTreeMap::new(),
+            info: WorkerInfo::default(),
+            first_seen_at: now,
+            last_seen_at: now,
+            refusal: None,
+            busy_slots: BTreeMap::new(),
         }
     }
 
-    /// Units that it can work at, as far as is known: it may not have said so yet.
+    /// Number of its slots; at least that of the busy ones, because it may not have reported the number yet.
     fn slots(&self) -> u32 {
-        let busy = u32::try_from(self.busy.len()).unwrap_or(u32::MAX);
-        self.about.slots.max(busy)
+        let busy = u32::try_from(self.busy_slots.len()).unwrap_or(u32::MAX);
+        self.info.slots.max(busy)
     }
 
-    /// Was it heard of a moment ago?
+    /// Was the worker heard of within [`WORKER_TIMEOUT`]?
     #[must_use]
-    pub fn is_there(&self, now: Timestamp) -> bool {
-        now.duration_since(self.last_at) < WORKER_SILENT
+    pub fn is_online(&self, now: Timestamp) -> bool {
+        now.duration_since(self.last_seen_at) < WORKER_TIMEOUT
     }
 }
 
 impl Workers {
-    /// Work is given to other machines.
-    pub fn use_them(&self) {
-        self.known().is_used = true;
+    /// Notes that this process gives jobs to remote workers.
+    pub fn enable(&self) {
+        self.lock().are_enabled = true;
     }
 
-    /// Is work given to other machines?
+    /// Does this process give jobs to remote workers?
     #[must_use]
-    pub fn are_used(&self) -> bool {
-        self.known().is_used
+    pub fn are_enabled(&self) -> bool {
+        self.lock().are_enabled
     }
 
-    /// A worker asks for work.
-    pub fn heard(&self, name: &str, about: WorkerAbout, refused: Option<&str>, now: Timestamp) {
-        let mut known = self.known();
-        known
+    /// Records that a worker has polled for a job, and why it gets none, if it is refused.
+    pub fn record_poll(
+        &self,
+        name: &str,
+        info: WorkerInfo,
+        refusal: Option<&str>,
+        now: Timestamp,
+    ) {
+        let mut state = self.lock();
+        state
             .workers
-            .retain(|_, worker| now.duration_since(worker.last_at) < FORGOTTEN);
-        let is_full = known.workers.len() >= MOST;
-        let worker = match known.workers.get_mut(name) {
+            .retain(|_, worker| now.duration_since(worker.last_seen_at) < FORGET_AFTER);
+        let is_full = state.workers.len() >= MAX_WORKERS;
+        let worker = match state.workers.get_mut(name) {
             Some(worker) => worker,
             None if is_full => return,
             None => {
-                let worker = known.workers.entry(name.to_owned());
-                worker.or_insert_with(|| WorkerHeard::first(name, now))
+                let worker = state.workers.entry(name.to_owned());
+                worker.or_insert_with(|| WorkerStatus::new(name, now))
             }
         };
-        worker.about = about;
-        worker.refused = refused.map(str::to_owned);
-        worker.last_at = now;
+        worker.info = info;
+        worker.refusal = refusal.map(str::to_owned);
+        worker.last_seen_at = now;
     }
 
-    /// One of its slots works at a unit, which the queue says, too. `trouble`: what keeps it from handing in what came of it. One that began
-    /// before this process is heard of by this first.
-    pub fn works(&self, name: &str, slot: &str, unit: Uuid, told: WorkTold<'_>, now: Timestamp) {
-        let mut known = self.known();
-        if !known.workers.contains_key(name) && known.workers.len() >= MOST {
+    /// Records that a slot runs a job that is leased to it. A worker that started before this process is first heard of
+    /// here.
+    pub fn record_job(
+        &self,
+        name: &str,
+        slot: &str,
+        job: Uuid,
+        report: SlotReport<'_>,
+        now: Timestamp,
+    ) {
+        let mut state = self.lock();
+        if !state.workers.contains_key(name) && state.workers.len() >= MAX_WORKERS {
             return;
         }
-        let worker = known.workers.entry(name.to_owned());
-        let worker = worker.or_insert_with(|| WorkerHeard::first(name, now));
-        worker.last_at = now;
-        let begun = WorkerBusy {
-            unit,
-            what: told.what.map(str::to_owned),
+        let worker = state.workers.entry(name.to_owned());
+        let worker = worker.or_insert_with(|| WorkerStatus::new(name, now));
+        worker.last_seen_at = now;
+        let new = SlotStatus {
+            job,
+            description: report.description.map(str::to_owned),
             since: now,
-            trouble: None,
+            problem: None,
         };
-        let busy = worker.busy.entry(slot.to_owned()).or_insert(begun.clone());
-        if busy.unit != unit {
-            *busy = begun;
+        let busy = worker
+            .busy_slots
+            .entry(slot.to_owned())
+            .or_insert(new.clone());
+        if busy.job != job {
+            *busy = new;
         }
-        busy.trouble = told.trouble.map(str::to_owned);
+        busy.problem = report.problem.map(str::to_owned);
     }
 
-    /// A unit came back that a worker could not play, by no fault of the agent's; how many in a row, and until when it gets nothing.
-    pub fn failed(&self, name: &str, unit: Uuid, now: Timestamp) -> Option<(usize, Timestamp)> {
-        let mut known = self.known();
-        if !known.failing.contains_key(name) && known.failing.len() >= MOST {
+    /// Records that a worker failed to run a job by a platform fault. Returns the number of failures in a row and the end
+    /// of the back-off, if this failure starts or extends one.
+    pub fn record_failure(
+        &self,
+        name: &str,
+        job: Uuid,
+        now: Timestamp,
+    ) -> Option<(usize, Timestamp)> {
+        let mut state = self.lock();
+        if !state.failing.contains_key(name) && state.failing.len() >= MAX_WORKERS {
             return None;
         }
-        let failing = known.failing.entry(name.to_owned()).or_default();
-        if !failing.units.insert(unit) {
+        let failures = state.failing.entry(name.to_owned()).or_default();
+        if !failures.jobs.insert(job) {
             return None;
         }
-        let units = failing.units.len();
-        let more = units.checked_sub(FAILS_IN_A_ROW)?;
-        let doubled = i32::try_from(more.min(6)).unwrap_or_default();
-        let rests = (RESTS * 2_i32.pow(doubled.unsigned_abs())).min(RESTS_AT_MOST);
-        let until = now.saturating_add(rests).unwrap_or(Timestamp::MAX);
-        failing.until = Some(until);
-        Some((units, until))
+        let count = failures.jobs.len();
+        let excess = count.checked_sub(MAX_FAILURES)?;
+        let doublings = i32::try_from(excess.min(6)).unwrap_or_default();
+        let backoff = (BACKOFF * 2_i32.pow(doublings.unsigned_abs())).min(MAX_BACKOFF);
+        let until = now.saturating_add(backoff).unwrap_or(Timestamp::MAX);
+        failures.until = Some(until);
+        Some((count, until))
     }
 
-    /// A worker has played a unit.
-    pub fn played(&self, name: &str) {
-        self.known().failing.remove(name);
+    /// Records that a worker has completed a job, which ends its failures in a row.
+    pub fn record_success(&self, name: &str) {
+        self.lock().failing.remove(name);
     }
 
-    /// Why a worker whose units fail gets nothing now, if so.
+    /// Why a worker gets no jobs after failures; `None` if it does not back off at `now`.
     #[must_use]
-    pub fn rests(&self, name: &str, now: Timestamp) -> Option<String> {
-        let known = self.known();
-        let failing = known.failing.get(name)?;
-        let until = failing.until.filter(|until| *until > now)?;
+    pub fn backoff_reason(&self, name: &str, now: Timestamp) -> Option<String> {
+        let state = self.lock();
+        let failures = state.failing.get(name)?;
+        let until = failures.until.filter(|until| *until > now)?;
         Some(format!(
-            "it could not play the last {} units that it was given, and gets none before {}: look into its log, and run `faceoff doctor` there",
-            failing.units.len(),
+            "its last {} jobs failed, and it gets none before {}: look into its log, and run `faceoff doctor` there",
+            failures.jobs.len(),
             until.strftime("%Y-%m-%d %H:%M:%S UTC")
         ))
     }
 
-    /// Whoever works at a unit does so no more.
-    pub fn ended(&self, unit: Uuid) {
-        for worker in self.known().workers.values_mut() {
-            worker.busy.retain(|_, busy| busy.unit != unit);
+    /// Records that no slot runs this job any more.
+    pub fn end_job(&self, job: Uuid) {
+        for worker in self.lock().workers.values_mut() {
+            worker.busy_slots.retain(|_, busy| busy.job != job);
         }
     }
 
-    /// All of them, by name.
+    /// All known workers, by name.
     #[must_use]
-    pub fn all(&self) -> Vec<WorkerHeard> {
-        self.known().workers.values().cloned().collect()
+    pub fn all(&self) -> Vec<WorkerStatus> {
+        self.lock().workers.values().cloned().collect()
     }
 
-    /// Slots elsewhere that can be given work now.
+    /// Number of slots of the remote workers that can get jobs now.
     #[must_use]
-    pub fn slots(&self, now: Timestamp) -> u32 {
-        let known = self.known();
-        let work = known
+    pub fn available_slots(&self, now: Timestamp) -> u32 {
+        let state = self.lock();
+        let available = state
             .workers
             .values()
-            .filter(|worker| worker.refused.is_none() && worker.is_there(now));
-        work.map(WorkerHeard::slots).sum()
+            .filter(|worker| worker.refusal.is_none() && worker.is_online(now));
+        available.map(WorkerStatus::slots).sum()
     }
 
-    /// What keeps the server from `what`; none: nothing any more.
-    pub fn trouble(&self, what: &str, cause: Option<&str>) {
-        let mut known = self.known();
+    /// Sets the problem that prevents the server from doing a task for remote workers; `None`: it is solved.
+    pub fn set_problem(&self, task: &str, cause: Option<&str>) {
+        let mut state = self.lock();
         match cause {
-            Some(cause) => drop(known.troubles.insert(what.to_owned(), cause.to_owned())),
-            None => drop(known.troubles.remove(what)),
+            Some(cause) => drop(state.problems.insert(task.to_owned(), cause.to_owned())),
+            None => drop(state.problems.remove(task)),
         }
     }
 
-    /// Does something keep the server from `what`?
+    /// Does a problem prevent the server from doing this task?
     #[must_use]
-    pub fn is_troubled(&self, what: &str) -> bool {
-        self.known().troubles.contains_key(what)
+    pub fn has_problem(&self, task: &str) -> bool {
+        self.lock().problems.contains_key(task)
     }
 
-    /// What the server cannot do for other machines, and why.
+    /// The tasks that the server cannot do for remote workers, with the causes.
     #[must_use]
-    pub fn troubles(&self) -> Vec<(String, String)> {
-        let known = self.known();
-        let troubles = known.troubles.iter();
-        troubles
-            .map(|(what, why)| (what.clone(), why.clone()))
+    pub fn problems(&self) -> Vec<(String, String)> {
+        let state = self.lock();
+        let problems = state.problems.iter();
+        problems
+            .map(|(task, cause)| (task.clone(), cause.clone()))
             .collect()
     }
 
-    /// Nothing is taken of these workers, and why; all others are taken.
+    /// Sets all bans: names of workers, with the reasons.
     pub fn set_banned(&self, banned: impl IntoIterator<Item = (String, String)>) {
-        self.known().banned = banned.into_iter().collect();
+        self.lock().banned = banned.into_iter().collect();
     }
 
     pub(crate) fn ban(&self, worker: &str, reason: &str) {
-        let mut known = self.known();
-        known.banned.insert(worker.to_owned(), reason.to_owned());
-        if let Some(worker) = known.workers.get_mut(worker) {
-            worker.busy.clear();
+        let mut state = self.lock();
+        state.banned.insert(worker.to_owned(), reason.to_owned());
+        if let Some(worker) = state.workers.get_mut(worker) {
+            worker.busy_slots.clear();
         }
     }
 
     pub(crate) fn readmit(&self, worker: &str) {
-        self.known().banned.remove(worker);
+        self.lock().banned.remove(worker);
     }
 
-    /// Why nothing is taken of a worker, if so.
+    /// Why the worker is banned; `None` if it is not.
     #[must_use]
-    pub fn ban_of(&self, worker: &str) -> Option<String> {
-        self.known().banned.get(worker).cloned()
+    pub fn ban_reason(&self, worker: &str) -> Option<String> {
+        self.lock().banned.get(worker).cloned()
     }
 
-    /// A file of the order of this nonce is being stored; `None` if its files are closed.
+    /// Begins the upload of a file of the job leased under this nonce; `None` if the job's files are closed.
     #[must_use]
-    pub fn storing(&self, nonce: Uuid) -> Option<Storing> {
-        let mut known = self.known();
-        let files = known.files.entry(nonce).or_default();
+    pub fn begin_upload(&self, nonce: Uuid) -> Option<UploadGuard> {
+        let mut state = self.lock();
+        let files = state.files.entry(nonce).or_default();
         if files.are_closed {
             return None;
         }
-        files.being_stored += 1;
+        files.uploads += 1;
         let workers = self.clone();
-        Some(Storing { nonce, workers })
+        Some(UploadGuard { nonce, workers })
     }
 
-    /// From now on the files of this order stay what they are; false while one is still being stored.
+    /// Closes the files of the job leased under this nonce: no upload can begin. False while an upload is running.
     #[must_use]
     pub fn close_files(&self, nonce: Uuid) -> bool {
-        let mut known = self.known();
-        let files = known.files.entry(nonce).or_default();
+        let mut state = self.lock();
+        let files = state.files.entry(nonce).or_default();
         files.are_closed = true;
-        files.being_stored == 0
+        files.uploads == 0
     }
 
-    /// Nothing of this order can be stored any more, whoever asks.
+    /// Forgets the files of a lease under which no upload is possible any more.
     pub fn forget_files(&self, nonce: Uuid) {
-        self.known().files.remove(&nonce);
+        self.lock().files.remove(&nonce);
     }
 
-    /// What is known is whole whatever panicked beside it.
-    fn known(&self) -> MutexGuard<'_, Known> {
+    /// A panic of another thread leaves the state consistent, so poisoning is ignored.
+    fn lock(&self) -> MutexGuard<'_, WorkersState> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
@@ -402,91 +422,93 @@ mod tests {
     use super::*;
 
     #[test]
-    fn workers_count_while_they_are_heard_of_and_get_work() {
+    fn available_slots_count_online_accepted_workers() {
         let workers = Workers::default();
-        let about = |slots| WorkerAbout {
+        let info = |slots| WorkerInfo {
             version: "1.0".to_owned(),
             slots,
             labels: Vec::new(),
         };
         let start: Timestamp = "2026-03-01T10:00:00Z".parse().expect("an instant");
         let at = |s: i64| start + SignedDuration::from_secs(s);
-        workers.heard("a", about(4), None, at(0));
-        workers.heard("b", about(2), Some("it is another program"), at(0));
-        assert_eq!(workers.slots(at(29)), 4);
-        assert_eq!(workers.slots(at(30)), 0, "it is silent");
-        let unit = Uuid::from_u128(1);
-        let hit = WorkTold {
-            what: Some("hit"),
-            trouble: None,
+        workers.record_poll("a", info(4), None, at(0));
+        workers.record_poll("b", info(2), Some("it is another program"), at(0));
+        assert_eq!(workers.available_slots(at(29)), 4);
+        assert_eq!(workers.available_slots(at(30)), 0, "it has timed out");
+        let job = Uuid::from_u128(1);
+        let hit = SlotReport {
+            description: Some("hit"),
+            problem: None,
         };
-        let stuck = WorkTold {
-            what: None,
-            trouble: Some("no room"),
+        let stuck = SlotReport {
+            description: None,
+            problem: Some("the disk is full"),
         };
-        workers.works("a", "slot-0", unit, hit, at(40));
-        workers.works("a", "slot-0", unit, stuck, at(50));
+        workers.record_job("a", "slot-0", job, hit, at(40));
+        workers.record_job("a", "slot-0", job, stuck, at(50));
         let all = workers.all();
         assert_eq!(all.len(), 2);
-        assert_eq!((all[0].first_at, all[0].last_at), (at(0), at(50)));
-        let busy = &all[0].busy["slot-0"];
-        assert_eq!((busy.what.as_deref(), busy.since), (Some("hit"), at(40)));
-        assert_eq!(busy.trouble.as_deref(), Some("no room"));
-        workers.works("a", "slot-0", unit, WorkTold::default(), at(50));
-        assert_eq!(workers.all()[0].busy["slot-0"].trouble, None);
-        // One that works since before this process counts as what it is seen to do.
-        workers.works("earlier", "slot-3", Uuid::from_u128(2), hit, at(50));
-        assert_eq!(workers.slots(at(50)), 5);
-        workers.ended(Uuid::from_u128(2));
-        workers.ended(unit);
-        assert!(workers.all()[0].busy.is_empty());
-        // A day later it is as if it had never been.
-        workers.heard("c", about(1), None, at(50) + FORGOTTEN);
+        assert_eq!((all[0].first_seen_at, all[0].last_seen_at), (at(0), at(50)));
+        let busy = &all[0].busy_slots["slot-0"];
+        assert_eq!((busy.description.as_deref(), busy.since), (Some("hit"), at(40)));
+        assert_eq!(busy.problem.as_deref(), Some("the disk is full"));
+        workers.record_job("a", "slot-0", job, SlotReport::default(), at(50));
+        assert_eq!(workers.all()[0].busy_slots["slot-0"].problem, None);
+        // A worker that started before this process counts with its busy slots.
+        workers.record_job("earlier", "slot-3", Uuid::from_u128(2), hit, at(50));
+        assert_eq!(workers.available_slots(at(50)), 5);
+        workers.end_job(Uuid::from_u128(2));
+        workers.end_job(job);
+        assert!(workers.all()[0].busy_slots.is_empty());
+        // A day later the worker is forgotten.
+        workers.record_poll("c", info(1), None, at(50) + FORGET_AFTER);
         assert_eq!(workers.all().len(), 1);
 
-        workers.trouble("give out work", Some("NATS is away"));
-        assert_eq!(workers.troubles().len(), 1);
-        workers.trouble("give out work", None);
-        assert!(workers.troubles().is_empty());
+        workers.set_problem("give out work", Some("NATS is away"));
+        assert_eq!(workers.problems().len(), 1);
+        workers.set_problem("give out work", None);
+        assert!(workers.problems().is_empty());
     }
 
     #[test]
-    fn who_can_play_nothing_rests_longer_each_time_until_it_plays() {
+    fn backoff_doubles_with_failures_and_ends_with_success() {
         let workers = Workers::default();
         let start: Timestamp = "2026-03-01T10:00:00Z".parse().expect("an instant");
         let at = |s: i64| start + SignedDuration::from_secs(s);
-        let failed = |unit, s| workers.failed("a", Uuid::from_u128(unit), at(s));
+        let failed = |job, s| workers.record_failure("a", Uuid::from_u128(job), at(s));
         assert_eq!(failed(1, 0), None);
         assert_eq!(failed(1, 0), None);
-        assert_eq!(failed(1, 0), None, "one that nobody can play is one");
+        assert_eq!(failed(1, 0), None, "a job that fails repeatedly counts once");
         assert_eq!(failed(2, 0), None);
-        assert_eq!(workers.rests("a", at(0)), None);
+        assert_eq!(workers.backoff_reason("a", at(0)), None);
         assert_eq!(failed(3, 0), Some((3, at(60))));
-        let told = workers.rests("a", at(59)).expect("it rests");
-        assert!(told.contains("the last 3 units"), "{told}");
-        assert_eq!(workers.rests("a", at(60)), None, "it may try again");
+        let reason = workers
+            .backoff_reason("a", at(59))
+            .expect("it backs off");
+        assert!(reason.contains("its last 3 jobs"), "{reason}");
+        assert_eq!(workers.backoff_reason("a", at(60)), None, "it may try again");
         assert_eq!(failed(4, 60), Some((4, at(180))));
-        for unit in 5..25 {
-            failed(unit, 180);
+        for job in 5..25 {
+            failed(job, 180);
         }
         assert_eq!(failed(25, 180), Some((25, at(180 + 3600))));
-        assert_eq!(workers.rests("b", at(180)), None);
-        workers.played("a");
-        assert_eq!(workers.rests("a", at(180)), None);
+        assert_eq!(workers.backoff_reason("b", at(180)), None);
+        workers.record_success("a");
+        assert_eq!(workers.backoff_reason("a", at(180)), None);
         assert_eq!(failed(26, 180), None);
     }
 
     #[test]
-    fn files_of_an_order_are_closed_once_nobody_stores_one() {
+    fn files_are_closed_once_no_upload_runs() {
         let (workers, nonce) = (Workers::default(), Uuid::from_u128(1));
-        let first = workers.storing(nonce).expect("open");
-        assert!(!workers.close_files(nonce), "one is being stored");
-        assert!(workers.storing(nonce).is_none(), "no other is begun");
+        let first = workers.begin_upload(nonce).expect("open");
+        assert!(!workers.close_files(nonce), "an upload is running");
+        assert!(workers.begin_upload(nonce).is_none(), "no other upload begins");
         drop(first);
         assert!(workers.close_files(nonce));
-        assert!(workers.storing(nonce).is_none());
+        assert!(workers.begin_upload(nonce).is_none());
         workers.forget_files(nonce);
-        drop(workers.storing(nonce).expect("another life"));
-        assert!(workers.known().files.is_empty(), "nothing is left of it");
+        drop(workers.begin_upload(nonce).expect("a new lease"));
+        assert!(workers.lock().files.is_empty(), "the entry is removed");
     }
 }

@@ -1,4 +1,4 @@
-//! The one way to change the database.
+//! The only way to change the database.
 
 use crate::{
     column::{Instant, Json},
@@ -11,36 +11,36 @@ use serde_json::Value;
 use sqlx::{Sqlite, SqliteConnection, Transaction, types::Text};
 use std::ops::{Deref, DerefMut};
 
-/// A change under way. It is the connection, for statements, and collects what is to be told of it.
+/// An open write transaction. It is the connection for statements, and collects the events to publish.
 pub(crate) struct Tx {
     transaction: Transaction<'static, Sqlite>,
     pub(crate) now: Timestamp,
     recorded: Vec<(Subject, Event)>,
-    advanced: Vec<Subject>,
-    work_added: bool,
+    progress: Vec<Subject>,
+    job_added: bool,
 }
 
 impl Tx {
-    /// Notes what happened; it is stored and told if the change is committed.
+    /// Records an event; it is stored and sent to listeners if the transaction is committed.
     pub(crate) fn record(&mut self, subject: Subject, event: Event) {
         self.recorded.push((subject, event));
     }
 
-    /// Notes progress, which is told and not stored.
-    pub(crate) fn advanced(&mut self, subject: Subject) {
-        self.advanced.push(subject);
+    /// Notes progress on a subject, which is sent to listeners and not stored.
+    pub(crate) fn record_progress(&mut self, subject: Subject) {
+        self.progress.push(subject);
     }
 
-    /// The queue has more to claim. For the queue alone.
-    pub(crate) const fn work_added(&mut self) {
-        self.work_added = true;
+    /// The queue has another job to claim. Only the queue calls this.
+    pub(crate) const fn job_added(&mut self) {
+        self.job_added = true;
     }
 
     async fn append_events(&mut self, actor: &Actor) -> Result<Vec<Change>> {
-        let mut told = Vec::with_capacity(self.recorded.len() + self.advanced.len());
+        let mut changes = Vec::with_capacity(self.recorded.len() + self.progress.len());
         for (subject, event) in std::mem::take(&mut self.recorded) {
             let id = append(&mut self.transaction, actor, self.now, subject, &event).await?;
-            told.push(Change::Recorded(Box::new(EventRecord {
+            changes.push(Change::Recorded(Box::new(EventRecord {
                 id,
                 at: self.now,
                 actor: actor.clone(),
@@ -48,8 +48,8 @@ impl Tx {
                 event,
             })));
         }
-        told.extend(self.advanced.drain(..).map(Change::Progress));
-        Ok(told)
+        changes.extend(self.progress.drain(..).map(Change::Progress));
+        Ok(changes)
     }
 }
 
@@ -66,7 +66,7 @@ impl DerefMut for Tx {
     }
 }
 
-/// Adds one row to the events table; its id.
+/// Adds one row to the events table and returns its id.
 async fn append(
     connection: &mut SqliteConnection,
     actor: &Actor,
@@ -74,7 +74,7 @@ async fn append(
     subject: Subject,
     event: &Event,
 ) -> Result<i64> {
-    let damaged = |what: &dyn std::fmt::Display| StoreError::Damaged(format!("an event: {what}"));
+    let damaged = |problem: &dyn std::fmt::Display| StoreError::Damaged(format!("an event: {problem}"));
     let mut payload = serde_json::to_value(event).map_err(|error| damaged(&error))?;
     let kind = match payload
         .as_object_mut()
@@ -100,16 +100,16 @@ async fn append(
 }
 
 impl Store {
-    /// As [`keep`](Self::keep), of a season that runs: [`StoreError::Archived`] of one that is an archive's, whatever
-    /// was asked.
+    /// As [`write_even_archived`](Self::write_even_archived), but refuses all changes of an archived season with
+    /// [`StoreError::Archived`].
     pub(crate) async fn write<T>(
         &self,
         actor: Actor,
         now: Timestamp,
         change: impl AsyncFnOnce(&mut Tx) -> Result<T>,
     ) -> Result<T> {
-        match self.archived() {
-            None => self.keep(actor, now, change).await,
+        match self.archived_season() {
+            None => self.write_even_archived(actor, now, change).await,
             Some(archived) => Err(StoreError::Archived {
                 made_at: archived.made_at,
                 imported_at: archived.imported_at,
@@ -117,11 +117,10 @@ impl Store {
         }
     }
 
-    /// Runs `change` as one transaction that nobody else's write comes into: what it did and what it
-    /// recorded are stored together, and then the listeners are woken. Nothing is changed and nobody
-    /// woken if it fails, or if the process dies. An error of the commit itself leaves open whether
-    /// it is stored.
-    pub(crate) async fn keep<T>(
+    /// Runs `change` as one isolated transaction. Its changes and its events are stored together, and
+    /// then the listeners are woken. Nothing is changed and no listener woken if it fails, or if the
+    /// process dies. After an error of the commit itself it is unknown whether the change is stored.
+    pub(crate) async fn write_even_archived<T>(
         &self,
         actor: Actor,
         now: Timestamp,
@@ -131,24 +130,24 @@ impl Store {
             transaction: self.database.begin().await?,
             now,
             recorded: Vec::new(),
-            advanced: Vec::new(),
-            work_added: false,
+            progress: Vec::new(),
+            job_added: false,
         };
         let done = change(&mut tx).await?;
-        let told = tx.append_events(&actor).await?;
+        let changes = tx.append_events(&actor).await?;
         let committed = tx.transaction.commit().await;
-        // What is not told changes nothing that is shown: deliveries, leases. An error leaves open whether it is stored.
-        if committed.is_err() || !told.is_empty() {
-            self.signals.committed();
+        // Transactions without events change nothing visible: deliveries, leases. After an error the commit may be stored.
+        if committed.is_err() || !changes.is_empty() {
+            self.signals.count_commit();
         }
         committed?;
-        if tx.work_added {
-            self.signals.work_added();
+        if tx.job_added {
+            self.signals.job_added();
         }
-        for change in told {
-            self.signals.changed(change);
+        for change in changes {
+            self.signals.send(change);
         }
-        self.database.log_has_grown();
+        self.database.empty_log_if_large();
         Ok(done)
     }
 }

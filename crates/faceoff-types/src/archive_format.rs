@@ -1,4 +1,4 @@
-/// The archives in which a bundle may come.
+/// Archive formats that bundles are accepted in.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ArchiveFormat {
     /// `.tar.gz`
@@ -12,16 +12,16 @@ pub enum ArchiveFormat {
 }
 
 impl ArchiveFormat {
-    /// So many first bytes tell any of them. All but [`Self::Tar`] are told by four, so that a shorter head
-    /// may be asked about, too.
+    /// Bytes from an archive's start that suffice to detect every format. All but [`Self::Tar`] need only
+    /// four, so [`Self::detect`] takes shorter heads too.
     pub const LONGEST_MAGIC: usize = TAR_MAGIC_AT + TAR_MAGIC.len();
 
-    /// Told by its first bytes, whatever its name says.
+/// Detects the format from an archive's first bytes; file names are not trusted.
     #[must_use]
     pub fn detect(head: &[u8]) -> Option<Self> {
         match head {
             [0x1f, 0x8b, ..] => Some(Self::TarGz),
-            // Or a frame that is to be skipped, with which some compressors begin.
+            // Some compressors begin with a skippable frame.
             [0x28, 0xb5, 0x2f, 0xfd, ..] | [0x50..=0x5f, 0x2a, 0x4d, 0x18, ..] => {
                 Some(Self::TarZst)
             }
@@ -31,7 +31,7 @@ impl ArchiveFormat {
         }
     }
 
-    /// Its usual ending, without the dot.
+    /// Usual file extension, without the dot.
     #[must_use]
     pub const fn extension(self) -> &'static str {
         match self {
@@ -42,7 +42,7 @@ impl ArchiveFormat {
         }
     }
 
-    /// Endings that people give it.
+    /// Accepted file extensions, with the dot.
     #[must_use]
     pub const fn names(self) -> &'static [&'static str] {
         match self {
@@ -54,8 +54,7 @@ impl ArchiveFormat {
     }
 }
 
-/// In the header of an archive's first entry, which begins with the entry's name. GNU's and POSIX' tar go on
-/// differently after it.
+/// Magic in the header of the first entry. The bytes after it differ between GNU and POSIX tar.
 const TAR_MAGIC: &[u8] = b"ustar";
 const TAR_MAGIC_AT: usize = 257;
 
@@ -64,7 +63,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn formats_are_told_by_their_first_bytes() {
+    fn detect_recognises_formats_by_first_bytes() {
         let detect = ArchiveFormat::detect;
         assert_eq!(detect(&[0x1f, 0x8b, 8, 0]), Some(ArchiveFormat::TarGz));
         assert_eq!(
@@ -77,7 +76,7 @@ mod tests {
     }
 
     #[test]
-    fn a_plain_tar_is_told_by_its_first_header() {
+    fn detect_recognises_gnu_and_posix_tar_headers() {
         for magic in [b"ustar  \0", b"ustar\x0000"] {
             let mut head = vec![0; 512];
             head[..13].copy_from_slice(b"manifest.json");

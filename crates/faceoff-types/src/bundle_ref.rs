@@ -1,14 +1,14 @@
 use serde::{Deserialize, Serialize};
 
-/// Where an uploaded bundle is kept and what it must be.
+/// An uploaded bundle: where it is stored and what it must hash to.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct BundleRef {
-    /// Where the archive is among the artifacts.
+    /// Key of the archive in the artifact store.
     pub key: String,
-    /// Size of the archive.
+    /// Size of the archive in bytes.
     pub bytes: u64,
     /// BLAKE3 of the archive, 64 hexadecimal digits.
     pub blake3: String,
-    /// As the team named it.
+    /// File name given by the team.
     pub file_name: String,
 }

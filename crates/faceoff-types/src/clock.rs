@@ -1,13 +1,13 @@
 use jiff::Timestamp;
 use std::{fmt, sync::Arc};
 
-/// Tells the instants that leases and days are reckoned by. A program makes one from its system's
-/// clock and hands it down; a test turns its own.
+/// Source of the current time for leases and days. Programs pass in one that reads the system clock, tests
+/// one that they advance themselves.
 #[derive(Clone)]
 pub struct Clock(Arc<dyn Fn() -> Timestamp + Send + Sync>);
 
 impl Clock {
-    /// A clock that asks `now`.
+    /// A clock that calls `now` for each reading.
     pub fn new(now: impl Fn() -> Timestamp + Send + Sync + 'static) -> Self {
         Self(Arc::new(now))
     }

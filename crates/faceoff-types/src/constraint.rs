@@ -12,7 +12,7 @@ pub enum Constraint {
     JointPos,
     /// Filtered joint velocities within 95 % of their limits.
     JointVel,
-    /// Time that the agent takes to answer.
+    /// Time that the agent takes to answer a step.
     ComputationTime,
 }
 

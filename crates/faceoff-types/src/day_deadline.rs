@@ -1,20 +1,20 @@
 use serde::{Deserialize, Serialize};
 use std::{fmt, str::FromStr};
 
-/// More hours than a day of any stage has: a month.
-pub const LONGEST_DEADLINE_H: u32 = 744;
+/// The longest deadline in hours: 31 days.
+pub const MAX_DEADLINE_H: u32 = 744;
 
-/// Until when what a day's cut has started may be played; what is left then is ended as not played.
+/// When an evaluation day ends. Episodes that have not been played by then are not played any more.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum DayDeadline {
-    /// Until the schedule's next cut; without a schedule there is none.
+    /// The schedule's next cutoff; without a schedule there is no deadline.
     #[default]
     NextCut,
-    /// However long it takes.
+    /// No deadline.
     Never,
-    /// So many hours from the cut, 1 to 744.
+    /// Hours after the cutoff, 1 to 744.
     Hours(u32),
 }
 
@@ -28,7 +28,7 @@ impl fmt::Display for DayDeadline {
     }
 }
 
-/// Text that is no deadline.
+/// Text that is not a deadline.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("expected next-cut, never, or hours as 30h, got {0:?}")]
 pub struct ParseDayDeadlineError(String);
@@ -52,7 +52,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn deadlines_read_back_and_others_are_told_what_one_is() {
+    fn deadline_round_trips_and_bad_text_is_refused() {
         for (deadline, json) in [
             (DayDeadline::NextCut, r#""next_cut""#),
             (DayDeadline::Never, r#""never""#),

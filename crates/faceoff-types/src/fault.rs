@@ -1,9 +1,9 @@
-use crate::Contest;
+use crate::AgentTask;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
-/// What an agent did wrong (PROTOCOL, "Agent faults"). A fault of the platform is a different type,
-/// in the crate where it arises, and never becomes one of these.
+/// What an agent did wrong (PROTOCOL, "Agent faults"). A platform fault has a different type, in the crate
+/// where it arises, and is never converted into one of these.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 pub enum AgentFaultKind {
@@ -17,18 +17,18 @@ pub enum AgentFaultKind {
         expected: String,
         got: String,
     },
-    /// An action of another shape than the agreed interpolation needs.
+    /// An action whose shape is not the one of the agreed interpolation.
     WrongShape {
         /// The agreed shape, e.g. `[2][7]`.
         expected: String,
-        /// The shape that came.
+        /// The shape that was sent.
         got: String,
     },
     /// NaN or an infinity, or a number beyond what `f64` holds.
     NonFinite,
-    /// A finite number that no action needs.
+    /// A finite number beyond the largest magnitude allowed.
     TooLarge {
-        /// Where, e.g. `action[1][3]`.
+        /// Position in the answer, e.g. `action[1][3]`.
         place: String,
         value: f64,
         /// The largest magnitude allowed.
@@ -36,28 +36,24 @@ pub enum AgentFaultKind {
     },
     /// The commands drove the simulated world beyond what can be simulated.
     Diverged {
-        /// What left its bounds, and which.
+        /// The quantity that left its bounds, and its bounds.
         detail: String,
     },
     /// A line longer than the protocol allows.
     LineTooLong {
-        /// The limit in bytes.
         limit_bytes: u64,
     },
-    /// No answer in time.
+    /// No answer within the time limit.
     TimedOut {
-        /// What was waited for.
+        /// Which answer was due.
         phase: Phase,
-        /// The limit in seconds.
         limit_s: f64,
     },
-    /// Answers that came, each in time, but took too long in all.
+    /// Each answer came in time, but their sum exceeded the budget.
     TimeBudget {
-        /// Which answers: of an episode's steps, or of a shard's resets.
+        /// What the budget is for: the steps of an episode, or the resets of a shard.
         phase: Phase,
-        /// What they add up to, in seconds.
         used_s: f64,
-        /// What is allowed, in seconds.
         limit_s: f64,
     },
     /// Standard output was closed while an answer was due.
@@ -70,13 +66,13 @@ pub enum AgentFaultKind {
     Signalled {
         signal: i32,
     },
-    /// The process was ended because it used more than it may.
+    /// The process was ended because it exceeded a resource limit.
     LimitExceeded {
-        /// The limit's name, e.g. `memory`.
+        /// Name of the limit, e.g. `memory`.
         limit: String,
-        /// What is allowed, with its unit.
+        /// The limit, with its unit.
         allowed: String,
-        /// What was used, with its unit.
+        /// The amount used, with its unit.
         used: String,
     },
     /// The program could not be started: the command is missing or not executable.
@@ -152,9 +148,8 @@ impl fmt::Display for AgentFaultKind {
     }
 }
 
-/// What a signal usually means, for those that an agent meets. An agent is the first process of its
-/// sandbox, which the kernel spares the signal of `abort`; the C library then ends it by an invalid
-/// access instead.
+/// The usual cause of the signals that end agents. An agent is process 1 of its sandbox, where the kernel
+/// ignores the signal of `abort`; the C library then ends it with an invalid access instead.
 const fn signal_note(signal: i32) -> &'static str {
     match signal {
         4 => " (SIGILL: an instruction that this CPU does not know, or a trap of the runtime)",
@@ -167,13 +162,13 @@ const fn signal_note(signal: i32) -> &'static str {
     }
 }
 
-/// What an agent is asked for.
+/// The kinds of answers that an agent owes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Phase {
-    /// To start and to answer `hello`.
+    /// Starting, up to the answer to `hello`.
     StartUp,
-    /// To get ready for an episode.
+    /// Getting ready for an episode: the answer to `reset`.
     Reset,
     Step,
 }
@@ -188,25 +183,25 @@ impl fmt::Display for Phase {
     }
 }
 
-/// One fault of an agent: what, where, and the offending line.
+/// A fault of an agent, with the place and the offending line.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct AgentFault {
     #[serde(flatten)]
     pub fault: AgentFaultKind,
-    /// What it was playing.
+    /// The task that the agent was given.
     #[serde(flatten)]
-    pub contest: Contest,
+    pub agent_task: AgentTask,
     /// The episode; `None` during start-up.
     pub episode: Option<u32>,
     /// The control step; `None` outside of an episode.
     pub step: Option<u32>,
-    /// The offending line, cut to 400 characters, where there was one.
+    /// The offending line, if there was one, cut to 400 characters.
     pub line: Option<String>,
 }
 
 impl fmt::Display for AgentFault {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}", self.contest)?;
+        write!(f, "{}", self.agent_task)?;
         match (self.episode, self.step) {
             (Some(episode), Some(step)) => write!(f, ", episode {episode}, step {step}")?,
             (Some(episode), None) => write!(f, ", episode {episode}, {}", Phase::Reset)?,
@@ -225,21 +220,21 @@ mod tests {
     use super::*;
     use crate::{Side, Task};
 
-    /// Databases and datasets hold these lines.
+    /// These lines are stored in databases and datasets.
     #[test]
-    fn stored_faults_stay_readable_and_a_games_fault_adds_its_side() {
+    fn stored_faults_stay_readable_and_name_the_side() {
         let fault = AgentFault {
             fault: AgentFaultKind::TimedOut {
                 phase: Phase::StartUp,
                 limit_s: 120.0,
             },
-            contest: Task::Hit.into(),
+            agent_task: Task::Hit.into(),
             episode: None,
             step: None,
             line: None,
         };
-        let mut in_a_game = fault.clone();
-        in_a_game.contest = Contest::Game { side: Side::Second };
+        let mut game_fault = fault.clone();
+        game_fault.agent_task = AgentTask::Game { side: Side::Second };
         for (fault, stored, shown) in [
             (
                 fault,
@@ -247,7 +242,7 @@ mod tests {
                 "hit, start-up: no answer within the start-up limit of 120 s",
             ),
             (
-                in_a_game,
+                game_fault,
                 r#"{"kind":"timed_out","phase":"start-up","limit_s":120.0,"task":"tournament","side":2,"episode":null,"step":null,"line":null}"#,
                 "tournament, side 2, start-up: no answer within the start-up limit of 120 s",
             ),
@@ -279,15 +274,15 @@ mod tests {
             r#"{"task":"hit","side":1}"#,
             r#"{"task":"tournament","side":3}"#,
         ] {
-            assert!(serde_json::from_str::<Contest>(wrong).is_err(), "{wrong}");
+            assert!(serde_json::from_str::<AgentTask>(wrong).is_err(), "{wrong}");
         }
     }
 
     #[test]
-    fn a_crash_in_the_sandbox_does_not_hide_that_it_may_have_been_an_abort() {
-        let told = |signal| AgentFaultKind::Signalled { signal }.to_string();
-        assert!(told(11).starts_with("the agent was ended by signal 11 (SIGSEGV"));
-        assert!(told(11).contains("abort"));
-        assert_eq!(told(12), "the agent was ended by signal 12");
+    fn sigsegv_message_mentions_abort() {
+        let message = |signal| AgentFaultKind::Signalled { signal }.to_string();
+        assert!(message(11).starts_with("the agent was ended by signal 11 (SIGSEGV"));
+        assert!(message(11).contains("abort"));
+        assert_eq!(message(12), "the agent was ended by signal 12");
     }
 }

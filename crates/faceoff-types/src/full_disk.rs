@@ -3,10 +3,10 @@ use std::{
     io::{self, ErrorKind},
 };
 
-/// Does this error, or one that caused it, say that a disk has no room left, or its owner no more of
-/// it? That is the host's doing and passes by itself; nobody's verdict follows from it.
+/// Is this error, or one of its causes, a full disk or an exhausted disk quota? Such a condition belongs to the
+/// host and is temporary, so it is never an agent fault.
 #[must_use]
-pub fn tells_of_full_disk(error: &(dyn Error + 'static)) -> bool {
+pub fn is_full_disk(error: &(dyn Error + 'static)) -> bool {
     let mut next = Some(error);
     while let Some(error) = next {
         if let Some(error) = error.downcast_ref::<io::Error>() {
@@ -16,7 +16,7 @@ pub fn tells_of_full_disk(error: &(dyn Error + 'static)) -> bool {
             ) {
                 return true;
             }
-            // The source of an error that wraps another is that one's source, not that one.
+            // `source()` of a wrapping `io::Error` skips the wrapped error itself.
             if let Some(wrapped) = error.get_ref() {
                 next = Some(wrapped);
                 continue;
@@ -38,22 +38,22 @@ mod tests {
     }
 
     #[test]
-    fn a_full_disk_is_seen_through_what_wraps_it() {
+    fn full_disk_is_recognised_through_wrappers() {
         let no_space = || io::Error::from_raw_os_error(28);
-        assert!(tells_of_full_disk(&no_space()));
-        assert!(tells_of_full_disk(&Copying { source: no_space() }));
+        assert!(is_full_disk(&no_space()));
+        assert!(is_full_disk(&Copying { source: no_space() }));
         let wrapped = Copying {
             source: io::Error::other(Copying { source: no_space() }),
         };
-        assert!(tells_of_full_disk(&wrapped));
+        assert!(is_full_disk(&wrapped));
         let over_quota = io::Error::from_raw_os_error(122);
-        assert!(tells_of_full_disk(&over_quota));
+        assert!(is_full_disk(&over_quota));
     }
 
     #[test]
-    fn other_failures_are_none() {
-        assert!(!tells_of_full_disk(&io::Error::from_raw_os_error(5)));
-        assert!(!tells_of_full_disk(&io::Error::other(
+    fn other_io_errors_are_not_full_disk() {
+        assert!(!is_full_disk(&io::Error::from_raw_os_error(5)));
+        assert!(!is_full_disk(&io::Error::other(
             "no space left on device"
         )));
     }

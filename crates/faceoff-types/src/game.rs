@@ -1,16 +1,15 @@
-//! What happened in a game: all that scoring needs.
+//! The outcome of a game, with all that scoring needs.
 
 use crate::{AgentFault, ComputationTime, Side, Violations};
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
-/// What happened in a game. Pairs are the first side's first.
+/// The outcome of a game. In pairs, the first side comes first.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct GameOutcome {
     pub steps: u32,
     pub rallies: u32,
     pub end: GameEnd,
-    /// What each side did.
     pub sides: [SideOutcome; 2],
 }
 
@@ -20,15 +19,15 @@ pub struct GameOutcome {
 pub enum GameEnd {
     /// All control steps were played.
     Played,
-    /// A side used up its faults or its time.
+    /// One side exceeded its allowed faults or time.
     Forfeit {
         by: Side,
-        /// What it used up.
+        /// What the side exceeded.
         cause: ForfeitCause,
     },
-    /// Both did, in the same control step or while they got ready for the same rally.
+    /// Both sides did so, in the same control step or while getting ready for the same rally.
     BothForfeit {
-        /// What each used up.
+        /// What each side exceeded.
         causes: [ForfeitCause; 2],
     },
 }
@@ -43,7 +42,7 @@ impl GameEnd {
         }
     }
 
-    /// What each side used up, if it forfeited.
+    /// What each side exceeded, if it forfeited.
     #[must_use]
     pub const fn forfeits(&self) -> [Option<ForfeitCause>; 2] {
         match self {
@@ -61,23 +60,23 @@ impl GameEnd {
     }
 }
 
-/// What a side used up.
+/// The allowance that a side exceeded.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[serde(tag = "kind", rename_all = "snake_case")]
 pub enum ForfeitCause {
-    /// Its faults.
+    /// The number of faults.
     Faults {
-        /// How many it had.
+        /// Faults of the side.
         count: u32,
-        /// How many do not forfeit.
+        /// The largest number that does not forfeit the game.
         allowed: u32,
     },
-    /// Its time for answers, start-ups and resets.
+    /// The total time for answers, start-ups and resets.
     Time {
-        /// What it used, in seconds.
+        /// Time used, in seconds.
         used_s: f64,
-        /// What is allowed, in seconds.
+        /// Time allowed, in seconds.
         allowed_s: f64,
     },
 }
@@ -94,31 +93,31 @@ impl fmt::Display for ForfeitCause {
     }
 }
 
-/// What one side of a game did.
+/// The outcome of one side of a game.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SideOutcome {
     /// Goals scored, without points for the opponent's fouls.
     pub goals: u32,
     pub fouls: u32,
-    /// Windows of 500 control steps, in order; the last may be shorter.
+    /// In windows of 500 control steps, in order; the last may be shorter.
     pub windows: Vec<GameWindow>,
     /// Control steps that were answered, in time or not.
     pub answers: u32,
     /// Answers that came too late to take effect.
     pub late_answers: u32,
-    /// Its faults, in order.
+    /// In order of occurrence.
     pub faults: Vec<GameFault>,
-    /// What its answers, start-ups and resets took in all, less what the host took, in seconds.
+    /// Total time of its answers, start-ups and resets, in seconds, without host interference.
     pub time_used_s: f64,
 }
 
-/// What a side did in one window: the game's equivalent of an episode.
+/// One window of one side: the game's equivalent of an episode.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct GameWindow {
     pub steps: u32,
     /// Constraints broken at least once.
     pub violations: Violations,
-    /// Of its answers, those that came too late included.
+    /// Includes answers that came too late to take effect.
     pub computation_time: ComputationTime,
     pub faults: u32,
 }
@@ -126,9 +125,9 @@ pub struct GameWindow {
 /// A fault in a game.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct GameFault {
-    /// Control steps that the game had played before.
+    /// Control steps of the game before the fault.
     pub game_step: u32,
-    /// What it was; its episode is the rally's number, its step is the rally's.
+    /// Its `episode` is the number of the rally, its `step` the step within the rally.
     #[serde(flatten)]
     pub fault: AgentFault,
 }

@@ -1,17 +1,17 @@
 use serde::{Deserialize, Serialize};
 
-/// What each side of a game is held to beside the limits of single answers (RULES, "Tournament").
+/// Limits of each side of a game, in addition to those of single answers (RULES, "Tournament").
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[serde(default, deny_unknown_fields)]
 pub struct GameLimits {
-    /// An answer that takes longer, in seconds, does not take effect.
+    /// Longest time of an answer that still takes effect, in seconds.
     pub in_time_s: f64,
-    /// More faults than this forfeit the game.
+    /// Faults allowed; one more forfeits the game.
     pub max_faults: u32,
-    /// All answers, start-ups and resets of a side in all, in seconds; what takes longer forfeits the game.
+    /// Total time for the answers, start-ups and resets of a side, in seconds; exceeding it forfeits the game.
     pub total_s: f64,
-    /// To start again after a fault, in seconds; the first start has the start-up's limit.
+    /// Limit for a restart after a fault, in seconds; the first start has the limit of start-ups.
     pub restart_s: f64,
 }
 

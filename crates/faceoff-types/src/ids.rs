@@ -2,7 +2,7 @@ use serde::{Deserialize, Serialize};
 use std::{fmt, str::FromStr};
 use uuid::Uuid;
 
-/// Text that is no id of the expected kind.
+/// Text that is not an id of the expected kind.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{text:?} is not a {kind} id: expected a UUID")]
 pub struct ParseIdError {
@@ -84,47 +84,47 @@ id!(
     "ablation"
 );
 id!(
-    /// What an evaluation or an ablation plays: contestants, a profile and episodes, cut into shards.
+    /// The episodes of an evaluation or ablation under one profile, split into shards.
     RunId,
     "run"
 );
 id!(
-    /// A range of episodes of one task of one run; the unit of work of a worker slot.
+    /// A range of episodes of one task of a run, played as one job.
     ShardId,
     "shard"
 );
 id!(
-    /// Somebody with an account: an organiser, or a member of a team.
-    PersonId,
+    /// A person with an account: an organiser, or a member of a team.
+    UserId,
     "person"
 );
 id!(
-    /// A named key to the API, of a person, a team or the host.
+    /// A named API token of a user, a team or the host.
     TokenId,
     "token"
 );
 id!(
-    /// A link by which one person joins, once.
+    /// A link with which one person joins, once.
     InvitationId,
     "invitation"
 );
 id!(
-    /// A team's wish to take part.
+    /// A team's request to take part.
     RegistrationId,
     "registration"
 );
 id!(
-    /// What the organisers tell everybody.
+    /// A public message from the organisers.
     AnnouncementId,
     "announcement"
 );
 id!(
-    /// What a team asks the organisers.
+    /// A team's question to the organisers.
     QuestionId,
     "question"
 );
 id!(
-    /// Evaluations that do not count: a trial, or a re-evaluation until it is applied.
+    /// Evaluations that do not count: a trial, or a proposed re-evaluation until it is applied.
     ProposalId,
     "proposal"
 );
@@ -133,17 +133,17 @@ id!(
     "tournament"
 );
 id!(
-    /// Two submissions at one table.
+    /// A game between two submissions.
     GameId,
     "game"
 );
 id!(
-    /// An address of somebody's program that is told of what happens.
+    /// An HTTP address that is notified of events.
     WebhookId,
     "webhook"
 );
 id!(
-    /// One thing told to one webhook, however often it is sent.
+    /// One event for one webhook, however often its delivery is tried.
     DeliveryId,
     "delivery"
 );

@@ -32,7 +32,7 @@ pub enum Interpolation {
     Trajectory,
 }
 
-/// A number that is no interpolation of the protocol.
+/// A number that is not an interpolation code of the protocol.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("unknown interpolation {0}: expected 1, 2, 3, 4, 5, -1 or null")]
 pub struct UnknownInterpolation(pub i64);
@@ -41,7 +41,7 @@ impl Interpolation {
     /// The interpolation of a code; `None` is the protocol's null.
     ///
     /// # Errors
-    /// The number is none of the protocol's.
+    /// If the protocol has no such code.
     pub const fn from_code(code: Option<i64>) -> Result<Self, UnknownInterpolation> {
         Ok(match code {
             Some(1) => Self::Linear,
@@ -92,15 +92,15 @@ impl Interpolation {
         }
     }
 
-    /// The action that commands a position, rad, at rest, in the first [`Interpolation::len`] places.
+    /// The action that holds a joint position (rad) at rest, in the first [`Interpolation::len`] elements.
     #[must_use]
-    pub fn held(self, position: &[f64; JOINTS]) -> [f64; MAX_ACTION_LEN] {
+    pub fn hold_position(self, position: &[f64; JOINTS]) -> [f64; MAX_ACTION_LEN] {
         let mut action = [0.0; MAX_ACTION_LEN];
-        let every = match self {
+        let point_len = match self {
             Self::Trajectory => 3 * JOINTS,
             _ => MAX_ACTION_LEN,
         };
-        for point in action.chunks_mut(every) {
+        for point in action.chunks_mut(point_len) {
             point[..JOINTS].copy_from_slice(position);
         }
         action
@@ -134,7 +134,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_protocol_knows_seven_interpolations() {
+    fn interpolation_codes_are_seven() {
         let known: Vec<i64> = (-300..300)
             .filter(|code| Interpolation::from_code(Some(*code)).is_ok())
             .collect();
@@ -146,7 +146,7 @@ mod tests {
     }
 
     #[test]
-    fn codes_shapes_and_lengths_are_those_of_the_protocol() {
+    fn interpolation_shapes_match_the_protocol() {
         for (code, len) in [
             (Some(1), 7),
             (Some(2), 7),
@@ -164,7 +164,7 @@ mod tests {
     }
 
     #[test]
-    fn null_is_a_code_in_json() {
+    fn interpolation_null_reads_as_trajectory() {
         let null: Interpolation = serde_json::from_str("null").unwrap();
         assert_eq!(null, Interpolation::Trajectory);
         assert_eq!(serde_json::to_string(&null).unwrap(), "null");

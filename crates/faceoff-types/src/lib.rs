@@ -1,6 +1,6 @@
 //! The vocabulary of Faceoff: ids, names, tasks, profiles, seeds, tiers, faults and scores.
 //!
-//! Everything here parses once, at a boundary (serde, command line, SQL), and is trusted afterwards.
+//! Values are parsed once, at a boundary (serde, command line, SQL), and trusted afterwards.
 //! This crate does no I/O, reads no clock and holds no policy: rules live in `faceoff-scoring`,
 //! physics in `faceoff-sim`.
 
@@ -9,17 +9,17 @@ mod bundle_ref;
 mod clock;
 mod computation_time;
 mod constraint;
-mod contest;
+mod agent_task;
 mod day_deadline;
 mod fault;
 mod full_disk;
 mod game;
 mod game_limits;
-mod game_seed;
-mod harmless;
+mod game_seed_label;
+mod printable;
 mod ids;
 mod interpolation;
-mod left_as;
+mod departure_kind;
 mod limits;
 mod live_game;
 mod millionths;
@@ -36,7 +36,7 @@ mod runtimes;
 mod schedule;
 mod seed;
 mod seed_label;
-mod smoke_outcome;
+mod validation_outcome;
 mod stage;
 mod stage_bounds;
 mod stage_limits;
@@ -54,25 +54,25 @@ pub use bundle_ref::BundleRef;
 pub use clock::Clock;
 pub use computation_time::ComputationTime;
 pub use constraint::{Constraint, Violations};
-pub use contest::{Contest, Side};
-pub use day_deadline::{DayDeadline, LONGEST_DEADLINE_H, ParseDayDeadlineError};
+pub use agent_task::{AgentTask, Side};
+pub use day_deadline::{DayDeadline, MAX_DEADLINE_H, ParseDayDeadlineError};
 pub use fault::{AgentFault, AgentFaultKind, Phase};
-pub use full_disk::tells_of_full_disk;
+pub use full_disk::is_full_disk;
 pub use game::{ForfeitCause, GameEnd, GameFault, GameOutcome, GameWindow, SideOutcome};
 pub use game_limits::GameLimits;
-pub use game_seed::{GameSeed, ParseGameSeedError};
-pub use harmless::{harmless, is_harmless};
+pub use game_seed_label::{GameSeedLabel, ParseGameSeedLabelError};
+pub use printable::{escape_unprintable, is_printable};
 pub use ids::{
     AblationId, AnnouncementId, DeliveryId, EvaluationId, GameId, InvitationId, ParseIdError,
-    PersonId, ProposalId, QuestionId, RegistrationId, RunId, ShardId, StageId, SubmissionId,
+    UserId, ProposalId, QuestionId, RegistrationId, RunId, ShardId, StageId, SubmissionId,
     TeamId, TokenId, TournamentId, WebhookId,
 };
 pub use interpolation::{Interpolation, JOINTS, MAX_ACTION_LEN, SUBSTEPS, UnknownInterpolation};
-pub use left_as::LeftAs;
+pub use departure_kind::DepartureKind;
 pub use limits::{AgentLimits, BundleLimits, ResourceLimits, TimeLimits};
-pub use live_game::{GameHappening, LiveGame, LiveHappening, LivePosition};
+pub use live_game::{GameEvent, LiveGame, LiveEvent, LivePosition};
 pub use millionths::{Millionths, NotMillionths};
-pub use names::{DivisionName, InvalidName, PersonName, StageName, TeamName};
+pub use names::{DivisionName, InvalidName, UserName, StageName, TeamName};
 pub use outcome::{EpisodeEnd, EpisodeOutcome};
 pub use perturbations::{
     DelaySettings, DisturbanceSettings, InvalidPerturbation, MismatchSettings, NoiseSettings,
@@ -86,15 +86,15 @@ pub use ruleset::{
     ACTION_LIMIT, FOULS_PER_POINT, GAME_WINDOWS, RULESET, Ruleset, UnknownRuleset, WINDOW_STEPS,
 };
 pub use runtime_inventory::{AgentMachine, PythonInventory, RuntimeContent, RuntimeInventory};
-pub use runtimes::{IMAGE_RUNTIME, InvalidRuntimes, RuntimeNotTaken, Runtimes, StageRuntimes};
+pub use runtimes::{IMAGE_RUNTIME, InvalidRuntimes, RuntimeRefused, Runtimes, StageRuntimes};
 pub use schedule::{InvalidSchedule, Schedule};
 pub use seed::{ParseSeedError, Seed};
 pub use seed_label::{ParseSeedLabelError, SeedLabel};
-pub use smoke_outcome::{SmokeOutcome, SmokeTiming};
+pub use validation_outcome::{ValidationOutcome, ValidationTiming};
 pub use stage::{ParseStageDayError, StageDay, StageRules};
 pub use stage_bounds::{InvalidStageRules, MAX_MEAN_DAYS};
-pub use stage_limits::{InvalidLimit, StageLimits, StageUploads};
-pub use stage_settings::{Publishes, StageSettings, Standings, UnknownSetting};
+pub use stage_limits::{InvalidLimit, StageLimits, StageUploadLimits};
+pub use stage_settings::{Publication, StageSettings, CountingResult, UnknownSetting};
 pub use task::{CONTROL_STEP_S, EPISODE_STEPS, MAX_EPISODES_PER_TASK, ParseTaskError, Task};
 pub use tier::Tier;
 pub use timing::{RoundTrips, SlotTiming};

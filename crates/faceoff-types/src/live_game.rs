@@ -1,35 +1,35 @@
-//! A game as it is watched while it is played. What is told here decides nothing.
+//! Live view of a running game. It has no influence on the result.
 
 use crate::{ForfeitCause, GameId, Side};
 use serde::{Deserialize, Serialize};
 
-/// Something that happened in a game under way. None is ever left out.
+/// An event of a running game. No event is left out.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
-pub struct LiveHappening {
-    /// Control steps that the game had played before. A fault is told when its rally is over, so that its step may be
-    /// an earlier one than that of what was told before.
+pub struct LiveEvent {
+    /// Control steps of the game before the event. A fault is reported at the end of its rally, so its step may be
+    /// before that of the preceding event.
     pub step: u32,
-    /// What.
+    /// The event, by its `kind`.
     #[serde(flatten)]
-    pub what: GameHappening,
+    pub event: GameEvent,
 }
 
-/// What can happen in a game. Pairs are the first side's first; scores are final ones so far, points for the
-/// opponent's fouls included.
+/// The kinds of events of a game. In pairs, the first side comes first. Scores include points for the opponent's
+/// fouls.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[serde(tag = "kind", rename_all = "snake_case")]
-pub enum GameHappening {
-    /// Both sides are ready, or held by a fault, and the puck lies on a side.
+pub enum GameEvent {
+    /// Both sides are ready, or suspended after a fault, and the puck lies on one side.
     RallyBegun {
-        /// From 0.
+        /// Number of the rally, from 0.
         rally: u32,
-        /// Whose side, 1 or 2.
+        /// The side on which the puck lies, 1 or 2.
         #[cfg_attr(feature = "openapi", schema(value_type = u32, minimum = 1, maximum = 2))]
         serves: Side,
     },
-    /// A side's agent was started anew after a fault.
+    /// The agent of a side was restarted after a fault.
     Restarted {
         /// 1 or 2.
         #[cfg_attr(feature = "openapi", schema(value_type = u32, minimum = 1, maximum = 2))]
@@ -37,84 +37,85 @@ pub enum GameHappening {
     },
     /// A goal ended the rally.
     Goal {
-        /// Who scored, 1 or 2.
+        /// The side that scored, 1 or 2.
         #[cfg_attr(feature = "openapi", schema(value_type = u32, minimum = 1, maximum = 2))]
         by: Side,
-        /// With it.
+        /// Score after the goal.
         score: [u32; 2],
     },
     /// A foul ended the rally.
     Foul {
-        /// Who fouled, 1 or 2.
+        /// The side that committed the foul, 1 or 2.
         #[cfg_attr(feature = "openapi", schema(value_type = u32, minimum = 1, maximum = 2))]
         by: Side,
-        /// With it.
+        /// Score after the foul.
         score: [u32; 2],
     },
-    /// The puck lay in the middle, where nobody reaches it: the rally ended without a foul.
+    /// The puck lay in the middle, out of reach of both sides: the rally ended without a foul.
     Stuck,
     /// The puck left the table beside the goals: the rally ended.
     LeftTable,
     /// A side's commands drove the simulated world beyond what can be simulated: the rally ended.
     Diverged,
-    /// A side broke the protocol or a limit: its arm held to the end of the rally that is over now.
+    /// A side violated the protocol or a limit. Its arm held still until the end of the rally, which is now over.
     Fault {
         /// 1 or 2.
         #[cfg_attr(feature = "openapi", schema(value_type = u32, minimum = 1, maximum = 2))]
         side: Side,
-        /// How many it has had with this one.
+        /// Faults of the side so far, including this one.
         count: u32,
     },
     /// The game is over and has a result, which counts once it is stored.
     Ended {
-        /// 10 : 0 after a forfeit.
+        /// Final score; 10 : 0 after a forfeit.
         score: [u32; 2],
-        /// 1 or 2; none: a draw.
+        /// The winning side, 1 or 2; null for a draw.
         #[cfg_attr(feature = "openapi", schema(value_type = Option<u32>, minimum = 1, maximum = 2))]
         winner: Option<Side>,
-        /// What each side used up, if it forfeited.
+        /// For each side, the allowance that it exceeded if it forfeited.
         forfeits: [Option<ForfeitCause>; 2],
     },
-    /// It was stopped, or broken by us: there is no result of it. If it is played again, it begins anew.
-    BrokenOff,
+    /// The attempt was stopped, or failed because of a platform fault, and has no result. A new attempt starts from the beginning.
+    #[serde(rename = "broken_off")]
+    Aborted,
 }
 
-impl GameHappening {
-    /// Is nothing told of this attempt any more?
+impl GameEvent {
+    /// Is the attempt over, with no more events to come?
     #[must_use]
     pub const fn is_last(&self) -> bool {
-        matches!(self, Self::Ended { .. } | Self::BrokenOff)
+        matches!(self, Self::Ended { .. } | Self::Aborted)
     }
 }
 
-/// Where things were after a control step: table frame, metres and radians.
+/// Positions after a control step, in the table frame, in metres and radians.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct LivePosition {
-    /// Control steps that were played by then.
+    /// Number of control steps played.
     pub step: u32,
     /// The puck's x, y and yaw.
     pub puck: [f64; 3],
-    /// Both mallets' x and y, the first side's first.
+    /// x and y of both mallets, the first side's first.
     pub mallets: [[f64; 2]; 2],
 }
 
-/// How a game under way stands.
+/// State of a running game.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct LiveGame {
-    /// Which.
+    /// Id of the game.
     pub game: GameId,
-    /// Which attempt is told of, from 1.
+    /// Number of the attempt, from 1.
     pub attempt: u32,
     /// Control steps of the whole game.
     pub steps: u32,
     /// Goals, and points for the opponent's fouls, the first side's first.
     pub score: [u32; 2],
-    /// Fouls.
+    /// Fouls of each side, the first side's first.
     pub fouls: [u32; 2],
-    /// The newest that was told; none before the first.
+    /// The latest position; null before the first.
     pub position: Option<LivePosition>,
-    /// Is nothing told of this attempt any more?
+    /// Is the attempt over, with no more events to come?
     pub is_over: bool,
 }

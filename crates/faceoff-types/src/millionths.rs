@@ -1,13 +1,13 @@
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
-/// A number with at most six decimals, from 0 to 4294: what people write is what is compared and summed, without
-/// rounding.
+/// A number from 0 to 4294 with at most six decimals. It is stored exactly as written, so comparisons and sums
+/// have no rounding.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(try_from = "f64", into = "f64")]
 pub struct Millionths(u32);
 
-/// A number that is none of these.
+/// A number out of range, or with more than six decimals.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("expected a number from 0 to 4294 with at most six decimals, got {0}")]
 pub struct NotMillionths(pub f64);
@@ -15,13 +15,13 @@ pub struct NotMillionths(pub f64);
 const ONE: f64 = 1e6;
 
 impl Millionths {
-    /// So many of them.
+    /// From a count of millionths.
     #[must_use]
     pub const fn new(count: u32) -> Self {
         Self(count)
     }
 
-    /// How many they are.
+    /// The number of millionths.
     #[must_use]
     pub const fn count(self) -> u32 {
         self.0
@@ -37,7 +37,7 @@ impl TryFrom<f64> for Millionths {
     type Error = NotMillionths;
     fn try_from(number: f64) -> Result<Self, NotMillionths> {
         let count = (number * ONE).round();
-        // What has six decimals is the nearest number to its count, to the last bit.
+        // A number with six decimals equals `count / 1e6` to the last bit.
         if (0.0..=f64::from(u32::MAX)).contains(&count) && count / ONE == number {
             #[expect(
                 clippy::cast_possible_truncation,
@@ -68,7 +68,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn six_decimals_are_exact_and_others_are_refused() {
+    fn six_decimals_are_exact_and_more_are_refused() {
         for text in ["0", "0.4", "0.333333", "1.5", "4294.967295"] {
             let number: Millionths = serde_json::from_str(text).unwrap();
             assert_eq!(number.to_string(), text);

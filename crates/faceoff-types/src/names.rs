@@ -1,42 +1,41 @@
-use crate::is_harmless;
+use crate::is_printable;
 use serde::{Deserialize, Serialize};
 use std::{fmt, str::FromStr};
 
-/// The longest name, in characters.
 const MAX_CHARS: usize = 40;
 
-/// Why a text is no name of a team, a stage, a person or a division.
+/// A text that cannot be the name of a team, stage, user or division.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("a {kind} name {why}")]
+#[error("a {kind} name {problem}")]
 pub struct InvalidName {
     kind: &'static str,
-    why: Why,
+    problem: NameProblem,
 }
 
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-enum Why {
+enum NameProblem {
     /// Too short or too long.
     #[error("has 1 to {MAX_CHARS} characters, this one has {0}")]
     Length(usize),
-    /// A character that a board would not show well.
+    /// A character that pages could not show safely.
     #[error("has letters, digits, spaces and . _ - only, not {0:?}")]
     Character(char),
-    /// A space at an end.
+    /// A leading or trailing space.
     #[error("neither starts nor ends with a space")]
     Space,
 }
 
-fn check(s: &str) -> Result<(), Why> {
+fn check(s: &str) -> Result<(), NameProblem> {
     let chars = s.chars().count();
     if !(1..=MAX_CHARS).contains(&chars) {
-        return Err(Why::Length(chars));
+        return Err(NameProblem::Length(chars));
     }
-    let allowed = |c: &char| " ._-".contains(*c) || (c.is_alphanumeric() && is_harmless(*c));
+    let allowed = |c: &char| " ._-".contains(*c) || (c.is_alphanumeric() && is_printable(*c));
     if let Some(bad) = s.chars().find(|c| !allowed(c)) {
-        return Err(Why::Character(bad));
+        return Err(NameProblem::Character(bad));
     }
     if s.starts_with(' ') || s.ends_with(' ') {
-        return Err(Why::Space);
+        return Err(NameProblem::Space);
     }
     Ok(())
 }
@@ -65,7 +64,7 @@ macro_rules! name {
         impl FromStr for $name {
             type Err = InvalidName;
             fn from_str(s: &str) -> Result<Self, InvalidName> {
-                check(s).map_err(|why| InvalidName { kind: $kind, why })?;
+                check(s).map_err(|problem| InvalidName { kind: $kind, problem })?;
                 Ok(Self(s.to_owned()))
             }
         }
@@ -92,17 +91,17 @@ name!(
     "team"
 );
 name!(
-    /// A stage's name, of the same characters as a team's.
+    /// A stage's name, with the same rules as a team's.
     StageName,
     "stage"
 );
 name!(
-    /// A person's name, by which they sign in, of the same characters as a team's.
-    PersonName,
+    /// A user's name for signing in, with the same rules as a team's.
+    UserName,
     "person's"
 );
 name!(
-    /// A division's name, of the same characters as a team's.
+    /// A division's name, with the same rules as a team's.
     DivisionName,
     "division"
 );
@@ -112,7 +111,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names_of_the_paper_are_names() {
+    fn team_names_of_the_paper_are_valid() {
         for name in [
             "AiRLIHockey",
             "Air-HocKIT",
@@ -125,17 +124,17 @@ mod tests {
     }
 
     #[test]
-    fn what_a_page_could_not_show_is_refused() {
-        assert_eq!(check(""), Err(Why::Length(0)));
-        assert_eq!(check(&"a".repeat(41)), Err(Why::Length(41)));
-        assert_eq!(check("<b>"), Err(Why::Character('<')));
+    fn unprintable_or_padded_names_are_refused() {
+        assert_eq!(check(""), Err(NameProblem::Length(0)));
+        assert_eq!(check(&"a".repeat(41)), Err(NameProblem::Length(41)));
+        assert_eq!(check("<b>"), Err(NameProblem::Character('<')));
         for invisible in ['\u{202e}', '\u{200f}', '\u{3164}', '\u{1b}', '\u{9b}'] {
             assert_eq!(
                 check(&format!("a{invisible}b")),
-                Err(Why::Character(invisible))
+                Err(NameProblem::Character(invisible))
             );
         }
-        assert_eq!(check(" a"), Err(Why::Space));
+        assert_eq!(check(" a"), Err(NameProblem::Space));
         let refused = "".parse::<StageName>().unwrap_err().to_string();
         assert_eq!(
             refused,

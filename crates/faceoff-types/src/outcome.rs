@@ -8,20 +8,20 @@ use serde::{Deserialize, Serialize};
 pub enum EpisodeEnd {
     /// All control steps were played.
     Horizon,
-    /// The puck left the table: a goal, or worse.
+    /// The puck left the table, in a goal or elsewhere.
     LeftTable,
-    /// `hit`, `defend`: the puck moves back across the middle line. `prepare`: it crossed the line.
+    /// `hit`, `defend`: the puck moved back across the middle line. `prepare`: it crossed the line.
     CrossedMiddle,
-    /// `defend`: the puck is slow enough.
+    /// `defend`: the puck became slow enough.
     Stopped,
     /// `prepare`: the puck reached the table's long axis.
     ReachedAxis,
-    /// The agent broke the protocol or a limit.
+    /// The agent violated the protocol or a limit.
     AgentFault,
 }
 
 impl EpisodeEnd {
-    /// As in files and tables.
+    /// The name used in files and tables.
     #[must_use]
     pub const fn as_str(self) -> &'static str {
         match self {
@@ -35,7 +35,7 @@ impl EpisodeEnd {
     }
 }
 
-/// What happened in one episode: all that scoring needs.
+/// The outcome of an episode, with all that scoring needs.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct EpisodeOutcome {
     pub task: Task,
@@ -43,12 +43,11 @@ pub struct EpisodeOutcome {
     pub episode: u32,
     pub steps: u32,
     pub end: EpisodeEnd,
-    /// Success, tested on the last true state; always false after an agent fault.
+    /// Success, tested on the last true state of the simulator; always false after an agent fault.
     pub success: bool,
     /// Constraints broken at least once.
     pub violations: Violations,
-    /// The agent's computation times.
     pub computation_time: ComputationTime,
-    /// The fault, if the episode ended by one.
+    /// The fault that ended the episode, if any.
     pub fault: Option<AgentFault>,
 }

@@ -2,24 +2,24 @@
 
 use serde::{Deserialize, Serialize};
 
-/// Magnitudes of all factors; the default is the ruleset's. Which factors are on, the profile says.
+/// Magnitudes of all factors; the defaults are the ruleset's. The profile decides which factors are active.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[serde(default, deny_unknown_fields)]
 pub struct PerturbationSettings {
-    /// The season's plant.
+    /// Deviation of the season's plant from the nominal model.
     pub model_mismatch: MismatchSettings,
-    /// Noise on the observation.
+    /// Noise on the observations.
     pub observation_noise: NoiseSettings,
-    /// Air flow.
+    /// Air flow that pushes the puck.
     pub disturbance: DisturbanceSettings,
-    /// Lost puck.
+    /// Loss of the puck's tracking.
     pub tracking_loss: TrackingLossSettings,
-    /// The laboratory's delays and table.
+    /// Delays and table of the real laboratory.
     pub delay: DelaySettings,
 }
 
-/// How far the plant may be off.
+/// Ranges of the plant's deviation from the nominal model.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[serde(default, deny_unknown_fields)]
@@ -30,7 +30,7 @@ pub struct MismatchSettings {
     pub gains: [f64; 2],
     /// Range of the factor on each joint's damping and dry friction.
     pub friction: [f64; 2],
-    /// Accepted range of the largest static end-effector error over the workspace, m.
+    /// Accepted range of the largest static end-effector error over the workspace, in metres.
     pub static_error_m: [f64; 2],
 }
 
@@ -97,14 +97,14 @@ impl Default for DisturbanceSettings {
     }
 }
 
-/// How the tracking of the puck gets lost.
+/// Interruptions of the puck's tracking.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[serde(default, deny_unknown_fields)]
 pub struct TrackingLossSettings {
     /// Probability per control step, while tracked.
     pub probability: f64,
-    /// Shortest and longest loss, control steps.
+    /// Shortest and longest loss, in control steps.
     pub steps: [u32; 2],
 }
 
@@ -117,14 +117,14 @@ impl Default for TrackingLossSettings {
     }
 }
 
-/// What the laboratory adds. Observations and actions are one control step late whatever the settings.
+/// Delays and table of the real laboratory. Observations and actions are always one control step late.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[serde(default, deny_unknown_fields)]
 pub struct DelaySettings {
-    /// Probability that the puck is seen two control steps late in place of one.
+    /// Probability that the puck is observed two control steps late instead of one.
     pub second_step_probability: f64,
-    /// Standard deviation per axis of the puck's acceleration by the table's tilt, m/s².
+    /// Standard deviation per axis of the puck's acceleration due to the table's tilt, m/s².
     pub tilt_m_s2: f64,
     /// Range of the decay rate of the puck's velocity, 1/s.
     pub puck_damping_per_s: [f64; 2],
@@ -140,22 +140,22 @@ impl Default for DelaySettings {
     }
 }
 
-/// A magnitude that no world has.
+/// A magnitude outside its valid range.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("{field}: expected {expected}, got {got}")]
 pub struct InvalidPerturbation {
-    /// Factor and magnitude, as JSON has them.
+    /// Factor and magnitude under their JSON names.
     pub field: &'static str,
     pub expected: String,
-    /// As it was given.
+    /// The value as it was given.
     pub got: String,
 }
 
 impl PerturbationSettings {
-    /// Can a world have these?
+    /// Checks that all magnitudes are in range.
     ///
     /// # Errors
-    /// The first magnitude that none can have.
+    /// The first magnitude that is out of range.
     pub fn check(&self) -> Result<(), InvalidPerturbation> {
         let Self {
             model_mismatch: mismatch,
@@ -225,7 +225,7 @@ impl PerturbationSettings {
         ] {
             check_number(field, value, 0.0, most)?;
         }
-        // The process is advanced every millisecond.
+        // The noise process is advanced every millisecond.
         check_number(
             "disturbance.correlation_time_s",
             disturbance.correlation_time_s,
@@ -281,7 +281,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn magnitudes_that_no_world_has_are_named() {
+    fn magnitude_out_of_range_is_refused_by_name() {
         assert_eq!(PerturbationSettings::default().check(), Ok(()));
         for (json, words) in [
             (
@@ -325,9 +325,9 @@ mod tests {
             let error = settings.check().unwrap_err().to_string();
             assert!(error.contains(words), "{error}");
         }
-        let mut nowhere = PerturbationSettings::default();
-        nowhere.delay.tilt_m_s2 = f64::NAN;
-        assert!(nowhere.check().is_err());
+        let mut not_a_number = PerturbationSettings::default();
+        not_a_number.delay.tilt_m_s2 = f64::NAN;
+        assert!(not_a_number.check().is_err());
         let unknown = r#"{"tracking_loss":{"chance":0.5}}"#;
         assert!(serde_json::from_str::<PerturbationSettings>(unknown).is_err());
     }

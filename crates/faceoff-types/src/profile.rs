@@ -1,24 +1,24 @@
 use serde::{Deserialize, Serialize};
 use std::{fmt, str::FromStr};
 
-/// One way in which the evaluator's simulator differs from the ideal one (RULES, "Perturbation profiles").
+/// One difference between the evaluator's simulator and the ideal one (RULES, "Perturbation profiles").
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Factor {
     /// The plant's masses, gains and friction differ from the nominal model, once per season.
     ModelMismatch,
-    /// Gaussian noise on everything the agent observes.
+    /// Gaussian noise on everything that the agent observes.
     ObservationNoise,
     /// Air flow pushes a moving puck.
     Disturbance,
     /// The puck's pose freezes for some steps.
     TrackingLoss,
-    /// The laboratory's delays and table. Part of the rehearsal only, so not among [`Factor::ALL`].
+    /// Delays and table of the real laboratory. Not in [`Factor::ALL`], since only the rehearsal uses it.
     Delay,
 }
 
 impl Factor {
-    /// All factors that count in the `evaluation` profile.
+    /// All factors of the `evaluation` profile.
     pub const ALL: [Self; 4] = [
         Self::ModelMismatch,
         Self::ObservationNoise,
@@ -45,12 +45,12 @@ impl fmt::Display for Factor {
     }
 }
 
-/// Which factors are switched on.
+/// The set of active factors.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub struct Factors(u8);
 
 impl Factors {
-    /// No factor: the simulator the teams have.
+    /// No factor: the simulator that the teams have.
     pub const NONE: Self = Self(0);
     /// All four factors of the `evaluation` profile.
     pub const ALL: Self = Self(0b1111);
@@ -60,13 +60,13 @@ impl Factors {
         Self(1 << factor as u8)
     }
 
-    /// These factors and one more.
+    /// This set with one more factor.
     #[must_use]
     pub const fn with(self, factor: Factor) -> Self {
         Self(self.0 | 1 << factor as u8)
     }
 
-    /// Is the factor switched on?
+    /// Is the factor active?
     #[must_use]
     pub const fn contains(self, factor: Factor) -> bool {
         self.0 & (1 << factor as u8) != 0
@@ -75,12 +75,12 @@ impl Factors {
 
 /// A named set of perturbations.
 ///
-/// The rules' rehearsal profile, with its safety layer, is not offered yet; its delays are.
+/// Of the rehearsal profile of the rules, only the delays are implemented, not the safety layer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum Profile {
-    /// The simulator the teams have.
+    /// The simulator that the teams have, without perturbations.
     Ideal,
     /// Model mismatch alone.
     ModelMismatch,
@@ -90,14 +90,14 @@ pub enum Profile {
     Disturbance,
     /// Tracking loss alone.
     TrackingLoss,
-    /// The laboratory's delays and table alone.
+    /// Delays and table of the real laboratory alone.
     Delay,
-    /// The four factors together: what counts.
+    /// The four factors together; used for evaluations that count.
     Evaluation,
 }
 
 impl Profile {
-    /// What an ablation compares: nothing, each factor that counts alone, and all of them.
+    /// The profiles of an ablation: no factor, each factor of `evaluation` alone, and all of them.
     pub const ABLATION: [Self; 6] = [
         Self::Ideal,
         Self::ModelMismatch,
@@ -131,7 +131,7 @@ impl Profile {
         }
     }
 
-    /// The factors that this profile switches on.
+    /// The factors that are active in this profile.
     #[must_use]
     pub const fn factors(self) -> Factors {
         match self {
@@ -152,7 +152,7 @@ impl fmt::Display for Profile {
     }
 }
 
-/// A word that names no profile.
+/// Text that is not the name of a profile.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error(
     "unknown profile {0:?}: expected ideal, model_mismatch, observation_noise, disturbance, tracking_loss, delay or evaluation"

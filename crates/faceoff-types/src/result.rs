@@ -2,7 +2,7 @@ use crate::{Profile, Seed, SlotTiming, Task, Tier, Variation};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// Episodes in which each constraint was violated.
+/// For each constraint, the number of episodes in which it was violated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct ViolationCounts {
@@ -47,7 +47,7 @@ pub struct TaskResult {
     pub penalty_points: f64,
     /// Episodes with each violation.
     pub violations: ViolationCounts,
-    /// Tier that follows from the penalty points.
+    /// Tier according to the penalty points.
     pub tier: Tier,
     /// Control steps played.
     pub steps: u64,
@@ -60,20 +60,20 @@ pub struct TaskResult {
 pub struct EvaluationResult {
     pub ruleset: String,
     pub profile: Profile,
-    /// What it was played and scored by otherwise than the ruleset has it.
+    /// Deviations from the ruleset.
     #[serde(flatten)]
     pub variation: Variation,
     /// The evaluation's seed, 64 hexadecimal digits.
     pub seed: Seed,
     pub tasks: BTreeMap<Task, TaskResult>,
-    /// Overall score in percent; tasks not played count as 0.
+    /// Overall score in percent; tasks that were not played count as 0.
     pub score: f64,
     /// Overall DS: the maximum over the tasks.
     pub penalty_points: f64,
     /// Overall tier: the worst over the tasks.
     pub tier: Tier,
-    /// How evenly the slots kept time, the worst of them; absent in results of older versions and
-    /// where nothing was played.
+    /// Timing of the slots, with the worst value over all slots; absent in results of older versions and if
+    /// nothing was played.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub timing: Option<SlotTiming>,
 }

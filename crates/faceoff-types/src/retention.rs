@@ -2,37 +2,35 @@ use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
-/// The most evaluations of a team whose datasets are kept by number.
+/// The largest value of [`Retention::last`].
 pub const MAX_LAST: u32 = 1000;
 
-/// The longest that everything of a stage is kept after it was signed off, days.
+/// The largest value of [`Retention::days_after_sign_off`].
 pub const MAX_DAYS_AFTER_SIGN_OFF: u32 = 3650;
 
-/// What is kept of a stage's large files: the datasets of its evaluations, and the archives of submissions that
-/// nobody plays any more. Results, boards and the log always stay. Without any field everything is kept.
+/// How long a stage's large files are kept: the datasets of its evaluations, and the archives of submissions that
+/// are no longer used. Results, boards and the log are always kept. Without any field everything is kept.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[serde(default, deny_unknown_fields)]
 pub struct Retention {
-    /// Of each team the last so many evaluations that count, and its best by each of the stage's rules; absent: all.
-    /// 1 to 1000.
+    /// For each team, keep this many of its latest counting evaluations, plus its best under each revision of the
+    /// stage's rules; absent: all. 1 to 1000.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub last: Option<u32>,
-    /// Until then; from then on nothing, once the stage has closed.
+    /// Keep files until this instant, or until the stage closes if that is later.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub until: Option<Timestamp>,
-    /// Until so many days after the stage was signed off; from then on nothing. 1 to 3650, and not beside `until`.
+    /// Keep files for this many days after the stage is signed off. 1 to 3650; excludes `until`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub days_after_sign_off: Option<u32>,
 }
 
-/// A retention that there cannot be.
+/// An invalid retention.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum InvalidRetention {
-    /// None, which `until` says, or more than are counted.
     #[error("last: expected 1 to {MAX_LAST}, got {0}; to keep nothing, say `until` when")]
     Last(u32),
-    /// Too soon for anybody to object, or later than anybody plans.
     #[error("days_after_sign_off: expected 1 to {MAX_DAYS_AFTER_SIGN_OFF}, got {0}")]
     Days(u32),
     #[error("until and days_after_sign_off: expected one of them at most, got both")]
@@ -45,10 +43,10 @@ impl Retention {
         *self == Self::default()
     }
 
-    /// Can a stage have it?
+    /// Checks that all values are in range.
     ///
     /// # Errors
-    /// What is out of bounds.
+    /// The value that is out of range.
     pub fn check(&self) -> Result<(), InvalidRetention> {
         match (self.last, self.until, self.days_after_sign_off) {
             (Some(last), _, _) if !(1..=MAX_LAST).contains(&last) => {
@@ -82,7 +80,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_retention_reads_back_and_says_what_is_kept() {
+    fn retention_round_trips_and_describes_itself() {
         for (json, words) in [
             ("{}", "everything"),
             (r#"{"last":5}"#, "the last 5 and the best of each team"),
@@ -104,7 +102,7 @@ mod tests {
     }
 
     #[test]
-    fn what_no_stage_can_have_is_named() {
+    fn retention_out_of_range_is_refused_by_name() {
         for (json, words) in [
             (r#"{"last":0}"#, "last: expected 1 to 1000, got 0"),
             (r#"{"last":1001}"#, "got 1001"),

@@ -1,22 +1,20 @@
 use serde::{Deserialize, Serialize};
 use std::{fmt, num::NonZeroU32};
 
-/// The number of a round, 1 to [`RoundNumber::MAX`].
+/// The number of a tournament round, 1 to [`RoundNumber::MAX`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(try_from = "u32", into = "u32")]
 pub struct RoundNumber(NonZeroU32);
 
-/// A number that no round has.
+/// A round number out of range.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("expected 1 to {max}, got {0}", max = RoundNumber::MAX)]
 pub struct InvalidRoundNumber(u32);
 
 impl RoundNumber {
-    /// The highest: a tournament has a few rounds, and standings list them all.
+    /// The highest number. Tournaments have few rounds, and standings list them all.
     pub const MAX: u32 = 100;
-    /// Of the first round.
     pub const FIRST: Self = Self(NonZeroU32::MIN);
-    /// Of the second round.
     pub const SECOND: Self = Self(NonZeroU32::MIN.saturating_add(1));
 
     /// The number, from 1.
@@ -25,7 +23,7 @@ impl RoundNumber {
         self.0.get()
     }
 
-    /// As lists of rounds have it, from 0.
+    /// Index in lists of rounds, from 0.
     #[must_use]
     pub const fn index(self) -> usize {
         self.get() as usize - 1

@@ -4,30 +4,33 @@ use std::{fmt, str::FromStr};
 /// The rules and the simulator behaviour that a published score refers to.
 ///
 /// A change of behaviour (a constant of the simulator, the pinned contact finder, a bound of a tier)
-/// is a new ruleset. Recordings of earlier ones are verified, and runs under way finished, by their own.
+/// is a new ruleset. Recordings and running evaluations keep the ruleset that they started with.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub enum Ruleset {
-    /// Numbers of an action are only finite, and a world may move however fast.
+    /// Numbers in actions must be finite, and velocities are unbounded.
     #[serde(rename = "airhockey-2023.1")]
     First,
-    /// With the day's cut, the clock's start at the first attempt to write, bounded numbers, a bounded
-    /// world and time budgets.
+    /// Adds the daily cutoff, bounds on numbers and on the simulated world, and time budgets. The clock of a
+    /// step starts at the first attempt to write.
     #[serde(rename = "airhockey-2023.2")]
     Second,
-    /// The clock of a step begins before the evaluator touches anything that it shares with the agent. Of the
-    /// evaluator's own calls nothing is excused but its thread's wait to run. CPU time that an agent uses between
-    /// its answer and the next question counts as the next step's; in a game on shared CPUs, an agent that has
-    /// answered is frozen meanwhile. Of the agent's CPUs, only the wait of a thread that then ran towards the answer
-    /// counts as the host's. The simulation is the second ruleset's.
+    /// Changes the timing of steps; the simulation is the one of the second ruleset.
+    ///
+    /// * The clock of a step starts before the evaluator touches anything that it shares with the agent.
+    /// * Of the evaluator's own time, only its thread's wait for a CPU is subtracted.
+    /// * CPU time that an agent uses between its answer and the next observation counts for the next step. In a
+    ///   game on shared CPUs, an agent that has answered is frozen until then.
+    /// * On the agent's CPUs, a wait counts as host interference only for threads that then contributed to the
+    ///   answer.
     #[serde(rename = "airhockey-2023.3")]
     Third,
 }
 
 impl Ruleset {
-    /// All, the earlier first.
+    /// All rulesets, oldest first.
     pub const ALL: [Self; 3] = [Self::First, Self::Second, Self::Third];
 
-    /// What new runs are played by.
+    /// The ruleset of new runs.
     pub const CURRENT: Self = Self::Third;
 
     /// The name in files and tables.
@@ -49,13 +52,13 @@ impl Ruleset {
         }
     }
 
-    /// Are there games of it? The first ruleset is older than games.
+    /// Does it support games? The first ruleset predates them.
     #[must_use]
     pub const fn has_games(self) -> bool {
         !matches!(self, Self::First)
     }
 
-    /// The names of all, for messages.
+    /// All names, for error messages.
     fn names() -> String {
         Self::ALL.map(Self::as_str).join(", ")
     }
@@ -67,7 +70,7 @@ impl fmt::Display for Ruleset {
     }
 }
 
-/// Rules that this version does not know.
+/// A ruleset that this version does not know.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("unknown ruleset {0:?}: this version knows {known}", known = Ruleset::names())]
 pub struct UnknownRuleset(pub String);
@@ -85,18 +88,18 @@ impl FromStr for Ruleset {
 /// Name of the current ruleset.
 pub const RULESET: &str = Ruleset::CURRENT.as_str();
 
-/// The largest magnitude of a number in an answer's action, whatever its unit: rad, rad/s or rad/s².
-/// No robot can follow commands near it, and nothing overflows that is computed of them.
+/// The largest magnitude of a number in an action, in rad, rad/s or rad/s².
+/// It is far beyond what a robot can follow, and small enough that no computation overflows.
 pub const ACTION_LIMIT: f64 = 1e4;
 
-/// Control steps of a window, the tournament's equivalent of an episode: the same violation counts once
-/// in each (paper §2.2).
+/// Control steps of a window, the equivalent of an episode in games: each violation counts at most once per window
+/// (paper §2.2).
 pub const WINDOW_STEPS: u32 = 500;
 
 /// Windows of a game: 45,000 control steps, 15 minutes (paper §2.2).
 pub const GAME_WINDOWS: u32 = 90;
 
-/// Every so many fouls of a robot give its opponent one point (reference implementation).
+/// Number of fouls of a robot that give its opponent one point (reference implementation).
 pub const FOULS_PER_POINT: u32 = 3;
 
 #[cfg(test)]
@@ -104,7 +107,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn ruleset_names_are_read_as_they_are_written() {
+    fn ruleset_names_round_trip() {
         for ruleset in Ruleset::ALL {
             let json = serde_json::to_string(&ruleset).unwrap();
             assert_eq!(json, format!("\"{ruleset}\""));

@@ -1,19 +1,19 @@
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// A runtime that a machine offers, and what was found in it, by asking inside the sandbox.
+/// A runtime that a machine offers, and its content as detected inside the sandbox.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct RuntimeInventory {
-    /// As `agent.toml` names it.
+    /// Name of the runtime in `agent.toml`.
     #[cfg_attr(feature = "openapi", schema(example = "python3"))]
     pub name: String,
-    /// What was found.
+    /// The detected content.
     #[serde(flatten)]
     pub content: RuntimeContent,
 }
 
-/// What was found in a runtime.
+/// The detected content of a runtime.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[serde(tag = "kind", rename_all = "snake_case")]
@@ -22,16 +22,18 @@ pub enum RuntimeContent {
     Python(PythonInventory),
     /// Shared libraries, and no Python.
     Native {
-        /// The version of the C library; null where it does not tell.
+        /// Version of the C library; null if it could not be detected.
         #[cfg_attr(feature = "openapi", schema(example = "2.36"))]
         libc: Option<String>,
     },
-    /// Whatever a container image brings.
+    /// The runtime is part of the container image.
     Image,
-    /// It does not work; `why` is for the organiser, who finds it in `faceoff doctor`.
-    Broken {
-        /// What went wrong.
-        why: String,
+    /// The runtime does not work. `faceoff doctor` shows the reason to the organiser.
+    #[serde(rename = "broken")]
+    Failed {
+        /// Why its inspection failed.
+        #[serde(rename = "why")]
+        reason: String,
     },
 }
 
@@ -39,21 +41,21 @@ pub enum RuntimeContent {
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct PythonInventory {
-    /// The interpreter.
+    /// Name of the interpreter.
     #[cfg_attr(feature = "openapi", schema(example = "CPython"))]
     pub implementation: String,
-    /// Its version.
+    /// Version of the interpreter.
     #[cfg_attr(feature = "openapi", schema(example = "3.11.2"))]
     pub version: String,
-    /// The version of the C library; null where it does not tell.
+    /// Version of the C library; null if it could not be detected.
     #[cfg_attr(feature = "openapi", schema(example = "2.36"))]
     pub libc: Option<String>,
-    /// Versions of the packages that can be imported beside the standard library, by their names in lower case.
+    /// Versions of the importable packages outside the standard library, by lower-case name.
     pub packages: BTreeMap<String, String>,
 }
 
 impl PythonInventory {
-    /// Major and minor version, which decide what compiled packages load: `3.11`.
+    /// Major and minor version, e.g. `3.11`; compiled packages depend on it.
     #[must_use]
     pub fn minor_version(&self) -> &str {
         let end = self.version.match_indices('.').nth(1);
@@ -61,16 +63,16 @@ impl PythonInventory {
     }
 }
 
-/// What agents run on.
+/// The machine that agents run on.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct AgentMachine {
-    /// The architecture, as Rust and `uname -m` name it.
+    /// The architecture, under its name in Rust and `uname -m`.
     #[cfg_attr(feature = "openapi", schema(example = "x86_64"))]
     pub architecture: String,
-    /// The model of its CPUs, as the kernel tells it; null where it does not.
+    /// CPU model as reported by the kernel; null if it does not report one.
     pub cpu_model: Option<String>,
-    /// CPUs that an agent may run on; its CPU time is limited besides (`resources.cpus`).
+    /// CPUs that an agent may run on; its CPU time has its own limit (`resources.cpus`).
     pub cpus_per_agent: u32,
 }
 
@@ -79,7 +81,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_runtime_is_one_object_that_says_what_it_is() {
+    fn runtime_inventory_is_one_flat_object() {
         let python = PythonInventory {
             implementation: "CPython".into(),
             version: "3.11.2".into(),

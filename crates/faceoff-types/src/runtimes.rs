@@ -2,24 +2,23 @@ use crate::StageName;
 use serde::{Deserialize, Serialize};
 use std::{collections::BTreeSet, fmt};
 
-/// The longest name of a runtime.
 const MAX_NAME_CHARS: usize = 40;
 
-/// The runtime of an agent that comes as a container image and brings its own; no server's runtime has this name.
+/// The runtime name of agents in container images, which bring their own; reserved, so no server runtime has it.
 pub const IMAGE_RUNTIME: &str = "image";
 
-/// Some of the runtimes that a server offers, by the names that `agent.toml` gives them.
+/// A selection of the server's runtimes, by their names in `agent.toml`.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[serde(transparent)]
 pub struct Runtimes(BTreeSet<String>);
 
-/// Runtimes that no agent can have.
+/// An invalid selection of runtimes.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum InvalidRuntimes {
     #[error("expected one runtime at least, or null for all that the server offers, got none")]
     None,
-    /// No name that `agent.toml` could give.
+    /// A name that is not allowed in `agent.toml`.
     #[error(
         "expected names of 1 to {MAX_NAME_CHARS} letters, digits, dots, dashes and underscores, got {0:?}"
     )]
@@ -27,10 +26,10 @@ pub enum InvalidRuntimes {
 }
 
 impl Runtimes {
-    /// Can an agent have one of them?
+    /// Checks that there is at least one, and that all names are valid.
     ///
     /// # Errors
-    /// If there is none, or one is no name.
+    /// If it is empty or contains an invalid name.
     pub fn check(&self) -> Result<(), InvalidRuntimes> {
         let is_name = |name: &&String| {
             (1..=MAX_NAME_CHARS).contains(&name.len())
@@ -47,13 +46,12 @@ impl Runtimes {
         }
     }
 
-    /// Is it one of them?
     #[must_use]
     pub fn contains(&self, runtime: &str) -> bool {
         self.0.contains(runtime)
     }
 
-    /// Their names, in the order of the alphabet.
+    /// Names in alphabetical order.
     pub fn names(&self) -> impl Iterator<Item = &str> {
         self.0.iter().map(String::as_str)
     }
@@ -72,47 +70,46 @@ impl fmt::Display for Runtimes {
     }
 }
 
-/// A stage that takes agents of some runtimes only.
+/// A stage that accepts only agents of certain runtimes.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct StageRuntimes {
-    /// As the organiser named it.
     pub stage: StageName,
     pub runtimes: Runtimes,
 }
 
-/// An agent does not play in a stage, since that does not take its runtime.
+/// An agent is refused by a stage because of its runtime.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("the stage “{}” takes agents of the runtime {} only, and {}", .by.stage, .by.runtimes, told(.runtime.as_deref()))]
-pub struct RuntimeNotTaken {
+#[error("the stage “{}” takes agents of the runtime {} only, and {}", .by.stage, .by.runtimes, describe(.runtime.as_deref()))]
+pub struct RuntimeRefused {
     by: StageRuntimes,
     runtime: Option<String>,
 }
 
-fn told(runtime: Option<&str>) -> String {
+fn describe(runtime: Option<&str>) -> String {
     match runtime {
         Some(runtime) => format!("this one names {runtime} in agent.toml"),
-        None => "this one's is not known: it was checked before stages told runtimes apart; upload it again".to_owned(),
+        None => "the runtime of this one is unknown: it was validated before stages had a list of runtimes; upload it again".to_owned(),
     }
 }
 
 impl StageRuntimes {
-    /// Does the stage take an agent of this runtime? `None` is one that is not known.
+    /// Checks that the stage accepts an agent of this runtime; `None`: the runtime is not known.
     ///
     /// # Errors
-    /// If it does not.
-    pub fn check(&self, runtime: Option<&str>) -> Result<(), RuntimeNotTaken> {
+    /// If it refuses the runtime.
+    pub fn check(&self, runtime: Option<&str>) -> Result<(), RuntimeRefused> {
         match runtime {
             Some(runtime) if self.runtimes.contains(runtime) => Ok(()),
-            _ => Err(RuntimeNotTaken {
+            _ => Err(RuntimeRefused {
                 by: self.clone(),
                 runtime: runtime.map(str::to_owned),
             }),
         }
     }
 
-    /// Why none of these stages takes a runtime; `None` if one does, or there is none.
+    /// The reasons for which all these stages refuse a runtime; `None` if one accepts it, or there are no stages.
     #[must_use]
-    pub fn refused_by_all(stages: &[Self], runtime: &str) -> Option<String> {
+    pub fn reasons_if_all_refuse(stages: &[Self], runtime: &str) -> Option<String> {
         let refusals = stages.iter().map(|stage| stage.check(Some(runtime)).err());
         let refusals: Vec<String> = refusals
             .map(|refusal| Some(refusal?.to_string()))
@@ -133,7 +130,7 @@ mod tests {
     }
 
     #[test]
-    fn a_stage_takes_its_runtimes_and_says_which_they_are() {
+    fn refusal_lists_the_stages_runtimes() {
         let main = stage("Main", &["python3", "native"]);
         assert_eq!(main.check(Some("native")), Ok(()));
         let refused = main.check(Some("julia")).unwrap_err().to_string();
@@ -146,11 +143,11 @@ mod tests {
     }
 
     #[test]
-    fn what_one_stage_takes_is_refused_by_none() {
+    fn runtime_accepted_by_one_stage_is_accepted() {
         let stages = [stage("Main", &["native"]), stage("Late", &["python3"])];
-        assert_eq!(StageRuntimes::refused_by_all(&stages, "python3"), None);
-        assert_eq!(StageRuntimes::refused_by_all(&[], "julia"), None);
-        let refused = StageRuntimes::refused_by_all(&stages, "julia").unwrap();
+        assert_eq!(StageRuntimes::reasons_if_all_refuse(&stages, "python3"), None);
+        assert_eq!(StageRuntimes::reasons_if_all_refuse(&[], "julia"), None);
+        let refused = StageRuntimes::reasons_if_all_refuse(&stages, "julia").unwrap();
         assert!(
             refused.contains("“Main”") && refused.contains("“Late”"),
             "{refused}"
@@ -158,7 +155,7 @@ mod tests {
     }
 
     #[test]
-    fn runtimes_that_no_agent_can_have_are_refused() {
+    fn runtimes_without_valid_names_are_refused() {
         let check = |names: &[&str]| stage("Main", names).runtimes.check();
         assert_eq!(check(&["python3", "my.runtime_2-x"]), Ok(()));
         assert_eq!(check(&[]), Err(InvalidRuntimes::None));

@@ -10,35 +10,35 @@ use jiff::{
 };
 use serde::{Deserialize, Serialize};
 
-/// When the days of a stage start: once on each date that it names, in the stage's zone.
+/// The dates and times at which the evaluation days of a stage start, at most one per date, in the stage's zone.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(try_from = "Fields", into = "Fields")]
 pub struct Schedule {
-    at: At,
+    at: Recurrence,
     days_off: Vec<Date>,
 }
 
 #[derive(Debug, Clone, PartialEq, Eq)]
-enum At {
+enum Recurrence {
     Daily(Time),
-    /// As it was given; what it is parsed to has 100 times its size.
+    /// The expression as text; parsed, it would take 100 times the memory.
     Cron(String),
 }
 
-/// A schedule as JSON and TOML have it.
+/// A schedule in JSON and TOML.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[serde(deny_unknown_fields)]
 struct Fields {
-    /// Every day at this time; or else `cron`.
+    /// Every day at this time; excludes `cron`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[cfg_attr(feature = "openapi", schema(value_type = Option<String>, example = "06:00:00"))]
     daily: Option<Time>,
-    /// At the first time of each date that it names: minute, hour, day of the month, month, day of the week.
+    /// Five fields: minute, hour, day of the month, month, day of the week. On each matching date, the first matching time.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[cfg_attr(feature = "openapi", schema(example = "0 6 * * 1-5"))]
     cron: Option<String>,
-    /// Dates on which no day starts.
+    /// Dates without an evaluation day.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     days_off: Vec<Date>,
 }
@@ -53,26 +53,25 @@ impl utoipa::PartialSchema for Schedule {
 #[cfg(feature = "openapi")]
 impl utoipa::ToSchema for Schedule {}
 
-/// Why something is no schedule.
+/// An invalid schedule.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum InvalidSchedule {
-    /// Neither or both.
+    /// Neither or both of `daily` and `cron`.
     #[error(
         "a schedule has either `daily`, a time as \"06:00\", or `cron`, five fields as \"0 6 * * 1-5\""
     )]
-    Which,
-    /// No expression, or one that never comes true.
+    OneKindExpected,
+    /// Not a cron expression, or one that never matches.
     #[error(
         "{pattern:?} is no schedule of five fields (minute, hour, day of the month, month, day of the week): {why}"
     )]
     Cron {
-        /// As it was given.
         pattern: String,
         why: String,
     },
 }
 
-/// How far ahead a cut is looked for: a rare one, and the longest of holidays.
+/// How far ahead to search for a cutoff: beyond the gap between two leap days, and any holidays.
 const HORIZON_DAYS: i64 = 366 * 9;
 
 impl Schedule {
@@ -80,15 +79,15 @@ impl Schedule {
     #[must_use]
     pub const fn daily(at: Time) -> Self {
         Self {
-            at: At::Daily(at),
+            at: Recurrence::Daily(at),
             days_off: Vec::new(),
         }
     }
 
-    /// At the first time of each date that an expression of five fields names, or one as `@daily`.
+    /// On each date that matches the expression, at the first matching time. Takes five fields, or e.g. `@daily`.
     ///
     /// # Errors
-    /// If it is none, or names no date at all.
+    /// If the expression is invalid, or no date matches it.
     pub fn cron(pattern: &str) -> Result<Self, InvalidSchedule> {
         let wrong = |why: String| InvalidSchedule::Cron {
             pattern: pattern.to_owned(),
@@ -96,10 +95,10 @@ impl Schedule {
         };
         parse(pattern).map_err(|error| wrong(error.to_string()))?;
         let schedule = Self {
-            at: At::Cron(pattern.to_owned()),
+            at: Recurrence::Cron(pattern.to_owned()),
             days_off: Vec::new(),
         };
-        // One of a leap day's comes within eight years.
+        // 29 February recurs within eight years.
         match schedule.next(
             jiff::civil::date(2000, 1, 1),
             Timestamp::UNIX_EPOCH,
@@ -110,7 +109,7 @@ impl Schedule {
         }
     }
 
-    /// Without these dates.
+    /// Excludes these dates.
     #[must_use]
     pub fn without(mut self, mut days_off: Vec<Date>) -> Self {
         days_off.sort_unstable();
@@ -119,7 +118,7 @@ impl Schedule {
         self
     }
 
-    /// The first day that starts on the date `from` or later and not before `earliest`, and when.
+    /// Date and instant of the first start on or after the date `from` and not before `earliest`.
     #[must_use]
     pub fn next(
         &self,
@@ -138,8 +137,8 @@ impl Schedule {
         None
     }
 
-    /// The same, days off or not, and perhaps too early. A time that a change of the clocks leaves out comes when they
-    /// have changed.
+    /// As [`Self::next`], but including days off and perhaps before `earliest`. A time that the change to summer time
+    /// skips is moved to after the change.
     fn first_from(
         &self,
         from: Date,
@@ -147,11 +146,11 @@ impl Schedule {
         zone: &Zone,
     ) -> Option<(Date, Timestamp)> {
         match &self.at {
-            At::Daily(at) => {
+            Recurrence::Daily(at) => {
                 let start = from.to_datetime(*at).to_zoned(zone.time_zone()).ok()?;
                 Some((from, start.timestamp()))
             }
-            At::Cron(pattern) => {
+            Recurrence::Cron(pattern) => {
                 let midnight = from.to_zoned(zone.time_zone()).ok()?;
                 let begin = midnight.max(earliest.to_zoned(zone.time_zone()));
                 let start = parse(pattern).ok()?.find_next_occurrence(&begin, true);
@@ -176,7 +175,7 @@ impl TryFrom<Fields> for Schedule {
         let schedule = match (fields.daily, fields.cron) {
             (Some(at), None) => Self::daily(at),
             (None, Some(pattern)) => Self::cron(&pattern)?,
-            _ => return Err(InvalidSchedule::Which),
+            _ => return Err(InvalidSchedule::OneKindExpected),
         };
         Ok(schedule.without(fields.days_off))
     }
@@ -185,8 +184,8 @@ impl TryFrom<Fields> for Schedule {
 impl From<Schedule> for Fields {
     fn from(Schedule { at, days_off }: Schedule) -> Self {
         let (daily, cron) = match at {
-            At::Daily(at) => (Some(at), None),
-            At::Cron(pattern) => (None, Some(pattern)),
+            Recurrence::Daily(at) => (Some(at), None),
+            Recurrence::Cron(pattern) => (None, Some(pattern)),
         };
         Self {
             daily,
@@ -213,7 +212,7 @@ mod tests {
     }
 
     #[test]
-    fn a_daily_time_is_that_of_the_zone_through_both_changes_of_the_clocks() {
+    fn daily_start_follows_the_zone_through_dst_changes() {
         let at = Schedule::daily("02:30".parse().unwrap());
         assert_eq!(
             starts(&at, "Europe/Berlin", date(2026, 3, 28), 3),
@@ -224,7 +223,7 @@ mod tests {
                 "2026-03-30 2026-03-30T00:30:00Z",
             ]
         );
-        // There are two: the first.
+        // 02:30 occurs twice: the first counts.
         assert_eq!(
             starts(&at, "Europe/Berlin", date(2026, 10, 25), 1),
             ["2026-10-25 2026-10-25T00:30:00Z"]
@@ -232,7 +231,7 @@ mod tests {
     }
 
     #[test]
-    fn an_expression_starts_a_day_at_the_first_of_its_times() {
+    fn cron_starts_at_first_matching_time_of_a_date() {
         let weekdays = Schedule::cron("0 6,18 * * 1-5").unwrap();
         assert_eq!(
             starts(&weekdays, "America/New_York", date(2026, 11, 20), 3),
@@ -242,7 +241,7 @@ mod tests {
                 "2026-11-24 2026-11-24T11:00:00Z",
             ]
         );
-        // On the first date, the first of those that are left.
+        // On the first date, the first remaining time.
         let earliest = "2026-11-20T12:00:00Z".parse().unwrap();
         let next = weekdays.next(date(2026, 11, 20), earliest, &Zone::UTC);
         assert_eq!(next.unwrap().1.to_string(), "2026-11-20T18:00:00Z");
@@ -257,7 +256,7 @@ mod tests {
     }
 
     #[test]
-    fn no_day_starts_on_a_day_off() {
+    fn days_off_are_skipped() {
         let days_off = vec![date(2026, 12, 25), date(2026, 12, 24)];
         let schedule = Schedule::daily("06:00".parse().unwrap()).without(days_off);
         assert_eq!(
@@ -270,7 +269,7 @@ mod tests {
     }
 
     #[test]
-    fn schedules_read_back_and_others_are_told_what_one_is() {
+    fn schedule_round_trips_and_bad_ones_are_refused() {
         for text in [
             r#"{"daily":"06:00:00"}"#,
             r#"{"cron":"0 6 * * 1-5","days_off":["2026-12-24"]}"#,

@@ -18,13 +18,13 @@ impl Seed {
         Self(bytes)
     }
 
-    /// A seed from a small number, as typed on a command line.
+    /// A seed from a number, for use on a command line.
     #[must_use]
     pub fn from_number(number: u64) -> Self {
         Self(*blake3::keyed_hash(&[0; 32], &number.to_le_bytes()).as_bytes())
     }
 
-    /// The bytes, for seeding a generator.
+    /// The bytes, for seeding a random generator.
     #[must_use]
     pub const fn as_bytes(&self) -> &[u8; 32] {
         &self.0
@@ -40,32 +40,32 @@ impl Seed {
         Self(*hasher.finalize().as_bytes())
     }
 
-    /// Season secret → the seed that all days of one stage follow from.
+    /// Season secret → the seed from which all days of a stage are derived.
     #[must_use]
     pub fn stage(&self, stage: StageId) -> Self {
         self.derive("stage", stage.as_uuid().as_bytes())
     }
 
-    /// A stage's seed → the seed of all evaluations of one day. (Of a season without stages, and of the first stage of
-    /// one that had none: the season secret.)
+    /// A stage's seed → the seed of all evaluations of one day. In a season without stages, and in the first stage of
+    /// a season that once had none, the season secret takes the place of the stage's seed.
     #[must_use]
     pub fn day(&self, day: Date) -> Self {
         self.derive("day", day.to_string().as_bytes())
     }
 
-    /// Season secret → the seed of all ablations: not that of any day, whose episodes may still count.
+    /// Season secret → the seed of all ablations. It differs from every day's seed, whose episodes may still count.
     #[must_use]
     pub fn ablation(&self) -> Self {
         self.derive("ablation", &[])
     }
 
-    /// Season secret → the seed of a submission's smoke run.
+    /// Season secret → the seed of a submission's validation run.
     #[must_use]
-    pub fn smoke(&self, submission: SubmissionId) -> Self {
+    pub fn validation(&self, submission: SubmissionId) -> Self {
         self.derive("smoke", submission.as_uuid().as_bytes())
     }
 
-    /// Season secret → the seed of an extra turn of a day whose own seed is public: that of no other evaluation.
+    /// Season secret → the seed of an extra evaluation on a day whose seed is public; unique to that evaluation.
     #[must_use]
     pub fn extra(&self, evaluation: EvaluationId) -> Self {
         self.derive("extra", evaluation.as_uuid().as_bytes())
@@ -83,8 +83,8 @@ impl Seed {
         self.derive("model_mismatch", &[])
     }
 
-    /// Evaluation seed → the seed of one episode. It depends on nothing else: not on the shard, the
-    /// worker or the order in which episodes run.
+    /// Evaluation seed → the seed of one episode. It does not depend on the shard, the worker or the order in which
+    /// episodes run.
     #[must_use]
     pub fn episode(&self, task: Task, episode: u32) -> Self {
         self.derive(task.as_str(), &episode.to_le_bytes())
@@ -110,7 +110,7 @@ impl fmt::Debug for Seed {
     }
 }
 
-/// Text that is no seed.
+/// Text that is not a seed.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("not a seed: expected a number below 2^64 or 64 hexadecimal digits")]
 pub struct ParseSeedError;
@@ -148,7 +148,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn text_round_trips_and_debug_hides() {
+    fn seed_text_round_trips_and_debug_hides_it() {
         let seed = Seed::from_number(7);
         assert_eq!(seed.to_string().parse(), Ok(seed));
         assert_eq!("7".parse(), Ok(seed));
@@ -157,7 +157,7 @@ mod tests {
     }
 
     #[test]
-    fn children_differ_by_every_part() {
+    fn seeds_differ_by_every_part() {
         let root = Seed::from_number(0);
         let all = [
             root.episode(Task::Hit, 0),

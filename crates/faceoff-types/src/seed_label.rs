@@ -2,30 +2,30 @@ use crate::{EvaluationId, ProposalId, StageDay, seed::Seed};
 use jiff::civil::Date;
 use std::{fmt, str::FromStr};
 
-/// What the seed of a run follows from, beside the season's secret. Runs of one label meet the same
+/// What the seed of a run is derived from, together with the season secret. Runs with the same label have the same
 /// episodes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum SeedLabel {
-    /// All that counts of one day of a season without stages, or of its first stage if that was played before
-    /// there were stages. Its text is the ISO date.
+    /// The counting evaluations of one day in a season without stages, or in its first stage if that predates stages.
+    /// Its text is the ISO date.
     Day(Date),
-    /// All that counts of one day of a stage.
+    /// The counting evaluations of one day of a stage.
     StageDay(StageDay),
     /// All ablations of the season. Its text is `ablation`.
     Ablation,
-    /// An extra turn of a day whose own seed is public. Its text is `extra/` and the evaluation's id.
+    /// An extra evaluation on a day whose seed is public. Its text is `extra/` and the evaluation's id.
     Extra(EvaluationId),
-    /// All of a trial. Its text is `trial/` and the id of the proposal.
+    /// The evaluations of a trial. Its text is `trial/` and the id of the proposal.
     Trial(ProposalId),
 }
 
 impl SeedLabel {
-    /// The seed that follows from the season's secret.
+    /// Derives the seed from the season secret.
     #[must_use]
     pub fn seed(self, season_secret: &Seed) -> Seed {
         match self {
             Self::Day(day) => season_secret.day(day),
-            Self::StageDay(of) => season_secret.stage(of.stage).day(of.date),
+            Self::StageDay(day) => season_secret.stage(day.stage).day(day.date),
             Self::Ablation => season_secret.ablation(),
             Self::Extra(id) => season_secret.extra(id),
             Self::Trial(id) => season_secret.trial(id),
@@ -37,7 +37,7 @@ impl fmt::Display for SeedLabel {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Day(day) => day.fmt(f),
-            Self::StageDay(of) => of.fmt(f),
+            Self::StageDay(day) => day.fmt(f),
             Self::Ablation => f.write_str("ablation"),
             Self::Extra(id) => write!(f, "extra/{id}"),
             Self::Trial(id) => write!(f, "trial/{id}"),
@@ -45,7 +45,7 @@ impl fmt::Display for SeedLabel {
     }
 }
 
-/// Text that is no seed label.
+/// Text that is not a seed label.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error(
     "not a seed label: expected a day as YYYY-MM-DD, a stage's as ID/YYYY-MM-DD, “ablation”, “extra/ID” or “trial/ID”"
@@ -72,17 +72,17 @@ mod tests {
     use crate::StageId;
 
     #[test]
-    fn a_label_gives_the_seed_of_its_day_or_of_ablations() {
+    fn seed_labels_derive_distinct_seeds_and_round_trip() {
         let secret = Seed::from_number(7);
         let day = jiff::civil::date(2026, 3, 1);
         assert_eq!(SeedLabel::Day(day).seed(&secret), secret.day(day));
         assert_eq!(SeedLabel::Ablation.seed(&secret), secret.ablation());
-        let of = |stage| SeedLabel::StageDay(StageDay { stage, date: day });
+        let label = |stage| SeedLabel::StageDay(StageDay { stage, date: day });
         let stage = StageId::new();
-        let staged = of(stage);
+        let staged = label(stage);
         assert_eq!(staged.seed(&secret), secret.stage(stage).day(day));
         assert_ne!(staged.seed(&secret), secret.day(day));
-        assert_ne!(staged.seed(&secret), of(StageId::new()).seed(&secret));
+        assert_ne!(staged.seed(&secret), label(StageId::new()).seed(&secret));
         let [extra, trial] = [
             SeedLabel::Extra(EvaluationId::new()),
             SeedLabel::Trial(ProposalId::new()),

@@ -10,7 +10,7 @@ use std::{fmt, str::FromStr};
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct StageDay {
     pub stage: StageId,
-    /// In the stage's zone, of the day's cut.
+    /// Date of the day's cutoff in the stage's zone.
     pub date: Date,
 }
 
@@ -20,7 +20,7 @@ impl fmt::Display for StageDay {
     }
 }
 
-/// Text that is no day of a stage.
+/// Text that is not a day of a stage.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("not a day of a stage: expected the stage's id, a slash and the date as YYYY-MM-DD")]
 pub struct ParseStageDayError;
@@ -36,40 +36,40 @@ impl FromStr for StageDay {
     }
 }
 
-/// What scores of a stage depend on. Rows of different rules never stand on one board.
+/// The rules on which the scores of a stage depend. Results under different rules are never on the same board.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct StageRules {
-    /// The simulator and the scoring.
+    /// Version of the simulator and of the scoring.
     #[cfg_attr(feature = "openapi", schema(value_type = String, example = "airhockey-2023.3"))]
     pub ruleset: Ruleset,
-    /// The perturbations.
+    /// Perturbation profile.
     pub profile: Profile,
-    /// In the order of play; at least one, none twice.
+    /// Tasks in the order of play; at least one, without repetition.
     pub tasks: Vec<Task>,
-    /// Episodes of each task that a team plays on a day.
+    /// Episodes per task and evaluation day.
     pub episodes_per_task: u32,
-    /// More agent faults than this end an evaluation without a score.
+    /// Agent faults allowed; one more ends an evaluation without a score.
     pub max_faults: u32,
-    /// Weights, bounds of the tiers and magnitudes, as far as they are not the ruleset's.
+    /// Task weights, tier bounds and perturbation magnitudes that differ from the ruleset.
     #[serde(flatten)]
     pub variation: Variation,
-    /// What agents are held to otherwise than by the server's configuration; absent if all is the server's.
+    /// Limits of agents that differ from the server's configuration; absent if none do.
     #[serde(default, skip_serializing_if = "StageLimits::is_none")]
     pub limits: Box<StageLimits>,
-    /// The runtimes that its agents may use; absent: all that the server offers.
+    /// Runtimes that agents may use; absent: all that the server offers.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub runtimes: Option<Runtimes>,
 }
 
 impl StageRules {
-    /// Can anything be played by them?
+    /// Checks that evaluations are possible under these rules.
     ///
     /// # Errors
-    /// What cannot be.
+    /// The first invalid field.
     pub fn check(&self) -> Result<(), InvalidStageRules> {
-        let twice = |task: &Task| self.tasks.iter().filter(|other| *other == task).count() > 1;
-        if self.tasks.is_empty() || self.tasks.iter().any(twice) {
+        let is_repeated = |task: &Task| self.tasks.iter().filter(|other| *other == task).count() > 1;
+        if self.tasks.is_empty() || self.tasks.iter().any(is_repeated) {
             return Err(InvalidStageRules::Tasks);
         }
         if !(1..=MAX_EPISODES_PER_TASK).contains(&self.episodes_per_task) {
@@ -88,7 +88,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn rules_play_each_task_once_and_some_episodes() {
+    fn rules_need_distinct_tasks_and_episodes() {
         let rules = |tasks: &[Task], episodes_per_task| StageRules {
             runtimes: None,
             ruleset: Ruleset::CURRENT,
@@ -110,14 +110,14 @@ mod tests {
     }
 
     #[test]
-    fn rules_of_before_there_were_variations_are_read_and_written_as_they_were() {
+    fn rules_without_variation_round_trip_unchanged() {
         let text = r#"{"ruleset":"airhockey-2023.2","profile":"evaluation","tasks":["hit"],"episodes_per_task":4,"max_faults":1}"#;
         let rules: StageRules = serde_json::from_str(text).unwrap();
         assert!(rules.variation.is_none());
         assert_eq!(serde_json::to_string(&rules).unwrap(), text);
-        let mut wild = rules;
-        wild.variation.perturbations.tracking_loss.probability = 2.0;
-        let refused = wild.check().unwrap_err();
+        let mut invalid = rules;
+        invalid.variation.perturbations.tracking_loss.probability = 2.0;
+        let refused = invalid.check().unwrap_err();
         assert_eq!(refused.field(), "perturbations");
         assert!(
             refused.to_string().contains("tracking_loss.probability"),

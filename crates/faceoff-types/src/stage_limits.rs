@@ -1,7 +1,7 @@
 use crate::AgentLimits;
 use serde::{Deserialize, Serialize};
 
-/// What agents are held to in a stage otherwise than by the server's configuration, which has all that is absent.
+/// Limits of agents in a stage that replace those of the server's configuration. An absent limit is the server's.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[serde(default, deny_unknown_fields)]
@@ -9,13 +9,13 @@ pub struct StageLimits {
     /// Memory of an agent's process tree in bytes.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub memory_bytes: Option<u64>,
-    /// Processes and threads.
+    /// Maximum number of processes and threads.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub pids: Option<u32>,
-    /// Its scratch folder in bytes.
+    /// Size of the scratch folder in bytes.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub scratch_bytes: Option<u64>,
-    /// CPU time per time.
+    /// CPUs: seconds of CPU time per second.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub cpus: Option<f64>,
     /// Seconds from the start of the process to its answer to `hello`.
@@ -27,24 +27,24 @@ pub struct StageLimits {
     /// Seconds to answer one `step`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub step_s: Option<f64>,
-    /// Seconds: the mean of the answers of a smoke run, for each task.
+    /// Mean answer time in a validation run for each task, in seconds.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub mean_s: Option<f64>,
-    /// All answers of an episode: so many times the control time of its steps …
+    /// Budget for the answers of an episode: this factor times the control time of its steps …
     #[serde(skip_serializing_if = "Option::is_none")]
     pub episode_control_times: Option<f64>,
-    /// … and so many seconds.
+    /// … plus this time, in seconds.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub episode_extra_s: Option<f64>,
-    /// All resets of a shard: so many seconds for each of its episodes …
+    /// Budget for the resets of a shard: this time per episode, in seconds …
     #[serde(skip_serializing_if = "Option::is_none")]
     pub reset_mean_s: Option<f64>,
-    /// … and so many more.
+    /// … plus this time, in seconds.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub resets_extra_s: Option<f64>,
 }
 
-/// A limit that no agent can live by, or that none meets.
+/// A limit or quota out of range.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("{field}: expected {expected}, got {got}")]
 pub struct InvalidLimit {
@@ -54,16 +54,16 @@ pub struct InvalidLimit {
 }
 
 impl StageLimits {
-    /// Has the server's configuration all of them?
+    /// Are all values those of the server's configuration?
     #[must_use]
     pub fn is_none(&self) -> bool {
         *self == Self::default()
     }
 
-    /// Can an agent be held to them?
+    /// Checks that all limits are in range.
     ///
     /// # Errors
-    /// The first that none can.
+    /// The first limit that is out of range.
     pub fn check(&self) -> Result<(), InvalidLimit> {
         for (field, value, least) in [
             ("memory_bytes", self.memory_bytes, 16 << 20),
@@ -105,9 +105,9 @@ impl StageLimits {
         Ok(())
     }
 
-    /// The server's limits with these in their places.
+    /// The server's limits with these replacing their counterparts.
     #[must_use]
-    pub fn over(&self, server: &AgentLimits) -> AgentLimits {
+    pub fn apply_to(&self, server: &AgentLimits) -> AgentLimits {
         let mut limits = server.clone();
         let (resources, time) = (&mut limits.resources, &mut limits.time);
         set(&mut resources.memory_bytes, self.memory_bytes);
@@ -132,34 +132,34 @@ fn set<T>(limit: &mut T, own: Option<T>) {
     }
 }
 
-/// What each team may upload while a stage is the one that matters, otherwise than by the server's configuration, which
-/// has all that is absent.
+/// Upload quotas of each team while the stage is current; they replace those of the server's configuration. An absent
+/// quota is the server's.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[serde(default, deny_unknown_fields)]
-pub struct StageUploads {
-    /// Uploads that wait for their smoke run; at least one.
+pub struct StageUploadLimits {
+    /// Submissions pending validation; at least 1.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub waiting: Option<u32>,
-    /// Bytes on a UTC day; at least one.
+    /// Bytes per UTC day; at least 1.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub day_bytes: Option<u64>,
-    /// Bytes of bundles kept; at least one.
+    /// Bytes of stored bundles; at least 1.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub stored_bytes: Option<u64>,
 }
 
-impl StageUploads {
-    /// Has the server's configuration all of them?
+impl StageUploadLimits {
+    /// Are all values those of the server's configuration?
     #[must_use]
     pub fn is_none(&self) -> bool {
         *self == Self::default()
     }
 
-    /// Can anything be uploaded?
+    /// Checks that uploads are possible.
     ///
     /// # Errors
-    /// What lets nothing through.
+    /// The first quota of 0.
     pub fn check(&self) -> Result<(), InvalidLimit> {
         for (field, value) in [
             ("waiting", self.waiting.map(u64::from)),
@@ -183,23 +183,23 @@ mod tests {
     use super::*;
 
     #[test]
-    fn own_limits_take_the_places_of_the_servers_and_no_others() {
+    fn stage_limits_replace_only_their_counterparts() {
         let none: StageLimits = serde_json::from_str("{}").unwrap();
         assert!(none.is_none());
         assert_eq!(serde_json::to_string(&none).unwrap(), "{}");
         let server = AgentLimits::default();
-        assert_eq!(none.over(&server), server);
+        assert_eq!(none.apply_to(&server), server);
         let own: StageLimits =
             serde_json::from_str(r#"{"memory_bytes":33554432,"step_s":0.5}"#).unwrap();
         assert_eq!(own.check(), Ok(()));
         let mut expected = server.clone();
         expected.resources.memory_bytes = 32 << 20;
         expected.time.step_s = 0.5;
-        assert_eq!(own.over(&server), expected);
+        assert_eq!(own.apply_to(&server), expected);
     }
 
     #[test]
-    fn limits_that_nobody_can_live_by_are_named() {
+    fn limit_out_of_range_is_refused_by_name() {
         for (json, words) in [
             (
                 r#"{"memory_bytes":10}"#,
@@ -215,14 +215,14 @@ mod tests {
             assert!(error.contains(words), "{error}");
         }
         assert!(serde_json::from_str::<StageLimits>(r#"{"memory":1}"#).is_err());
-        let nothing: StageUploads = serde_json::from_str(r#"{"waiting":0}"#).unwrap();
+        let no_uploads: StageUploadLimits = serde_json::from_str(r#"{"waiting":0}"#).unwrap();
         assert!(
-            nothing
+            no_uploads
                 .check()
                 .unwrap_err()
                 .to_string()
                 .contains("waiting: expected at least 1")
         );
-        assert_eq!(StageUploads::default().check(), Ok(()));
+        assert_eq!(StageUploadLimits::default().check(), Ok(()));
     }
 }

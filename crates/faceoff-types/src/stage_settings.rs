@@ -1,33 +1,33 @@
 use crate::{
-    DayDeadline, LONGEST_DEADLINE_H, MAX_EPISODES_PER_TASK, Schedule, StageUploads,
+    DayDeadline, MAX_DEADLINE_H, MAX_EPISODES_PER_TASK, Schedule, StageUploadLimits,
     stage_bounds::{InvalidStageRules, MAX_MEAN_DAYS},
 };
 use serde::{Deserialize, Serialize};
 use std::{fmt, str::FromStr};
 
-/// How a stage goes on, without a score depending on it.
+/// Settings of a stage that do not affect scores.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[serde(default)]
 pub struct StageSettings {
-    /// When its days start; null: when the organiser starts them.
+    /// Start times of its days; null: the organisers start each day.
     pub schedule: Option<Schedule>,
-    /// Episodes of each task and profile of the ablation that the schedule orders of every submission that it
-    /// starts; 0: none.
+    /// Episodes per task and profile of the ablation that the schedule creates for every submission it evaluates;
+    /// 0: no ablations.
     pub ablation_episodes: u32,
-    /// Episodes of one unit of work; at least one.
+    /// Episodes per shard; at least 1.
     pub episodes_per_shard: u32,
-    /// Until when what its cut has started may be played.
+    /// When its days end.
     pub day_deadline: DayDeadline,
-    /// Are its scores hidden from everybody but the organiser?
+    /// Are scores visible to organisers only?
     pub blind: bool,
-    /// When its datasets are there for everybody.
-    pub publishes: Publishes,
-    /// What a team's row on its board is made of.
-    pub standings: Standings,
-    /// What each team may upload meanwhile; absent if all is the server's.
-    #[serde(skip_serializing_if = "StageUploads::is_none")]
-    pub uploads: StageUploads,
+    /// When its datasets become public.
+    pub publishes: Publication,
+    /// Which result of a team counts on the board.
+    pub standings: CountingResult,
+    /// Upload quotas that differ from the server's configuration; absent if none do.
+    #[serde(skip_serializing_if = "StageUploadLimits::is_none")]
+    pub uploads: StageUploadLimits,
 }
 
 impl Default for StageSettings {
@@ -38,18 +38,18 @@ impl Default for StageSettings {
             episodes_per_shard: 50,
             day_deadline: DayDeadline::NextCut,
             blind: false,
-            publishes: Publishes::AtClose,
-            standings: Standings::Latest,
-            uploads: StageUploads::default(),
+            publishes: Publication::AtClose,
+            standings: CountingResult::Latest,
+            uploads: StageUploadLimits::default(),
         }
     }
 }
 
 impl StageSettings {
-    /// Can a stage go on so?
+    /// Checks that all settings are in range.
     ///
     /// # Errors
-    /// What is out of bounds.
+    /// The first setting that is out of range.
     pub fn check(&self) -> Result<(), InvalidStageRules> {
         if !(1..=MAX_EPISODES_PER_TASK).contains(&self.episodes_per_shard) {
             return Err(InvalidStageRules::Shards(self.episodes_per_shard));
@@ -58,13 +58,13 @@ impl StageSettings {
             return Err(InvalidStageRules::Ablations(self.ablation_episodes));
         }
         if let DayDeadline::Hours(hours) = self.day_deadline
-            && !(1..=LONGEST_DEADLINE_H).contains(&hours)
+            && !(1..=MAX_DEADLINE_H).contains(&hours)
         {
             return Err(InvalidStageRules::Deadline(hours));
         }
         self.uploads.check().map_err(InvalidStageRules::Uploads)?;
         match self.standings {
-            Standings::MeanOfLast(days) if !(1..=MAX_MEAN_DAYS).contains(&days) => {
+            CountingResult::MeanOfLast(days) if !(1..=MAX_MEAN_DAYS).contains(&days) => {
                 Err(InvalidStageRules::MeanDays(days))
             }
             _ => Ok(()),
@@ -72,13 +72,13 @@ impl StageSettings {
     }
 }
 
-/// When the datasets of a stage's released days are there for everybody, without a token. A team may publish its own
+/// When the datasets of a stage's released days become public, i.e. need no token. A team may publish its own
 /// earlier.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[serde(rename_all = "snake_case")]
-pub enum Publishes {
-    /// By the stage never.
+pub enum Publication {
+    /// Never automatically.
     Never,
     /// When the stage, or the season, has closed.
     AtClose,
@@ -86,8 +86,8 @@ pub enum Publishes {
     AtRelease,
 }
 
-impl Publishes {
-    /// All, the most reserved first.
+impl Publication {
+    /// All values, from the most restrictive on.
     pub const ALL: [Self; 3] = [Self::Never, Self::AtClose, Self::AtRelease];
 
     /// The name in files.
@@ -101,22 +101,22 @@ impl Publishes {
     }
 }
 
-/// What a team's row on a stage's board is made of: of its finished evaluations by the board's rules.
+/// Which of a team's finished evaluations under the board's rules count on the board of a stage.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[serde(rename_all = "snake_case")]
-pub enum Standings {
-    /// The newest.
+pub enum CountingResult {
+    /// The latest evaluation.
     Latest,
-    /// The one that stands highest by the board's order.
+    /// The evaluation that ranks highest.
     Best,
-    /// The mean of the last so many.
+    /// The mean of this many latest evaluations.
     MeanOfLast(u32),
-    /// That of the final day, which the organiser starts once after the close.
+    /// The evaluation of the final day, which the organisers start once after the stage closes.
     Final,
 }
 
-/// Text that is none of them.
+/// Text that is not a valid value of a setting.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("expected {expected}, got {got:?}")]
 pub struct UnknownSetting {
@@ -124,7 +124,7 @@ pub struct UnknownSetting {
     got: String,
 }
 
-impl FromStr for Publishes {
+impl FromStr for Publication {
     type Err = UnknownSetting;
     fn from_str(text: &str) -> Result<Self, UnknownSetting> {
         Self::ALL
@@ -137,7 +137,7 @@ impl FromStr for Publishes {
     }
 }
 
-impl fmt::Display for Publishes {
+impl fmt::Display for Publication {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.pad(self.as_str())
     }
@@ -145,8 +145,8 @@ impl fmt::Display for Publishes {
 
 const MEAN: &str = "mean_of_last:";
 
-/// As the command line takes it: a mean is `mean_of_last:5`.
-impl FromStr for Standings {
+/// The form used on the command line; a mean is `mean_of_last:5`.
+impl FromStr for CountingResult {
     type Err = UnknownSetting;
     fn from_str(text: &str) -> Result<Self, UnknownSetting> {
         let days = text.strip_prefix(MEAN).and_then(|days| days.parse().ok());
@@ -163,7 +163,7 @@ impl FromStr for Standings {
     }
 }
 
-impl fmt::Display for Standings {
+impl fmt::Display for CountingResult {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Latest => f.pad("latest"),
@@ -179,7 +179,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn settings_are_bounded_and_may_be_left_out() {
+    fn settings_have_defaults_and_bounds() {
         let settings: StageSettings = serde_json::from_str("{}").unwrap();
         assert_eq!(settings, StageSettings::default());
         assert_eq!(settings.check(), Ok(()));
@@ -193,7 +193,7 @@ mod tests {
             ..settings.clone()
         };
         assert_eq!(many.check(), Err(InvalidStageRules::Ablations(u32::MAX)));
-        for hours in [0, LONGEST_DEADLINE_H + 1] {
+        for hours in [0, MAX_DEADLINE_H + 1] {
             let none = StageSettings {
                 day_deadline: DayDeadline::Hours(hours),
                 ..settings.clone()
@@ -202,7 +202,7 @@ mod tests {
         }
         for days in [0, MAX_MEAN_DAYS + 1] {
             let mean = StageSettings {
-                standings: Standings::MeanOfLast(days),
+                standings: CountingResult::MeanOfLast(days),
                 ..settings.clone()
             };
             assert_eq!(mean.check(), Err(InvalidStageRules::MeanDays(days)));
@@ -210,31 +210,31 @@ mod tests {
     }
 
     #[test]
-    fn standings_and_publication_read_back_from_json_and_from_words() {
+    fn settings_round_trip_in_json_and_text() {
         for (standings, json, words) in [
-            (Standings::Latest, r#""latest""#, "latest"),
-            (Standings::Best, r#""best""#, "best"),
+            (CountingResult::Latest, r#""latest""#, "latest"),
+            (CountingResult::Best, r#""best""#, "best"),
             (
-                Standings::MeanOfLast(5),
+                CountingResult::MeanOfLast(5),
                 r#"{"mean_of_last":5}"#,
                 "mean_of_last:5",
             ),
-            (Standings::Final, r#""final""#, "final"),
+            (CountingResult::Final, r#""final""#, "final"),
         ] {
             assert_eq!(serde_json::to_string(&standings).unwrap(), json);
-            assert_eq!(serde_json::from_str::<Standings>(json).unwrap(), standings);
+            assert_eq!(serde_json::from_str::<CountingResult>(json).unwrap(), standings);
             assert_eq!(standings.to_string(), words);
             assert_eq!(words.parse(), Ok(standings));
         }
-        for publishes in Publishes::ALL {
+        for publishes in Publication::ALL {
             let json = format!("{:?}", publishes.as_str());
             assert_eq!(serde_json::to_string(&publishes).unwrap(), json);
             assert_eq!(publishes.to_string().parse(), Ok(publishes));
         }
         for wrong in ["mean_of_last", "mean_of_last:", "mean_of_last:x", "newest"] {
-            let error = wrong.parse::<Standings>().unwrap_err().to_string();
+            let error = wrong.parse::<CountingResult>().unwrap_err().to_string();
             assert!(error.contains("mean_of_last:5"), "{error}");
         }
-        assert!("soon".parse::<Publishes>().is_err());
+        assert!("soon".parse::<Publication>().is_err());
     }
 }

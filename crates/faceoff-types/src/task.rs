@@ -4,11 +4,11 @@ use std::{fmt, str::FromStr};
 /// The length of a control step, s (RULES, "Stages").
 pub const CONTROL_STEP_S: f64 = 0.02;
 
-/// Control steps of a qualifying episode, at most.
+/// Maximum number of control steps of a qualifying episode.
 pub const EPISODE_STEPS: u32 = 500;
 
-/// Most episodes of a task that one run may play: a hundred times the qualifying stage, where the success
-/// rate is known to ±0.3 %. Whoever scores a run holds its outcomes in memory, some 300 bytes each.
+/// Maximum number of episodes per task in a run: a hundred times the qualifying stage, where the success
+/// rate is known to ±0.3 %. Scoring holds all outcomes of a run in memory, some 300 bytes each.
 pub const MAX_EPISODES_PER_TASK: u32 = 100_000;
 
 /// A task of the qualifying stage (paper §2.1).
@@ -25,7 +25,7 @@ pub enum Task {
 }
 
 impl Task {
-    /// All tasks, in board order.
+    /// All tasks, in the order of boards.
     pub const ALL: [Self; 3] = [Self::Hit, Self::Defend, Self::Prepare];
 
     /// The name used in files, in the protocol and on the command line.
@@ -45,7 +45,7 @@ impl fmt::Display for Task {
     }
 }
 
-/// A word that names no task.
+/// Text that is not the name of a task.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("unknown task {0:?}: expected hit, defend or prepare")]
 pub struct ParseTaskError(pub String);

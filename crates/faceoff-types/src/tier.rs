@@ -15,7 +15,7 @@ pub enum Tier {
 }
 
 impl Tier {
-    /// All tiers, in board order.
+    /// All tiers, in the order of boards.
     pub const ALL: [Self; 3] = [Self::Deployable, Self::Improvable, Self::NonDeployable];
 
     /// The name used in files.

@@ -1,10 +1,10 @@
 use serde::{Deserialize, Serialize};
 
-/// Round trips to an agent that answers at once, in seconds: what a slot adds to every answer.
+/// Round-trip times to an agent that answers at once, in seconds: the overhead of a slot in every answer time.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct RoundTrips {
-    /// How many were measured.
+    /// Number of measurements.
     pub count: u32,
     /// Median (nearest rank).
     pub p50: f64,
@@ -15,7 +15,7 @@ pub struct RoundTrips {
 }
 
 impl RoundTrips {
-    /// The worse of two slots, value by value.
+    /// The worse value of two slots for each field; counts add up.
     #[must_use]
     pub fn worse(self, other: Self) -> Self {
         Self {
@@ -27,7 +27,7 @@ impl RoundTrips {
     }
 }
 
-/// How evenly a slot kept time, measured by the platform's own calibration agent on the agent's CPUs.
+/// Timing quality of a slot, measured by the platform's calibration agent on the agent's CPUs.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct SlotTiming {
@@ -35,12 +35,12 @@ pub struct SlotTiming {
     pub before_s: RoundTrips,
     /// Round trips between the episodes, in seconds.
     pub during_s: RoundTrips,
-    /// The most that the host took of one answer's time, in seconds; 0 when no answer was late by it.
+    /// Longest delay of one answer by host interference, in seconds; 0 if there was none.
     pub longest_stall_s: f64,
-    /// Tries of episodes that were dropped and played again because the host kept the agent from answering.
+    /// Number of times that an episode was discarded and repeated because of host interference.
     pub host_noise_reruns: u32,
-    /// How often episodes were begun again from a shard's first because something of ours broke; absent
-    /// if never.
+    /// Number of times that a shard was restarted from its first episode because of a platform fault; absent
+    /// if 0.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub platform_retries: u32,
 }
@@ -50,7 +50,7 @@ const fn is_zero(count: &u32) -> bool {
 }
 
 impl SlotTiming {
-    /// The worse of two slots, value by value; re-runs and retries add up.
+    /// The worse value of two slots for each field; repetitions and retries add up.
     #[must_use]
     pub fn worse(self, other: Self) -> Self {
         Self {
@@ -70,7 +70,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn of_two_slots_the_worse_values_count_and_reruns_add_up() {
+    fn worse_timing_takes_maxima_and_adds_reruns() {
         let trips = |p50, max| RoundTrips {
             count: 10,
             p50,

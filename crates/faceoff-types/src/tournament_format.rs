@@ -1,37 +1,36 @@
 use crate::RoundNumber;
 use serde::{Deserialize, Serialize};
 
-/// How a tournament is played.
+/// Format of a tournament.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
 pub enum TournamentFormat {
-    /// In every round everybody meets everybody once: one round, or two with sides swapped, as the
-    /// challenge had it.
+    /// In every round, each team plays each other team once. The challenge had two rounds, the second with sides
+    /// swapped.
     RoundRobin {
-        /// How many times everybody meets everybody.
+        /// Number of rounds, in each of which all teams play each other.
         #[cfg_attr(feature = "openapi", schema(value_type = u32, minimum = 1, maximum = 100))]
         rounds: RoundNumber,
     },
-    /// A first round in drawn groups, each a round robin; a final round among the best of them, a round
-    /// robin again: with two groups and one to advance, a single game.
+    /// A first round in drawn groups, each a round robin, and a final round robin among the best of each group. With
+    /// two groups and one team to advance, the final is a single game.
     Groups {
-        /// How many groups.
+        /// Number of groups.
         groups: u32,
-        /// How many of each reach the final.
+        /// Teams of each group that reach the final.
         advance: u32,
     },
-    /// A number of rounds in each of which everybody has one game, against somebody who stands near and
-    /// was not met before.
+    /// In every round, each team plays one game against a team of similar rank that it has not played before.
     Swiss {
-        /// How many rounds.
+        /// Number of rounds.
         #[cfg_attr(feature = "openapi", schema(value_type = u32, minimum = 1, maximum = 100))]
         rounds: RoundNumber,
     },
 }
 
 impl TournamentFormat {
-    /// How many rounds there are.
+    /// The number of the last round.
     #[must_use]
     pub fn last_round(&self) -> RoundNumber {
         match self {
@@ -41,7 +40,7 @@ impl TournamentFormat {
     }
 }
 
-/// As the challenge had it: everybody meets everybody twice.
+/// The format of the challenge: all teams play each other twice.
 impl Default for TournamentFormat {
     fn default() -> Self {
         Self::RoundRobin {

@@ -1,86 +1,78 @@
 use crate::{
     GAME_WINDOWS, GameLimits, InvalidLimit, InvalidPerturbation, PerturbationSettings, Profile,
-    Publishes, Ruleset, Runtimes, StageLimits, TournamentFormat, WINDOW_STEPS,
+    Publication, Ruleset, Runtimes, StageLimits, TournamentFormat, WINDOW_STEPS,
 };
 use serde::{Deserialize, Serialize};
 
 /// The longest game, in control steps.
 pub const MAX_GAME_STEPS: u32 = 10 * GAME_WINDOWS * WINDOW_STEPS;
-/// The most games that do not count which a team may ask for on a day.
+/// Maximum number of test games and friendly games per team and day.
 pub const MAX_FREE_GAMES: u32 = 1000;
 
-/// What the results of a tournament depend on.
+/// The rules on which the results of a tournament depend.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[serde(default, deny_unknown_fields)]
 pub struct TournamentRules {
-    /// The simulator and the scoring.
+    /// Version of the simulator and of the scoring.
     #[cfg_attr(feature = "openapi", schema(value_type = String, example = "airhockey-2023.3"))]
     pub ruleset: Ruleset,
-    /// Who meets whom.
+    /// Format, which decides the pairings.
     pub format: TournamentFormat,
-    /// Control steps of a game; the last window of 500 may be shorter.
+    /// Control steps per game; the last window of 500 may be shorter.
     pub steps: u32,
-    /// The perturbations.
+    /// Perturbation profile.
     pub profile: Profile,
-    /// Is each meeting two games of one seed, with sides swapped?
+    /// Does each pairing consist of two games with the same seed and swapped sides?
     pub mirrored: bool,
-    /// What each side is held to beside the limits of single answers.
+    /// Limits of each side, in addition to those of single answers.
     pub game_limits: GameLimits,
-    /// Magnitudes of what the profile switches on; absent: the ruleset's.
-    #[serde(skip_serializing_if = "is_the_rulesets")]
+    /// Magnitudes of the profile's perturbations; absent: the ruleset's.
+    #[serde(skip_serializing_if = "is_default")]
     pub perturbations: Box<PerturbationSettings>,
-    /// What agents are held to otherwise than by the server's configuration; absent if all is the server's.
+    /// Limits of agents that differ from the server's configuration; absent if none do.
     #[serde(skip_serializing_if = "StageLimits::is_none")]
     pub limits: Box<StageLimits>,
-    /// The runtimes that its agents may use; absent: all that the server offers.
+    /// Runtimes that agents may use; absent: all that the server offers.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub runtimes: Option<Runtimes>,
 }
 
-/// How a tournament goes on, without a result depending on it.
+/// Settings of a tournament that do not affect results.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[serde(default, deny_unknown_fields)]
 pub struct TournamentSettings {
-    /// Games that do not count, against the baseline or another team, which a team may ask for on a UTC day.
+    /// Test games (against a baseline) and friendly games (against another team) that a team may request per UTC day.
     pub free_games_per_day: u32,
-    /// When both sides' recordings are there for everybody: never, when the round is over (`at_release`), or when the
-    /// tournament is closed.
-    pub publishes: Publishes,
+    /// When the recordings of both sides become public: never, after the round (`at_release`), or when the tournament
+    /// closes (`at_close`).
+    pub publishes: Publication,
 }
 
-/// A tournament that could not be played.
+/// Invalid rules or settings of a tournament.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum InvalidTournament {
-    /// No steps, or more than are ever played.
     #[error("steps: expected 1 to {MAX_GAME_STEPS}, got {0}")]
     Steps(u32),
-    /// A format that nobody could play.
     #[error("format.{field}: expected at least {least}, got {got}")]
     Format {
         field: &'static str,
         least: u32,
         got: u32,
     },
-    /// A budget that nobody could keep.
     #[error("game_limits.{field}: expected {expected}, got {got}")]
     GameLimits {
         field: &'static str,
-        /// What it may be.
         expected: &'static str,
         got: f64,
     },
-    /// Magnitudes that no world has.
     #[error("perturbations.{0}")]
     Perturbations(#[from] InvalidPerturbation),
-    /// Limits that no agent can live by.
     #[error("limits.{0}")]
     Limits(InvalidLimit),
-    /// Runtimes that no agent can have.
     #[error("runtimes: {0}")]
     Runtimes(#[from] crate::InvalidRuntimes),
-    /// A quota that is none.
     #[error("free_games_per_day: expected 0 to {MAX_FREE_GAMES}, got {0}")]
     FreeGames(u32),
 }
@@ -102,10 +94,10 @@ impl Default for TournamentRules {
 }
 
 impl TournamentRules {
-    /// Can games be played by them?
+    /// Checks that games are possible under these rules.
     ///
     /// # Errors
-    /// What cannot be.
+    /// The first invalid field.
     pub fn check(&self) -> Result<(), InvalidTournament> {
         if !(1..=MAX_GAME_STEPS).contains(&self.steps) {
             return Err(InvalidTournament::Steps(self.steps));
@@ -129,7 +121,7 @@ impl TournamentRules {
             ("total_s", total_s, 86_400.0, "above 0, at most 86400"),
             ("restart_s", restart_s, 600.0, "above 0, at most 600"),
         ] {
-            // Written so that NaN is refused.
+            // The negation also refuses NaN.
             if !(got > 0.0 && got <= most) {
                 return Err(InvalidTournament::GameLimits {
                     field,
@@ -150,16 +142,16 @@ impl Default for TournamentSettings {
     fn default() -> Self {
         Self {
             free_games_per_day: 5,
-            publishes: Publishes::AtClose,
+            publishes: Publication::AtClose,
         }
     }
 }
 
 impl TournamentSettings {
-    /// Can a tournament go on so?
+    /// Checks that all settings are in range.
     ///
     /// # Errors
-    /// What is out of bounds.
+    /// The first setting that is out of range.
     pub const fn check(&self) -> Result<(), InvalidTournament> {
         if self.free_games_per_day > MAX_FREE_GAMES {
             return Err(InvalidTournament::FreeGames(self.free_games_per_day));
@@ -168,7 +160,7 @@ impl TournamentSettings {
     }
 }
 
-fn is_the_rulesets(perturbations: &PerturbationSettings) -> bool {
+fn is_default(perturbations: &PerturbationSettings) -> bool {
     *perturbations == PerturbationSettings::default()
 }
 
@@ -181,7 +173,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_left_out_is_as_the_challenge_had_it() {
+    fn rules_default_to_the_challenge() {
         let rules = rules("{}");
         assert_eq!(rules, TournamentRules::default());
         assert_eq!(rules.format.last_round().get(), 2);
@@ -196,7 +188,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_played_is_named() {
+    fn invalid_tournament_rules_are_refused_by_name() {
         for (json, words) in [
             (r#"{"steps":0}"#, "steps: expected 1 to 450000, got 0"),
             (

@@ -2,23 +2,23 @@ use crate::{Millionths, PerturbationSettings, Task, millionths::NotMillionths};
 use serde::{Deserialize, Serialize};
 use std::{fmt, str::FromStr};
 
-/// What scores by otherwise than the ruleset has it. What is left out is the ruleset's.
+/// Deviations from the ruleset that affect scores. Absent values are the ruleset's.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct Variation {
-    /// What each task's success rate weighs in the overall score; absent: 0.4, 0.4 and 0.2.
+    /// Weights of the tasks' success rates in the overall score; absent: 0.4, 0.4 and 0.2.
     #[serde(default, skip_serializing_if = "is_default")]
     pub weights: TaskWeights,
-    /// Penalty points per episode up to which an agent is in a tier; absent: 0.5 and 1.5.
+    /// Largest penalty points per episode of the two better tiers; absent: 0.5 and 1.5.
     #[serde(default, skip_serializing_if = "is_default")]
     pub tier_bounds: TierBounds,
-    /// Magnitudes of the perturbations that the profile switches on; what is absent is the ruleset's.
+    /// Magnitudes of the profile's perturbations; absent values are the ruleset's.
     #[serde(default, skip_serializing_if = "is_default")]
     pub perturbations: Box<PerturbationSettings>,
 }
 
 impl Variation {
-    /// Is all of it the ruleset's?
+    /// Is everything as in the ruleset?
     #[must_use]
     pub fn is_none(&self) -> bool {
         is_default(self)
@@ -29,7 +29,7 @@ fn is_default<T: Default + PartialEq>(value: &T) -> bool {
     *value == T::default()
 }
 
-/// What each task's success rate weighs in the overall score: fractions that sum to 1.
+/// Weights of the tasks' success rates in the overall score: fractions that sum to 1.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(try_from = "WeightFields", into = "WeightFields")]
 pub struct TaskWeights {
@@ -38,40 +38,34 @@ pub struct TaskWeights {
     prepare: Millionths,
 }
 
-/// Weights that are none, or bounds that are none.
+/// Invalid weights or tier bounds.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum InvalidVariation {
-    /// They are parts of one.
+    /// Weights that do not sum to 1.
     #[error(
         "expected three weights that sum to 1, got {hit} (hit), {defend} (defend) and {prepare} (prepare)"
     )]
     Weights {
-        /// Of `hit`.
         hit: Millionths,
-        /// Of `defend`.
         defend: Millionths,
-        /// Of `prepare`.
         prepare: Millionths,
     },
-    /// The better tier has the lower bound.
+    /// The bounds of the tiers do not rise.
     #[error(
         "expected 0 < deployable < improvable, in points per episode, got {deployable} and {improvable}"
     )]
     Bounds {
-        /// Of the best tier.
         deployable: Millionths,
-        /// Of the second.
         improvable: Millionths,
     },
-    /// A number too many, or too few.
+    /// Too many or too few numbers, or text that is not a number.
     #[error("expected {expected} numbers with commas between them, as in {example}, got {got:?}")]
     Count {
         expected: usize,
         example: &'static str,
-        /// As it was given.
+        /// The text as it was given.
         got: String,
     },
-    /// One of them is none.
     #[error(transparent)]
     Number(#[from] NotMillionths),
 }
@@ -83,10 +77,10 @@ struct WeightFields {
     /// From 0 to 1, with at most six decimals.
     #[cfg_attr(feature = "openapi", schema(value_type = f64, example = 0.4))]
     hit: Millionths,
-    /// The same.
+    /// From 0 to 1, with at most six decimals.
     #[cfg_attr(feature = "openapi", schema(value_type = f64, example = 0.4))]
     defend: Millionths,
-    /// The same; the three sum to 1.
+    /// From 0 to 1, with at most six decimals; the three sum to 1.
     #[cfg_attr(feature = "openapi", schema(value_type = f64, example = 0.2))]
     prepare: Millionths,
 }
@@ -94,7 +88,7 @@ struct WeightFields {
 const WHOLE: u64 = 1_000_000;
 
 impl TaskWeights {
-    /// Of `hit`, `defend` and `prepare`.
+    /// From the weights of `hit`, `defend` and `prepare`.
     ///
     /// # Errors
     /// If they do not sum to 1.
@@ -159,7 +153,7 @@ impl From<TaskWeights> for WeightFields {
     }
 }
 
-/// In the order of the tasks, as the command line takes them.
+/// The form used on the command line: numbers in the order of the tasks.
 impl fmt::Display for TaskWeights {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{},{},{}", self.hit, self.defend, self.prepare)
@@ -174,7 +168,7 @@ impl FromStr for TaskWeights {
     }
 }
 
-/// Penalty points per episode up to which an agent is in a tier; the bound belongs to the better one.
+/// Largest penalty points per episode of the two better tiers; the bound itself belongs to the better tier.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(try_from = "BoundFields", into = "BoundFields")]
 pub struct TierBounds {
@@ -186,19 +180,19 @@ pub struct TierBounds {
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[serde(deny_unknown_fields)]
 struct BoundFields {
-    /// Points per episode: above 0, with at most six decimals.
+    /// Penalty points per episode: above 0, with at most six decimals.
     #[cfg_attr(feature = "openapi", schema(value_type = f64, example = 0.5))]
     deployable: Millionths,
-    /// Points per episode: above the other.
+    /// Penalty points per episode: above `deployable`, with at most six decimals.
     #[cfg_attr(feature = "openapi", schema(value_type = f64, example = 1.5))]
     improvable: Millionths,
 }
 
 impl TierBounds {
-    /// Of the best tier and of the second.
+    /// From the bounds of the best and the second tier.
     ///
     /// # Errors
-    /// If the first is 0, or the second not above it.
+    /// If the first bound is 0, or the second is not above it.
     pub fn new(deployable: Millionths, improvable: Millionths) -> Result<Self, InvalidVariation> {
         if deployable.count() > 0 && deployable < improvable {
             Ok(Self {
@@ -213,13 +207,13 @@ impl TierBounds {
         }
     }
 
-    /// Of the best tier, points per episode.
+    /// Bound of the best tier, in penalty points per episode.
     #[must_use]
     pub const fn deployable(&self) -> Millionths {
         self.deployable
     }
 
-    /// Of the second, points per episode.
+    /// Bound of the second tier, in penalty points per episode.
     #[must_use]
     pub const fn improvable(&self) -> Millionths {
         self.improvable
@@ -251,7 +245,7 @@ impl From<TierBounds> for BoundFields {
     }
 }
 
-/// The lower one first, as the command line takes them.
+/// The form used on the command line: the lower bound first.
 impl fmt::Display for TierBounds {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{},{}", self.deployable, self.improvable)
@@ -314,7 +308,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_the_rulesets_is_left_out_and_read_back() {
+    fn ruleset_values_are_omitted_and_round_trip() {
         assert_eq!(serde_json::to_string(&Variation::default()).unwrap(), "{}");
         let read: Variation = serde_json::from_str("{}").unwrap();
         assert!(read.is_none());
@@ -322,8 +316,8 @@ mod tests {
         let read: Variation = serde_json::from_str(text).unwrap();
         assert!(!read.is_none());
         assert_eq!(serde_json::to_string(&read).unwrap(), text);
-        let calm = r#"{"perturbations":{"tracking_loss":{"probability":0.0}}}"#;
-        let read: Variation = serde_json::from_str(calm).unwrap();
+        let no_losses = r#"{"perturbations":{"tracking_loss":{"probability":0.0}}}"#;
+        let read: Variation = serde_json::from_str(no_losses).unwrap();
         let mut expected = PerturbationSettings::default();
         expected.tracking_loss.probability = 0.0;
         assert_eq!(*read.perturbations, expected);

@@ -2,7 +2,7 @@ use jiff::{Timestamp, civil::Date, tz::TimeZone};
 use serde::{Deserialize, Serialize};
 use std::{fmt, str::FromStr};
 
-/// A time zone by its name in the IANA database, as `Europe/Berlin` or `UTC`.
+/// A time zone by its name in the IANA database, e.g. `Europe/Berlin` or `UTC`.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema), schema(value_type = String, example = "Europe/Berlin"))]
 #[serde(try_from = "String", into = "String")]
@@ -11,13 +11,12 @@ pub struct Zone(TimeZone);
 impl Zone {
     pub const UTC: Self = Self(TimeZone::UTC);
 
-    /// Its offsets and their changes.
     #[must_use]
     pub fn time_zone(&self) -> TimeZone {
         self.0.clone()
     }
 
-    /// The date there at an instant.
+    /// The local date at an instant.
     #[must_use]
     pub fn date(&self, at: Timestamp) -> Date {
         at.to_zoned(self.time_zone()).date()
@@ -37,7 +36,7 @@ impl fmt::Display for Zone {
     }
 }
 
-/// Text that names no time zone.
+/// Text that is not the name of a time zone.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{0:?} is no time zone: expected a name of the IANA database, as “Europe/Berlin” or “UTC”")]
 pub struct UnknownZone(String);
@@ -76,7 +75,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_date_is_that_of_the_zone() {
+    fn zone_gives_the_local_date() {
         let at: Timestamp = "2026-03-01T23:30:00Z".parse().unwrap();
         let date = |name: &str| name.parse::<Zone>().unwrap().date(at).to_string();
         assert_eq!(date("UTC"), "2026-03-01");
@@ -85,7 +84,7 @@ mod tests {
     }
 
     #[test]
-    fn names_read_back_and_others_are_refused() {
+    fn zone_names_round_trip_and_others_are_refused() {
         for name in ["UTC", "Europe/Berlin", "Pacific/Auckland"] {
             assert_eq!(name.parse::<Zone>().unwrap().to_string(), name);
         }

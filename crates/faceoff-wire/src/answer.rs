@@ -1,9 +1,9 @@
-//! What an agent answers, parsed strictly: `ready` and `act`.
+//! Answers of an agent, parsed strictly: `ready` and `act`.
 //!
-//! One pass over the line, without an intermediate tree: an action's numbers go straight into the
-//! caller's buffer. Looked at again is only a line that is refused, to say what was wrong with it, and
-//! one with fields that the protocol does not know, for keys given twice. Unknown fields are skipped
-//! without recursion, and known fields refuse to nest, so that no line can exhaust the stack.
+//! A line is parsed in one pass without an intermediate tree; the numbers of an action go straight into the
+//! caller's buffer. A second pass is made in two cases only: over a refused line, to explain what is wrong with it,
+//! and over a line with unknown fields, to find repeated keys. Unknown fields are skipped without recursion, and
+//! known fields refuse nested values, so no line can exhaust the stack.
 
 use crate::protocol::PROTOCOL_VERSION;
 use faceoff_types::{AgentFaultKind, Interpolation};
@@ -26,15 +26,15 @@ pub struct Ready {
     pub interpolation: Interpolation,
     /// The agent's name for itself, if it gave one as a string.
     pub name: Option<String>,
-    /// Its version, likewise.
+    /// The agent's version, if it gave one as a string.
     pub version: Option<String>,
 }
 
-/// Parses the answer to `hello`. The line comes without its newline.
+/// Parses the answer to `hello`. `line` is without the newline.
 ///
 /// # Errors
-/// The agent's fault: not a JSON object, another message, another protocol, no or an unknown
-/// interpolation, a key given twice.
+/// The agent fault: not a JSON object, another message, another protocol, no or an unknown
+/// interpolation, a repeated key.
 pub fn parse_ready(line: &[u8]) -> Result<Ready, AgentFaultKind> {
     const EXPECTED: &str = "ready with protocol 1 and an interpolation";
     let fields = Fields::parse(line, None)?;
@@ -63,10 +63,10 @@ pub fn parse_ready(line: &[u8]) -> Result<Ready, AgentFaultKind> {
     })
 }
 
-/// Parses the answer to `reset`. The line comes without its newline.
+/// Parses the answer to `reset`. `line` is without the newline.
 ///
 /// # Errors
-/// The agent's fault: not a JSON object, another message or episode, a key given twice.
+/// The agent fault: not a JSON object, another message or episode, a repeated key.
 pub fn parse_reset_ready(line: &[u8], episode: u32) -> Result<(), AgentFaultKind> {
     let expected = || format!("ready with episode {episode}");
     let fields = Fields::parse(line, None)?;
@@ -74,14 +74,14 @@ pub fn parse_reset_ready(line: &[u8], episode: u32) -> Result<(), AgentFaultKind
     fields.require_integer("episode", &fields.episode, episode, &expected())
 }
 
-/// Parses the answer to `step` into `action`, row-major. The line comes without its newline.
+/// Parses the answer to `step` into `action`, row-major. `line` is without the newline.
 ///
 /// On success `action` holds exactly [`Interpolation::len`] numbers of at most
-/// [`ACTION_LIMIT`](faceoff_types::ACTION_LIMIT) in magnitude; after an error its content is meaningless.
+/// [`ACTION_LIMIT`](faceoff_types::ACTION_LIMIT) in magnitude; after an error its content is undefined.
 ///
 /// # Errors
-/// The agent's fault: not a JSON object, another message or step, another shape, a number that is
-/// not finite or too large, a key given twice, at any depth.
+/// The agent fault: not a JSON object, another message or step, another shape, a number that is
+/// not finite or too large, a repeated key at any depth.
 pub fn parse_act(
     line: &[u8],
     step: u32,

@@ -1,4 +1,4 @@
-//! Files of a dataset: what an evaluation leaves behind beside its Parquet tables.
+//! JSON files of an evaluation's dataset; its other files are Parquet tables and a log.
 //!
 //! A dataset is a zip archive with `manifest.json`, `results.json`, `violations.json`,
 //! `calibration.json`, `episodes.parquet`, `steps.parquet` and `agent.log`. The layout is versioned by
@@ -8,21 +8,21 @@ use faceoff_types::{Profile, Seed, SlotTiming, Task, Variation};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// Name and version of the layout described here. Another meaning of a column is another version.
+/// Name and version of this layout. A change in a column's meaning is a new version.
 pub const DATASET_SCHEMA: &str = "faceoff-dataset/4";
 
-/// `manifest.json`: what the dataset is and what its files must hash to.
+/// `manifest.json`: a description of the dataset, with the hashes of its files.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct DatasetManifest {
     /// [`DATASET_SCHEMA`].
     pub schema: String,
     /// The ruleset's name.
     pub ruleset: String,
-    /// The simulator that made the states; only the same one can make them again.
+    /// The simulator that computed the states; only the same one reproduces them.
     pub simulator: SimulatorId,
     /// The perturbation profile.
     pub profile: Profile,
-    /// What it was played and scored by otherwise than the ruleset has it.
+    /// Deviations from the ruleset, in playing and in scoring.
     #[serde(flatten)]
     pub variation: Variation,
     /// The evaluation's seed.
@@ -31,20 +31,19 @@ pub struct DatasetManifest {
     pub mismatch_seed: Seed,
     /// The agent's name.
     pub agent: String,
-    /// The tasks and how many episodes of each.
+    /// Number of episodes of each task.
     pub episodes: BTreeMap<Task, u32>,
-    /// Every other file of the archive.
+    /// Size and hash of every other file of the archive, by name.
     pub files: BTreeMap<String, FileDigest>,
 }
 
-/// Which simulator made a recording.
+/// Identity of the simulator that made a recording.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct SimulatorId {
-    /// The program's version.
+    /// Version of the program.
     pub version: String,
-    /// BLAKE3, 64 hexadecimal digits, of what the simulator makes of a few fixed episodes: two
-    /// simulators that differ in one bit of them have different fingerprints, whatever their versions
-    /// say.
+    /// BLAKE3 of the simulated states of a few fixed episodes, 64 hexadecimal digits. It differs between simulators
+    /// that differ in one bit of them, whatever their versions.
     pub fingerprint: String,
 }
 
@@ -53,16 +52,16 @@ pub struct SimulatorId {
 pub struct FileDigest {
     /// Length in bytes.
     pub bytes: u64,
-    /// 64 hexadecimal digits.
+    /// BLAKE3, 64 hexadecimal digits.
     pub blake3: String,
 }
 
-/// `violations.json`: where each constraint was broken.
+/// `violations.json`: the episodes in which each constraint was violated.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct ViolationsFile {
     /// [`DATASET_SCHEMA`].
     pub schema: String,
-    /// Per task, in order of the episodes.
+    /// Violations by task, in the order of the episodes.
     pub tasks: BTreeMap<Task, TaskViolations>,
 }
 
@@ -78,21 +77,21 @@ pub struct TaskViolations {
     pub joint_pos: Vec<ConstraintViolation>,
     /// Joint velocity, rad/s beyond 95 % of the limit.
     pub joint_vel: Vec<ConstraintViolation>,
-    /// Computation time: episodes with penalty points for it.
+    /// Computation time: the episodes with penalty points for it.
     pub computation_time: Vec<SlowEpisode>,
 }
 
-/// A constraint broken in one episode.
+/// The violation of a constraint in one episode.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct ConstraintViolation {
-    /// Index within the evaluation, from 0.
+    /// Index of the episode within the evaluation, from 0.
     pub episode: u32,
-    /// The first control step at which it was broken.
+    /// The first control step with a violation.
     pub first_step: u32,
-    /// Control steps at which it was broken.
+    /// Number of control steps with a violation.
     pub steps: u32,
-    /// The largest value of the constraint; violated when above 0.
+    /// The largest value of the constraint; above 0 it is violated.
     pub max: f64,
 }
 
@@ -100,44 +99,44 @@ pub struct ConstraintViolation {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct SlowEpisode {
-    /// Index within the evaluation, from 0.
+    /// Index of the episode within the evaluation, from 0.
     pub episode: u32,
-    /// Over the answered steps, in seconds.
+    /// Mean computation time over the answered steps, in seconds.
     pub mean_s: f64,
-    /// The slowest answer, in seconds.
+    /// Longest computation time, in seconds.
     pub max_s: f64,
-    /// What they cost: 0.5, 1 or 2.
+    /// Penalty points: 0.5, 1 or 2.
     pub points: f64,
-    /// Since layout 4, if a step was answered.
+    /// The slowest answer, if a step was answered; since layout 4.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub slowest: Option<SlowStep>,
 }
 
-/// The slowest answer of an episode: what it took, and whose time that was.
+/// The slowest answer of an episode, with the parts of its time.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct SlowStep {
-    /// The control step, from 0; the first of those that took equally long.
+    /// The control step, from 0; the first one if several took equally long.
     pub step: u32,
-    /// From the first attempt to write the question to the last byte of the answer, in seconds.
+    /// Wall time from the first attempt to write the observation to the last byte of the answer, in seconds.
     pub wall_s: f64,
-    /// What the host took of it, in seconds; the rest counts.
+    /// Part of it due to host interference, in seconds; the rest is the computation time.
     pub host_s: f64,
-    /// CPU time of the agent's process tree meanwhile, in seconds, where the host told.
+    /// CPU time of the agent's process tree in that time, in seconds, if the host reports it.
     pub cpu_s: Option<f64>,
 }
 
-/// `calibration.json`: how evenly the slots kept time, measured by the platform itself.
+/// `calibration.json`: timing quality of the slots, measured by the platform.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct CalibrationFile {
     /// [`DATASET_SCHEMA`].
     pub schema: String,
-    /// In order of the tasks and episodes.
+    /// One entry per shard, in the order of tasks and episodes.
     pub shards: Vec<ShardCalibration>,
 }
 
 impl CalibrationFile {
-    /// The worst of all slots, value by value; `None` without any.
+    /// The worst value of all slots for each field; `None` without shards.
     #[must_use]
     pub fn worst(&self) -> Option<SlotTiming> {
         let timings = self.shards.iter().map(|shard| shard.timing);
@@ -145,16 +144,16 @@ impl CalibrationFile {
     }
 }
 
-/// The measurements of the slot that played a range of episodes.
+/// Timing quality of the slot that played a shard.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct ShardCalibration {
     /// The task.
     pub task: Task,
-    /// Index within the evaluation, from 0.
+    /// Index of the episode within the evaluation, from 0.
     pub first_episode: u32,
-    /// One past the last episode.
+    /// One past the index of the last episode.
     pub end_episode: u32,
-    /// What was measured.
+    /// The measurements.
     #[serde(flatten)]
     pub timing: SlotTiming,
 }

@@ -1,8 +1,8 @@
-//! Games: what a slot is told to play, and what a recording of one says about itself.
+//! Games: the specification of a game, and the JSON files of its recording.
 //!
 //! A recording is a zip archive with `manifest.json`, `results.json`, `outcome.json`, `calibration.json`,
 //! `motion.parquet`, `rallies.parquet` and, for each side N, `side-N.parquet`, `entries-N.parquet` and
-//! `agent-N.log`. A side's own file is made of it: the public files and those of that side, without seeds.
+//! `agent-N.log`. A side's own archive is derived from it: the public files and those of that side, without seeds.
 
 use crate::dataset::{FileDigest, SimulatorId};
 use faceoff_types::{GameLimits, PerturbationSettings, Profile, Ruleset, Seed, SlotTiming};
@@ -11,14 +11,13 @@ use std::collections::BTreeMap;
 
 /// Name and version of the layout of a game's recording.
 pub const GAME_SCHEMA: &str = "faceoff-game/1";
-/// Name and version of the layout of a side's own file.
+/// Name and version of the layout of a side's own archive.
 pub const GAME_SIDE_SCHEMA: &str = "faceoff-game-side/1";
 
-/// Which game to play, and how. Both agents' limits and CPUs are not in it: those are the host's and the
-/// order's.
+/// The specification of a game. The agents' limits are part of the job, and their CPUs are chosen by the host.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct GameSpec {
-    /// By which rules.
+    /// The ruleset.
     pub ruleset: Ruleset,
     /// Control steps of the whole game.
     pub steps: u32,
@@ -28,58 +27,58 @@ pub struct GameSpec {
     pub seed: Seed,
     /// The seed of the season's model mismatch.
     pub mismatch_seed: Seed,
-    /// What each side is held to.
+    /// Limits of each side.
     #[serde(default)]
     pub limits: GameLimits,
-    /// How often this game was begun before and broken by us.
+    /// Number of earlier attempts that a platform fault ended.
     #[serde(default)]
     pub platform_retries: u32,
-    /// Magnitudes of what the profile switches on; absent: the ruleset's.
-    #[serde(default, skip_serializing_if = "is_the_rulesets")]
+    /// Magnitudes of the profile's perturbations; absent: the ruleset's.
+    #[serde(default, skip_serializing_if = "is_default")]
     pub perturbations: Box<PerturbationSettings>,
 }
 
-/// `manifest.json` of a game: what it is and what its files must hash to.
+/// `manifest.json` of a game: a description of the game, with the hashes of its files.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct GameManifest {
     /// [`GAME_SCHEMA`].
     pub schema: String,
-    /// The simulator that made the states; only the same one can make them again.
+    /// The simulator that computed the states; only the same one reproduces them.
     pub simulator: SimulatorId,
-    /// What was to be played.
+    /// The specification of the game.
     #[serde(flatten)]
     pub spec: GameSpec,
     /// The agents' names, the first side's first.
     pub agents: [String; 2],
-    /// Every other file of the archive.
+    /// Size and hash of every other file of the archive, by name.
     pub files: BTreeMap<String, FileDigest>,
 }
 
-/// `manifest.json` of a side's own file. It names no seed: with one, the other side's observations could be
-/// made again.
+/// `manifest.json` of a side's own archive. It contains no seed, since the other side's observations could be
+/// reproduced with it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct GameSideManifest {
     /// [`GAME_SIDE_SCHEMA`].
     pub schema: String,
-    /// The rules it was played by.
+    /// The ruleset of the game.
     pub ruleset: Ruleset,
     /// The perturbation profile.
     pub profile: Profile,
-    /// Which side it is of: 1 or 2.
+    /// The side, 1 or 2.
     pub side: faceoff_types::Side,
     /// The agents' names, the first side's first.
     pub agents: [String; 2],
-    /// Every other file of the archive.
+    /// Size and hash of every other file of the archive, by name.
     pub files: BTreeMap<String, FileDigest>,
 }
 
-/// `calibration.json` of a game: how evenly the slot kept time for each side.
+/// `calibration.json` of a game: timing quality of the slot for each side.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct GameCalibration {
-    /// The first side's first.
+    /// One entry per side, the first side's first.
     pub sides: [SlotTiming; 2],
 }
 
-fn is_the_rulesets(perturbations: &PerturbationSettings) -> bool {
+fn is_default(perturbations: &PerturbationSettings) -> bool {
     *perturbations == PerturbationSettings::default()
 }

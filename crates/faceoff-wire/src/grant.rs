@@ -1,69 +1,77 @@
-//! What the holder of a work order may read and write of the server's files: sealed by the server, so that it needs to remember
-//! none, and nobody can make one. That the order is still its holder's is asked of the queue each time.
+//! Grants: which of the server's files the holder of a job may read and write.
+//!
+//! The server seals a grant with a secret key, so it can check grants without storing them, and they cannot be
+//! forged. On each use it also asks the queue whether the lease is still valid.
 
-use crate::{game::GameSpec, work::ShardSpec};
+use crate::{game::GameSpec, job::ShardSpec};
 use faceoff_types::BundleRef;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 use uuid::Uuid;
 
-/// What an order opens.
+/// File access for one lease of a job.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Grant {
-    /// The order's unit of work.
-    pub unit: Uuid,
-    /// That of the lease under which it was given out.
+    /// Id of the job in the queue.
+    #[serde(rename = "unit")]
+    pub job_id: Uuid,
+    /// Nonce of the lease for which the grant was issued.
     pub nonce: Uuid,
-    /// What may be fetched: the agents that play.
+    /// Bundles that may be fetched: those of the job's agents.
     pub bundles: Vec<BundleRef>,
-    /// What may be stored.
-    pub writes: Writes,
-    /// What the recording must be of, if one is stored.
-    pub plays: Plays,
-    /// BLAKE3 of the program that gave the order out: what another has played says nothing of this one.
+    /// Files that may be stored.
+    #[serde(rename = "writes")]
+    pub write_scope: WriteScope,
+    /// Specification that a stored recording must match.
+    #[serde(rename = "plays")]
+    pub expected_recording: ExpectedRecording,
+    /// BLAKE3 of the server program that issued the job, 64 hexadecimal digits. A result of another program version
+    /// is not comparable, so the job is played again.
     #[serde(default)]
     pub program: String,
 }
 
-/// What is played under an order.
+/// The recording that a job is expected to store.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Plays {
-    /// Nothing that is recorded.
-    Nothing,
-    /// Episodes.
+pub enum ExpectedRecording {
+    /// None is stored.
+    #[serde(rename = "nothing")]
+    None,
+    /// Episodes of a shard.
     Shard(ShardSpec),
     /// A game.
     Game(GameSpec),
 }
 
-/// What may be stored under an order.
+/// The storage keys that a job may write.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Writes {
-    /// Nothing.
-    Nothing,
-    /// One file, of this key.
+pub enum WriteScope {
+    /// No file.
+    #[serde(rename = "nothing")]
+    None,
+    /// One file with this key.
     File(String),
-    /// The files of a recording, below this key prefix.
+    /// The files of a recording under this key prefix.
     Folder(String),
 }
 
-/// What a server seals its grants with.
+/// The key with which a server seals its grants.
 #[derive(Clone)]
 pub struct GrantKey([u8; 32]);
 
-/// The longest name of a file of a recording.
+/// Longest file name in a recording, in bytes.
 const LONGEST_NAME: usize = 64;
 
 impl GrantKey {
-    /// Of a server that keeps this secret.
+    /// Derives the key from the server's secret.
     #[must_use]
-    pub fn of(secret: &[u8; 32]) -> Self {
+    pub fn from_secret(secret: &[u8; 32]) -> Self {
         Self(blake3::derive_key("faceoff: grants of work orders", secret))
     }
 
-    /// A number that nobody knows before who does not know the secret, the `number`th of a lease.
+    /// Draws the `number`th pseudo-random number of a lease; it cannot be predicted without the secret.
     #[must_use]
     pub fn draw(&self, nonce: Uuid, number: u32) -> u64 {
         let mut hasher = blake3::Hasher::new_keyed(&self.0);
@@ -75,8 +83,8 @@ impl GrantKey {
         u64::from_le_bytes(bytes)
     }
 
-    fn seal(&self, words: &[u8]) -> blake3::Hash {
-        blake3::keyed_hash(&self.0, words)
+    fn mac(&self, bytes: &[u8]) -> blake3::Hash {
+        blake3::keyed_hash(&self.0, bytes)
     }
 }
 
@@ -87,56 +95,56 @@ impl fmt::Debug for GrantKey {
 }
 
 impl Grant {
-    /// As a header carries it.
+    /// The text for an HTTP header: JSON in hexadecimal digits, a dot and the keyed hash.
     ///
     /// # Errors
-    /// None that a grant could cause: all of it can be written.
-    pub fn sealed(&self, key: &GrantKey) -> serde_json::Result<String> {
-        let words = serde_json::to_vec(self)?;
-        let seal = key.seal(&words);
-        Ok(format!("{}.{}", hex::encode(words), seal.to_hex()))
+    /// Only if serialisation fails, which no grant causes.
+    pub fn seal(&self, key: &GrantKey) -> serde_json::Result<String> {
+        let json = serde_json::to_vec(self)?;
+        let seal = key.mac(&json);
+        Ok(format!("{}.{}", hex::encode(json), seal.to_hex()))
     }
 
-    /// `None` of anything that was not sealed with this key.
+    /// Reads a sealed grant; `None` if the text was not sealed with this key.
     #[must_use]
     pub fn open(text: &str, key: &GrantKey) -> Option<Self> {
-        let (words, seal) = text.split_once('.')?;
-        let words = hex::decode(words).ok()?;
+        let (json, seal) = text.split_once('.')?;
+        let json = hex::decode(json).ok()?;
         // Hashes are compared in constant time.
-        if blake3::Hash::from_hex(seal).ok()? != key.seal(&words) {
+        if blake3::Hash::from_hex(seal).ok()? != key.mac(&json) {
             return None;
         }
-        serde_json::from_slice(&words).ok()
+        serde_json::from_slice(&json).ok()
     }
 
-    /// How many episodes are recorded under it.
+    /// Number of episodes in the expected recording.
     #[must_use]
     pub fn episodes(&self) -> u32 {
-        match &self.plays {
-            Plays::Shard(spec) => spec.episodes.end.saturating_sub(spec.episodes.start),
-            Plays::Game(_) | Plays::Nothing => 0,
+        match &self.expected_recording {
+            ExpectedRecording::Shard(spec) => spec.episodes.end.saturating_sub(spec.episodes.start),
+            ExpectedRecording::Game(_) | ExpectedRecording::None => 0,
         }
     }
 
-    /// The bundle of this hash (BLAKE3, 64 hexadecimal digits), if it may be fetched.
+    /// The bundle with this hash (BLAKE3, 64 hexadecimal digits), if it may be fetched.
     #[must_use]
     pub fn bundle(&self, blake3: &str) -> Option<&BundleRef> {
         self.bundles.iter().find(|bundle| bundle.blake3 == blake3)
     }
 
-    /// The key under which a file of this name may be stored.
+    /// The storage key for a file of this name; `None` if it may not be stored.
     #[must_use]
-    pub fn key_of(&self, name: &str) -> Option<String> {
-        match &self.writes {
-            Writes::Nothing => None,
-            Writes::File(key) => Some(key.clone()),
-            Writes::Folder(prefix) => is_name(name).then(|| format!("{prefix}/{name}")),
+    pub fn storage_key(&self, name: &str) -> Option<String> {
+        match &self.write_scope {
+            WriteScope::None => None,
+            WriteScope::File(key) => Some(key.clone()),
+            WriteScope::Folder(prefix) => is_file_name(name).then(|| format!("{prefix}/{name}")),
         }
     }
 }
 
-/// Names of files as recordings have them: no way out of their folder.
-fn is_name(name: &str) -> bool {
+/// Is this a valid file name in a recording? Names that could leave its folder are not.
+fn is_file_name(name: &str) -> bool {
     let allowed = |c: char| c.is_ascii_alphanumeric() || matches!(c, '.' | '-' | '_');
     (1..=LONGEST_NAME).contains(&name.len()) && !name.starts_with('.') && name.chars().all(allowed)
 }
@@ -148,7 +156,7 @@ mod tests {
 
     fn grant() -> Grant {
         Grant {
-            unit: Uuid::from_u128(1),
+            job_id: Uuid::from_u128(1),
             nonce: Uuid::from_u128(2),
             bundles: vec![BundleRef {
                 key: "bundles/a/b.zip".into(),
@@ -156,28 +164,28 @@ mod tests {
                 blake3: "ab".repeat(32),
                 file_name: "agent.zip".into(),
             }],
-            writes: Writes::Folder("runs/r/n".into()),
-            plays: Plays::Nothing,
+            write_scope: WriteScope::Folder("runs/r/n".into()),
+            expected_recording: ExpectedRecording::None,
             program: "cd".repeat(32),
         }
     }
 
     #[test]
-    fn what_was_sealed_opens_and_nothing_else() {
-        let (key, other) = (GrantKey::of(&[1; 32]), GrantKey::of(&[2; 32]));
-        let sealed = grant().sealed(&key).unwrap();
+    fn sealed_grant_opens_and_forgeries_do_not() {
+        let (key, other) = (GrantKey::from_secret(&[1; 32]), GrantKey::from_secret(&[2; 32]));
+        let sealed = grant().seal(&key).unwrap();
         assert_eq!(Grant::open(&sealed, &key), Some(grant()));
         assert_eq!(Grant::open(&sealed, &other), None);
-        let (words, seal) = sealed.split_once('.').unwrap();
+        let (json, seal) = sealed.split_once('.').unwrap();
         let wider = Grant {
-            writes: Writes::Folder("runs/another".into()),
+            write_scope: WriteScope::Folder("runs/another".into()),
             ..grant()
         };
         let wider = hex::encode(serde_json::to_vec(&wider).unwrap());
         for forged in [
             format!("{wider}.{seal}"),
-            format!("{words}."),
-            words.to_owned(),
+            format!("{json}."),
+            json.to_owned(),
             String::new(),
         ] {
             assert_eq!(Grant::open(&forged, &key), None, "{forged}");
@@ -185,12 +193,12 @@ mod tests {
     }
 
     #[test]
-    fn it_names_what_may_be_read_and_written() {
+    fn grant_limits_reads_and_writes() {
         let grant = grant();
         assert!(grant.bundle(&"ab".repeat(32)).is_some());
         assert!(grant.bundle(&"cd".repeat(32)).is_none());
         assert_eq!(
-            grant.key_of("steps.parquet").as_deref(),
+            grant.storage_key("steps.parquet").as_deref(),
             Some("runs/r/n/steps.parquet")
         );
         for name in [
@@ -204,24 +212,24 @@ mod tests {
             "a b",
             &"n".repeat(65),
         ] {
-            assert_eq!(grant.key_of(name), None, "{name:?}");
+            assert_eq!(grant.storage_key(name), None, "{name:?}");
         }
         let file = Grant {
-            writes: Writes::File("ablations/x".into()),
+            write_scope: WriteScope::File("ablations/x".into()),
             ..grant.clone()
         };
-        assert_eq!(file.key_of("clips").as_deref(), Some("ablations/x"));
+        assert_eq!(file.storage_key("clips").as_deref(), Some("ablations/x"));
         let nothing = Grant {
-            writes: Writes::Nothing,
+            write_scope: WriteScope::None,
             ..grant
         };
-        assert_eq!(nothing.key_of("clips"), None);
+        assert_eq!(nothing.storage_key("clips"), None);
     }
 
     proptest! {
         #[test]
-        fn no_text_of_strangers_opens(text in ".{0,200}") {
-            prop_assert_eq!(Grant::open(&text, &GrantKey::of(&[3; 32])), None);
+        fn arbitrary_text_opens_no_grant(text in ".{0,200}") {
+            prop_assert_eq!(Grant::open(&text, &GrantKey::from_secret(&[3; 32])), None);
         }
     }
 }

@@ -1,18 +1,18 @@
-//! What Faceoff promises to outsiders: the agent protocol, the bundle's `agent.toml`, the files of a
-//! dataset and the work orders of slots, which may be on other machines.
+//! The formats that Faceoff shares with other programs: the agent protocol, the bundle's `agent.toml`, the files of a
+//! dataset, and the jobs of worker slots, which may be on other machines.
 //!
-//! Everything here is versioned, size-capped and free of I/O: bytes come in and go out as slices,
-//! and the crate neither reads a clock nor knows a process. What an agent says is parsed once, into
-//! types; whatever does not fit becomes an [`AgentFaultKind`](faceoff_types::AgentFaultKind) that
-//! says what was expected and what came.
+//! All formats are versioned and limited in size. The crate does no I/O, reads no clock and starts no process: it
+//! works on byte slices. Answers of agents are parsed once, into types. An invalid answer becomes an
+//! [`AgentFaultKind`](faceoff_types::AgentFaultKind) that says what was expected and what was sent.
 //!
-//! * [`message`]: what the evaluator says (`hello`, `reset`, `step`, `end`, `bye`);
-//! * [`answer`]: what the agent answers (`ready`, `act`);
+//! * [`message`]: messages of the evaluator (`hello`, `reset`, `step`, `end`, `bye`);
+//! * [`answer`]: answers of the agent (`ready`, `act`);
 //! * [`Manifest`][]: `agent.toml`;
 //! * [`dataset`]: `manifest.json` and `violations.json` of a recorded evaluation;
-//! * [`game`]: what a slot is told to play as a game, and `manifest.json` of its recording;
-//! * [`work`]: what a worker slot is told to do and reports back;
-//! * [`remote`]: what passes between the server and workers on other machines, and [`grant`]: what they may read and write.
+//! * [`game`]: the specification of a game, and `manifest.json` of its recording;
+//! * [`job`]: jobs of worker slots and their reports;
+//! * [`remote`]: messages between the server and remote workers;
+//! * [`grant`]: the file access of remote workers.
 
 #![warn(missing_docs)]
 
@@ -25,7 +25,7 @@ pub mod message;
 mod protocol;
 mod quote;
 pub mod remote;
-pub mod work;
+pub mod job;
 
 pub use manifest::{MANIFEST_MAX_BYTES, Manifest, ManifestError};
 pub use message::{Env, Message, ProtocolTask};

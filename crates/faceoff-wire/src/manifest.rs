@@ -1,41 +1,41 @@
-use faceoff_types::{Interpolation, harmless, is_harmless};
+use faceoff_types::{Interpolation, escape_unprintable, is_printable};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 /// Largest `agent.toml`, in bytes.
 pub const MANIFEST_MAX_BYTES: u64 = 64 * 1024;
 
-/// `agent.toml`: what a bundle is and how its agent is started.
+/// `agent.toml`: the description of a bundle and of how to start its agent.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Manifest {
-    /// The agent's name, as shown on the board.
+    /// The agent's name, 1 to 60 characters, as shown on boards.
     pub name: String,
-    /// Program and arguments, run in the bundle's folder.
+    /// Program and arguments; the working directory is the bundle's folder.
     pub command: Vec<String>,
-    /// The runtime that it needs; whether the organiser offers it is the runner's question.
+    /// Name of the runtime that the agent needs. Whether the server offers it is checked by the runner.
     pub runtime: String,
-    /// The interpolation that `ready` must state, if stated here. TOML has no null: an agent that
-    /// sends whole trajectories leaves the key out and says `null` in `ready`.
+    /// The interpolation that `ready` must have, if given here. TOML has no null: an agent that sends whole
+    /// trajectories omits the key and has `null` in `ready`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub interpolation: Option<i64>,
-    /// Environment variables for the agent.
+    /// Environment variables for the agent, at most 64.
     #[serde(default)]
     pub env: BTreeMap<String, String>,
 }
 
-/// Why an `agent.toml` is refused; shown to the team.
+/// The reason for refusing an `agent.toml`; shown to the team.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum ManifestError {
-    /// Not TOML, or a key is missing, unknown or of another type.
+    /// Not TOML, or with a missing or unknown key, or a value of a wrong type.
     #[error("agent.toml: {0}")]
     Toml(String),
-    /// A value that cannot be.
+    /// An invalid value.
     #[error("agent.toml: {key} {problem}")]
     Value {
-        /// The key.
+        /// The key in `agent.toml`.
         key: String,
-        /// What is wrong with it.
+        /// What is wrong with the value.
         problem: String,
     },
 }
@@ -44,7 +44,7 @@ impl Manifest {
     /// Parses and checks the text of an `agent.toml`.
     ///
     /// # Errors
-    /// Says which key is wrong and what would be right.
+    /// Names the invalid key and what is expected.
     pub fn parse(text: &str) -> Result<Self, ManifestError> {
         if text.len() as u64 > MANIFEST_MAX_BYTES {
             return Err(ManifestError::Toml(format!(
@@ -52,14 +52,14 @@ impl Manifest {
             )));
         }
         let manifest: Self = toml::from_str(text).map_err(|error| {
-            // It quotes the text.
-            ManifestError::Toml(harmless(&error.to_string()).into_owned())
+            // The error quotes the text.
+            ManifestError::Toml(escape_unprintable(&error.to_string()).into_owned())
         })?;
         manifest.check()?;
         Ok(manifest)
     }
 
-    /// Can an agent's environment have a variable of this name?
+    /// Is this a valid name of an environment variable: a letter or `_`, then letters, digits and `_`, at most 128 bytes?
     #[must_use]
     pub fn is_variable_name(name: &str) -> bool {
         name.len() <= 128
@@ -67,7 +67,7 @@ impl Manifest {
             && name.bytes().all(|b| b.is_ascii_alphanumeric() || b == b'_')
     }
 
-    /// Can a variable of an agent's environment have this value: at most 4096 bytes, none of them NUL?
+    /// Is this a valid value of an environment variable: at most 4096 bytes, without NUL?
     #[must_use]
     pub fn is_variable_value(value: &str) -> bool {
         value.len() <= 4096 && !value.contains('\0')
@@ -76,7 +76,7 @@ impl Manifest {
     fn check(&self) -> Result<(), ManifestError> {
         let chars = self.name.chars().count();
         require(
-            (1..=60).contains(&chars) && self.name.chars().all(is_harmless),
+            (1..=60).contains(&chars) && self.name.chars().all(is_printable),
             "name",
             "must have 1 to 60 characters, none that steers a terminal, is invisible or turns the \
              writing direction",
@@ -127,7 +127,7 @@ impl Manifest {
             "must have at most 64 variables",
         )?;
         for (name, value) in &self.env {
-            let key: String = format!("env.{}", harmless(name)).chars().take(80).collect();
+            let key: String = format!("env.{}", escape_unprintable(name)).chars().take(80).collect();
             require(
                 Self::is_variable_name(name),
                 &key,
@@ -143,8 +143,8 @@ impl Manifest {
     }
 }
 
-fn require(holds: bool, key: &str, problem: &str) -> Result<(), ManifestError> {
-    if holds {
+fn require(condition: bool, key: &str, problem: &str) -> Result<(), ManifestError> {
+    if condition {
         Ok(())
     } else {
         Err(ManifestError::Value {
@@ -168,18 +168,18 @@ mod tests {
     "#;
 
     #[test]
-    fn the_protocols_example_is_read() {
+    fn manifest_example_of_the_protocol_is_read() {
         let manifest = Manifest::parse(GOOD).unwrap();
         assert_eq!(manifest.name, "striker");
         assert_eq!(manifest.command, ["python3", "agent.py"]);
         assert_eq!(manifest.interpolation, Some(3));
         assert_eq!(manifest.env["OMP_NUM_THREADS"], "1");
-        let again = Manifest::parse(&toml::to_string(&manifest).unwrap()).unwrap();
-        assert_eq!(again, manifest);
+        let reparsed = Manifest::parse(&toml::to_string(&manifest).unwrap()).unwrap();
+        assert_eq!(reparsed, manifest);
     }
 
     #[test]
-    fn a_refusal_names_the_key() {
+    fn manifest_error_names_the_key() {
         for (from, to, needle) in [
             ("name = \"striker\"", "", "missing field `name`"),
             ("name = \"striker\"", "name = \"\"", "name must have"),

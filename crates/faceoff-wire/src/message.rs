@@ -1,11 +1,11 @@
-//! What the evaluator says to an agent, one JSON object per line.
+//! Messages from the evaluator to an agent, one JSON object per line.
 
 use crate::protocol::PROTOCOL_VERSION;
-use faceoff_types::{Contest, JOINTS, Task};
+use faceoff_types::{AgentTask, JOINTS, Task};
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 
-/// What an agent may be asked to play.
+/// Tasks of the agent protocol.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum ProtocolTask {
@@ -13,19 +13,19 @@ pub enum ProtocolTask {
     Hit,
     /// Stop an incoming puck.
     Defend,
-    /// Bring the puck into a good position.
+    /// Bring the puck into a good hitting position.
     Prepare,
     /// A game against another agent.
     Tournament,
 }
 
-impl From<Contest> for ProtocolTask {
-    fn from(contest: Contest) -> Self {
-        match contest {
-            Contest::Task(Task::Hit) => Self::Hit,
-            Contest::Task(Task::Defend) => Self::Defend,
-            Contest::Task(Task::Prepare) => Self::Prepare,
-            Contest::Game { .. } => Self::Tournament,
+impl From<AgentTask> for ProtocolTask {
+    fn from(agent_task: AgentTask) -> Self {
+        match agent_task {
+            AgentTask::Qualifying(Task::Hit) => Self::Hit,
+            AgentTask::Qualifying(Task::Defend) => Self::Defend,
+            AgentTask::Qualifying(Task::Prepare) => Self::Prepare,
+            AgentTask::Game { .. } => Self::Tournament,
         }
     }
 }
@@ -34,34 +34,34 @@ impl From<Contest> for ProtocolTask {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "type", rename_all = "lowercase")]
 pub enum Message<'a> {
-    /// Once, first; answered by `ready`.
+    /// Sent once, as the first message; answered by `ready`.
     Hello {
         /// [`PROTOCOL_VERSION`].
         protocol: u32,
-        /// What is played.
+        /// The task.
         task: ProtocolTask,
         /// 1, or 2 for the second side of a game.
         agent_id: u32,
         /// The constants of the simulation.
         env: Box<Env>,
     },
-    /// Before each episode; answered by `ready`.
+    /// Sent before each episode; answered by `ready`.
     Reset {
         /// Index of the episode within the evaluation.
         episode: u32,
     },
-    /// One control step; answered by `act`.
+    /// Sent for each control step; answered by `act`.
     Step {
         /// Index of the step within the episode, from 0.
         step: u32,
         /// The observation: 20 numbers, or 23 with an opponent on the table.
         obs: Cow<'a, [f64]>,
     },
-    /// The episode is over; not answered.
+    /// Sent after each episode; not answered.
     End {
         /// Index of the episode.
         episode: u32,
-        /// Control steps played.
+        /// Number of control steps played.
         steps: u32,
     },
     /// The last message; not answered.
@@ -69,13 +69,13 @@ pub enum Message<'a> {
 }
 
 impl<'a> Message<'a> {
-    /// `hello` for the one agent of a qualifying task, or one of the two of a game.
+    /// `hello` for the agent of a qualifying task, or for one of the two agents of a game.
     #[must_use]
-    pub fn hello(contest: Contest, env: Env) -> Self {
+    pub fn hello(agent_task: AgentTask, env: Env) -> Self {
         Self::Hello {
             protocol: PROTOCOL_VERSION,
-            task: contest.into(),
-            agent_id: contest.agent_id(),
+            task: agent_task.into(),
+            agent_id: agent_task.agent_id(),
             env: Box::new(env),
         }
     }
@@ -89,10 +89,10 @@ impl<'a> Message<'a> {
         }
     }
 
-    /// Replaces `buffer` by the message's line, newline included. The buffer's memory is reused;
-    /// numbers are written with as many digits as read back to the same bits.
+    /// Replaces the content of `buffer` by the message's line, including the newline, reusing its memory.
+    /// Numbers are written with enough digits to be read back to the same bits.
     ///
-    /// Numbers must be finite: JSON has no others, and an infinity would read as `null`.
+    /// Numbers must be finite: JSON has no others, and an infinity would be read as `null`.
     pub fn write_line(&self, buffer: &mut Vec<u8>) {
         buffer.clear();
         serde_json::to_writer(&mut *buffer, self)
@@ -105,29 +105,29 @@ impl<'a> Message<'a> {
 /// SI units, radians.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Env {
-    /// Duration of a control step.
+    /// Duration of a control step, seconds.
     pub dt: f64,
-    /// Robots on the table that agents control.
+    /// Number of robots that agents control.
     pub n_agents: u32,
-    /// Where the puck's x, y, yaw are in an observation.
+    /// Indices of the puck's x, y, yaw in an observation.
     pub puck_pos_ids: Vec<usize>,
-    /// Where the puck's velocities are in an observation.
+    /// Indices of the puck's velocities in an observation.
     pub puck_vel_ids: Vec<usize>,
-    /// Where the joint positions are in an observation.
+    /// Indices of the joint positions in an observation.
     pub joint_pos_ids: Vec<usize>,
-    /// Where the filtered joint velocities are in an observation.
+    /// Indices of the filtered joint velocities in an observation.
     pub joint_vel_ids: Vec<usize>,
-    /// Where the opponent's end effector is in an observation; empty without an opponent.
+    /// Indices of the opponent's end effector in an observation; empty without an opponent.
     pub opponent_ee_ids: Vec<usize>,
-    /// Playing surface and goal mouths.
+    /// The playing surface and the goal mouths.
     pub table: TableEnv,
-    /// Mass and friction are not told.
+    /// The puck; its mass and friction are not disclosed.
     pub puck: DiscEnv,
-    /// The striking cylinder.
+    /// The mallet: the cylinder that strikes the puck.
     pub mallet: DiscEnv,
-    /// Always the nominal one, whatever the profile does to the plant.
+    /// The nominal robot, regardless of the profile's model mismatch.
     pub robot: RobotEnv,
-    /// Control steps after which an episode ends at the latest.
+    /// Maximum number of control steps of an episode.
     pub episode_steps: u32,
     /// The ruleset's name.
     pub ruleset: String,
@@ -136,25 +136,25 @@ pub struct Env {
 /// Dimensions of the table, in metres.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct TableEnv {
-    /// Along x, from goal line to goal line.
+    /// Distance between the goal lines, along x.
     pub length: f64,
-    /// Along y.
+    /// Width of the playing surface, along y.
     pub width: f64,
-    /// Of the goal mouth, along y.
+    /// Width of a goal mouth, along y.
     pub goal_width: f64,
 }
 
 /// A round body on the table.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct DiscEnv {
-    /// In metres.
+    /// Radius in metres.
     pub radius: f64,
 }
 
 /// The robot's constants.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct RobotEnv {
-    /// Driven joints.
+    /// Number of driven joints.
     pub n_joints: usize,
     /// Height of the mallet plane in the robot's base frame, metres.
     pub ee_desired_height: f64,
@@ -196,7 +196,7 @@ mod tests {
     }
 
     #[test]
-    fn lines_are_those_of_the_protocol() {
+    fn messages_are_written_as_in_the_protocol() {
         assert_eq!(
             line(&Message::Reset { episode: 17 }),
             "{\"type\":\"reset\",\"episode\":17}\n"
@@ -216,7 +216,7 @@ mod tests {
     }
 
     #[test]
-    fn numbers_come_back_with_the_same_bits() {
+    fn observation_numbers_keep_their_bits() {
         let obs = [
             0.1 + 0.2,
             -0.0,

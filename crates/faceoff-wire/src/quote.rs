@@ -1,15 +1,15 @@
-use faceoff_types::harmless;
+use faceoff_types::escape_unprintable;
 
-/// Characters of an offending line that are kept in a fault.
+/// Maximum number of characters of an offending line in a fault.
 const QUOTED_CHARS: usize = 400;
 
-/// An offending line as a fault shows it: lossy UTF-8, harmless, cut to 400 characters.
+/// An offending line for a fault: lossy UTF-8 with unprintable characters escaped, cut to 400 characters.
 #[must_use]
 pub fn quote_line(line: &[u8]) -> String {
-    // Four bytes hold any character, so that a long line is not decoded as a whole.
+    // A character has at most four bytes, so a long line need not be decoded as a whole.
     let head = &line[..line.len().min(4 * QUOTED_CHARS)];
     let text = String::from_utf8_lossy(head);
-    let text = harmless(&text);
+    let text = escape_unprintable(&text);
     let mut quoted: String = text.chars().take(QUOTED_CHARS).collect();
     if quoted.len() < text.len() || head.len() < line.len() {
         quoted.push('…');
@@ -25,7 +25,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_quoted_line_is_cut_to_400_characters_and_says_so() {
+    fn quoted_line_is_cut_to_400_characters_with_a_mark() {
         assert_eq!(quote_line(b"{}"), "{}");
         assert_eq!(quote_line(&[b'a'; 400]), "a".repeat(400));
         let cut = quote_line(&[b'a'; 401]);

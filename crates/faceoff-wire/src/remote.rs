@@ -1,183 +1,199 @@
-//! What passes between the server and workers on other machines, as JSON: orders, what is asked meanwhile, and what came of them.
+//! JSON messages between the server and remote workers: jobs, requests of workers, live updates of games, and results.
 
-use crate::work::{Lease, WorkOrder, WorkReport};
-use faceoff_types::{GameId, LiveHappening, LivePosition, RuntimeInventory};
+use crate::job::{Lease, JobSpec, JobReport};
+use faceoff_types::{GameId, LiveEvent, LivePosition, RuntimeInventory};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// An order, and what it opens.
+/// A job for a remote worker, with access to its files.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct RemoteOrder {
-    /// What is to be done.
-    pub order: WorkOrder,
-    /// A sealed [`Grant`](crate::grant::Grant).
+pub struct RemoteJob {
+    /// The job.
+    #[serde(rename = "order")]
+    pub job: JobSpec,
+    /// A sealed [`Grant`](crate::grant::Grant) for the job's files.
     pub grant: String,
-    /// Where the server's files are: an address of http or https, without a slash at its end.
-    pub files: String,
-    /// BLAKE3 of the server's program, 64 hexadecimal digits: a worker that runs another declines.
+    /// Base URL of the server's files (http or https), without a trailing slash.
+    #[serde(rename = "files")]
+    pub files_url: String,
+    /// BLAKE3 of the server's program, 64 hexadecimal digits. A worker that runs another program does not start the job.
     pub program: String,
-    /// Where bundles and recordings are instead, if not with the server.
+    /// Links to bundles and recordings, if they are in a bucket in place of the server.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub objects: Option<Objects>,
+    pub objects: Option<ObjectLinks>,
 }
 
-/// Links to files of an order, good for a while and for nothing else.
+/// Links to a job's files in a bucket. Each expires after a while and gives access to one file only.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Objects {
-    /// By BLAKE3: to fetch.
+pub struct ObjectLinks {
+    /// Links to fetch bundles, by their BLAKE3.
     pub bundles: BTreeMap<String, String>,
-    /// By name: to store.
+    /// Links to store files, by file name.
     pub files: BTreeMap<String, String>,
 }
 
-/// What a worker is: its orders depend on it.
+/// A worker's program and runtimes, which decide whether it gets jobs, and its description for organisers.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Introduction {
-    /// BLAKE3 of the program that it runs, 64 hexadecimal digits: only the same program has the same bits.
+pub struct WorkerCapabilities {
+    /// BLAKE3 of its program, 64 hexadecimal digits. Only the same program computes the same bits.
     pub program: String,
-    /// The program's version, for people.
+    /// Version of its program, for display.
     pub version: String,
-    /// What it offers to agents, and what is in it.
+    /// Runtimes that it offers to agents, with their content.
     pub runtimes: Vec<RuntimeInventory>,
-    /// Units that it works at at the same time.
+    /// Number of jobs that it runs at a time.
     pub slots: u32,
-    /// What its owner calls it by beside its name, for people.
+    /// Labels given by its owner, for display.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub labels: Vec<String>,
 }
 
-impl Introduction {
-    /// More labels are left out.
-    pub const MOST_LABELS: usize = 8;
-    /// In characters; what is longer is cut.
-    pub const LONGEST_LABEL: usize = 40;
+impl WorkerCapabilities {
+    /// Maximum number of labels; further ones are ignored.
+    pub const MAX_LABELS: usize = 8;
+    /// Maximum length of a label in characters; longer ones are cut.
+    pub const MAX_LABEL_CHARS: usize = 40;
 }
 
-/// What a worker asks, and is answered at once.
+/// A request of a worker, which the server answers at once.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "snake_case")]
-pub enum Ask {
-    /// May it work?
-    MayWork(Introduction),
-    /// Might it work, if it were started?
-    WouldWork(Introduction),
-    /// It has an order, and is to be the only one that works at it.
-    Begin {
-        /// As the order has it.
+pub enum WorkerRequest {
+    /// Registers the worker, and asks whether it gets jobs.
+    #[serde(rename = "may_work")]
+    Register(WorkerCapabilities),
+    /// Asks whether a worker like this would get jobs, without registering it.
+    #[serde(rename = "would_work")]
+    CheckRegistration(WorkerCapabilities),
+    /// Asks for the exclusive right to run a job that it has received.
+    #[serde(rename = "begin")]
+    StartJob {
+        /// The lease of the job.
         lease: Lease,
-        /// Which of its slots.
+        /// Name of the slot that runs the job.
         slot: String,
     },
-    /// Is it still to work at an order?
-    Renew {
-        /// As the order has it.
+    /// Renews the lease of a job, and reports progress.
+    #[serde(rename = "renew")]
+    RenewLease {
+        /// The lease of the job.
         lease: Lease,
-        /// How far it is.
+        /// Number of episodes played so far; in a game, of windows.
         episodes_done: u32,
-        /// What keeps it from handing in what came of it, in words for organisers.
+        /// The problem that prevents it from sending the result, for organisers.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         trouble: Option<String>,
     },
-    /// What came of an order is stored by NATS, and waits for the server: until it is taken in, the order is nobody else's.
-    HandedIn {
-        /// As the order has it.
+    /// Reports that the result message is stored in NATS. From then on the server keeps the lease until it has accepted
+    /// the result.
+    #[serde(rename = "handed_in")]
+    ResultPending {
+        /// The lease of the job.
         lease: Lease,
-        /// How far it is.
+        /// Number of episodes played so far; in a game, of windows.
         episodes_done: u32,
-        /// Where it is in the stream of outcomes.
+        /// Sequence number of the message in the stream of results.
         sequence: u64,
     },
 }
 
-/// The answer to [`Ask`].
+/// The response to a [`WorkerRequest`].
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "snake_case")]
-pub enum Answer {
-    /// Yes.
-    Yes,
-    /// No, and this is why.
-    No {
-        /// For the worker's log.
+pub enum WorkerResponse {
+    /// The request is granted.
+    #[serde(rename = "yes")]
+    Accepted,
+    /// The request is refused.
+    #[serde(rename = "no")]
+    Refused {
+        /// The reason, for the worker's log.
         reason: String,
     },
-    /// Nobody can tell now; it may ask again.
+    /// The server cannot answer now; the worker may ask again.
     Unknown,
 }
 
-/// What is told of a game under way; it decides nothing, and may get lost.
+/// A live update of a running game. It has no influence on the result, and may get lost.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct RemoteShow {
-    /// Under which it is played.
+pub struct LiveGameMessage {
+    /// The lease under which the game is played.
     pub lease: Lease,
-    /// Which.
+    /// Id of the game.
     pub game: GameId,
-    /// Which attempt at it, from 1.
+    /// Number of the attempt, from 1.
     pub attempt: u32,
-    /// What happens.
-    pub shown: Shown,
+    /// The update.
+    #[serde(rename = "shown")]
+    pub update: LiveGameUpdate,
 }
 
-/// What happens in a game under way.
+/// A change in a running game.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "snake_case")]
-pub enum Shown {
-    /// It begins.
-    Begun {
-        /// Control steps that are to be played.
+pub enum LiveGameUpdate {
+    /// The game has started.
+    #[serde(rename = "begun")]
+    Started {
+        /// Control steps of the whole game.
         steps: u32,
     },
-    /// It goes on.
-    Goes {
-        /// What happened since.
-        happenings: Vec<LiveHappening>,
-        /// Where things are.
+    /// The game has progressed.
+    #[serde(rename = "goes")]
+    Progress {
+        /// Events since the last update.
+        #[serde(rename = "happenings")]
+        events: Vec<LiveEvent>,
+        /// The current positions.
         position: LivePosition,
     },
-    /// Nothing more comes.
-    Over,
+    /// The attempt is over; no further update follows.
+    #[serde(rename = "over")]
+    Ended,
 }
 
-/// What came of an order.
+/// The result of a job, as sent by a remote worker.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct RemoteOutcome {
-    /// As the order has it.
+pub struct ResultMessage {
+    /// The lease of the job.
     pub lease: Lease,
-    /// As the order has it.
+    /// The sealed grant of the job.
     pub grant: String,
-    /// What came of it.
-    pub outcome: Outcome,
+    /// How the job ended.
+    #[serde(rename = "outcome")]
+    pub end: JobEnd,
 }
 
-/// How work at an order ended.
+/// How a job ended.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "snake_case")]
-pub enum Outcome {
-    /// It is done; what is kept of it is stored.
+pub enum JobEnd {
+    /// The job is done, and its files are stored.
     Done {
-        /// What came of it.
-        report: Box<WorkReport>,
+        /// The report of the job.
+        report: Box<JobReport>,
     },
-    /// The worker ends; the attempt does not count.
+    /// The worker shut down; the attempt does not count.
     Shutdown,
-    /// There was no room for it; the attempt does not count.
+    /// The disk was full; the attempt does not count.
     FullDisk,
-    /// A fault of ours.
+    /// A platform fault.
     PlatformFault {
-        /// In words for the team.
+        /// A description for the team.
         reason: String,
     },
 }
 
-impl RemoteOutcome {
-    /// The name under which it is accepted once: unit and lease.
+impl ResultMessage {
+    /// Message id, by which a result is accepted at most once: job id and nonce of the lease.
     #[must_use]
     pub fn id(&self) -> String {
         Self::id_of(&self.lease)
     }
 
-    /// Likewise, of what comes of work under a lease.
+    /// [`Self::id`] of the result of a job under this lease.
     #[must_use]
     pub fn id_of(lease: &Lease) -> String {
-        format!("{}/{}", lease.unit, lease.nonce)
+        format!("{}/{}", lease.job_id, lease.nonce)
     }
 }

@@ -1,120 +1,120 @@
-use crate::{evaluator::Evaluator, lease::Progress, server::WorkServer};
+use crate::{evaluator::Evaluator, lease::Progress, server::JobServer};
 use anyhow::Context as _;
 use faceoff_runner::{
     PlatformFault,
     bundle::{Bundle, BundleError},
 };
-use faceoff_wire::work::AgentOrder;
+use faceoff_wire::job::AgentSpec;
 use fs_err as fs;
 use std::path::{Path, PathBuf};
 
-/// What a team's archive turned out to be.
+/// The result of unpacking a team's archive.
 #[derive(Debug)]
 pub(crate) enum Unpacked {
     Bundle(Bundle),
-    /// No bundle, by the team's fault; the text says what is wrong.
+    /// Not a valid bundle, by the team's fault; the text says what is wrong.
     Invalid(String),
 }
 
-/// The bundles that a slot used last, unpacked: a slot plays many shards of one agent in a row, and games of two.
-/// No more are held than the work at hand needs, since each takes room.
+/// The unpacked bundles that a slot used last. A slot often runs many shards of one agent in a row, and games of two
+/// agents. The cache holds no more bundles than the current job needs, since each takes disk space.
 #[derive(Debug)]
 pub(crate) struct BundleCache {
-    places: [Place; 2],
+    entries: [Entry; 2],
 }
 
-/// Where one bundle is unpacked.
+/// A folder for one unpacked bundle.
 #[derive(Debug)]
-struct Place {
+struct Entry {
     folder: PathBuf,
-    /// the archive's hash, and what was unpacked from it
-    held: Option<(String, Bundle)>,
+    /// The archive's hash, and the unpacked bundle.
+    bundle: Option<(String, Bundle)>,
 }
 
 impl BundleCache {
     pub(crate) fn new(slot_folder: &Path) -> Self {
-        let place = |name| Place {
+        let entry = |name| Entry {
             folder: slot_folder.join(name),
-            held: None,
+            bundle: None,
         };
         Self {
-            places: [place("bundle-1"), place("bundle-2")],
+            entries: [entry("bundle-1"), entry("bundle-2")],
         }
     }
 
-    /// The unpacked bundle, fetched if it is not held. All others are forgotten, but the one that is used `beside` it. Its bytes are the ones that were
-    /// uploaded: the hash is checked on every fetch, and agents see the folder read-only. An error is
-    /// ours, or `progress` has stopped.
+    /// The unpacked bundle, fetched if it is not in the cache. All other bundles are removed, except that of the
+    /// `opponent`. The content is what was uploaded: the hash is checked on every fetch, and agents see the folder
+    /// read-only. An error is a platform fault, or `progress` was stopped.
     pub(crate) fn get(
         &mut self,
-        agent: &AgentOrder,
-        beside: Option<&AgentOrder>,
+        agent: &AgentSpec,
+        opponent: Option<&AgentSpec>,
         evaluator: &dyn Evaluator,
-        server: &dyn WorkServer,
+        server: &dyn JobServer,
         progress: &Progress,
     ) -> anyhow::Result<Unpacked> {
         let mut found = None;
         let mut free = None;
-        for place in &mut self.places {
-            if let Some(bundle) = place.holds(agent) {
+        for entry in &mut self.entries {
+            if let Some(bundle) = entry.get(agent) {
                 found = Some(bundle);
-            } else if beside.is_none_or(|beside| place.holds(beside).is_none()) {
-                place.forget()?;
-                // The first that is free: one agent alone is always in the same place.
-                free = free.or(Some(place));
+            } else if opponent.is_none_or(|opponent| entry.get(opponent).is_none()) {
+                entry.clear()?;
+                // The first free entry, so that a single agent is always in the same one.
+                free = free.or(Some(entry));
             }
         }
         match (found, free) {
             (Some(bundle), _) => Ok(Unpacked::Bundle(bundle)),
-            (None, Some(place)) => place.take(agent, evaluator, server, progress),
-            (None, None) => anyhow::bail!("both places of a slot hold the same bundle"),
+            (None, Some(entry)) => entry.fill(agent, evaluator, server, progress),
+            (None, None) => anyhow::bail!("both cache entries of a slot hold the same bundle"),
         }
     }
 }
 
-impl Place {
-    /// The bundle, if it is here.
-    fn holds(&self, agent: &AgentOrder) -> Option<Bundle> {
-        let (hash, held) = self.held.as_ref()?;
-        (*hash == agent.bundle.blake3).then(|| held.clone())
+impl Entry {
+    /// The agent's bundle, if this entry holds it.
+    fn get(&self, agent: &AgentSpec) -> Option<Bundle> {
+        let (hash, bundle) = self.bundle.as_ref()?;
+        (*hash == agent.bundle.blake3).then(|| bundle.clone())
     }
 
-    fn forget(&mut self) -> anyhow::Result<()> {
-        self.held = None;
+    fn clear(&mut self) -> anyhow::Result<()> {
+        self.bundle = None;
         if self.folder.exists() {
             fs::remove_dir_all(&self.folder)?;
         }
         Ok(())
     }
 
-    /// Fetches a bundle into this place, where nothing is.
-    fn take(
+    /// Fetches a bundle into this entry, which must be empty.
+    fn fill(
         &mut self,
-        agent: &AgentOrder,
+        agent: &AgentSpec,
         evaluator: &dyn Evaluator,
-        server: &dyn WorkServer,
+        server: &dyn JobServer,
         progress: &Progress,
     ) -> anyhow::Result<Unpacked> {
         let fetched = self.fetch(agent, evaluator, server, progress);
-        // What is of no use must not keep the room that the next one needs.
+        // An invalid or partial bundle must not take space that the next one needs.
         if !matches!(fetched, Ok(Unpacked::Bundle(_)))
             && self.folder.exists()
             && let Err(error) = fs::remove_dir_all(&self.folder)
         {
-            tracing::warn!(%error, "a part of a bundle is left");
+            tracing::warn!(%error, "a partial bundle could not be removed");
         }
         let unpacked = fetched?;
         if let Unpacked::Bundle(bundle) = &unpacked {
-            self.held = Some((agent.bundle.blake3.clone(), bundle.clone()));
+            self.bundle = Some((agent.bundle.blake3.clone(), bundle.clone()));
         }
         Ok(unpacked)
     }
 
     fn fetch(
         &self,
-        agent: &AgentOrder,
+        agent: &AgentSpec,
         evaluator: &dyn Evaluator,
-        server: &dyn WorkServer,
+        server: &dyn JobServer,
         progress: &Progress,
     ) -> anyhow::Result<Unpacked> {
         let unpacked = self.folder.join("unpacked");
@@ -133,7 +133,7 @@ impl Place {
         let bundle = match opened {
             Ok(bundle) => bundle,
             Err(BundleError::Invalid(reason)) => {
-                // What was refused is not kept until the next bundle comes.
+                // An invalid bundle is removed at once.
                 fs::remove_dir_all(&self.folder)?;
                 return Ok(Unpacked::Invalid(reason));
             }

@@ -3,29 +3,29 @@ use faceoff_sandbox::affinity;
 /// The CPUs of one slot.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct SlotCpus {
-    /// Where the simulator's thread is pinned; empty = not pinned.
+    /// CPUs that the simulator's thread is pinned to; empty: not pinned.
     pub simulator: Vec<usize>,
-    /// Where each of the agents that play at a time may run; empty = anywhere.
+    /// CPUs of each agent that runs at the same time; empty: any CPU.
     pub agents: Vec<Vec<usize>>,
 }
 
 impl SlotCpus {
-    /// Those of one agent, counted from 0.
+    /// The CPUs of one agent, counted from 0.
     #[must_use]
-    pub fn of_agent(&self, agent: usize) -> &[usize] {
+    pub fn agent_cpus(&self, agent: usize) -> &[usize] {
         self.agents.get(agent).map_or(&[], Vec::as_slice)
     }
 
-    /// Those of both sides of a game. What a slot has for one agent is halved, so that three CPUs keep the simulator
-    /// and both sides apart. Where there is one for both, they share it with the simulator, and it the simulator's with
-    /// them: what the others took of an answer is told apart as anywhere.
+    /// The CPUs of both sides of a game. The agent CPUs of a slot are halved, so three CPUs separate the simulator and
+    /// both sides. With only one agent CPU, the sides and the simulator share all CPUs of the slot; host interference
+    /// is measured as usual.
     #[must_use]
-    pub fn of_a_game(&self) -> [Vec<usize>; 2] {
+    pub fn side_cpus(&self) -> [Vec<usize>; 2] {
         match &self.agents[..] {
             [first, second, ..] => [first.clone(), second.clone()],
             [both] if both.len() > 1 => {
                 let (first, second) = both.split_at(both.len() / 2);
-                // As many each, so that neither is favoured.
+                // The same number for each side, so that neither has an advantage.
                 [first.to_vec(), second[..first.len()].to_vec()]
             }
             _ => {
@@ -39,27 +39,27 @@ impl SlotCpus {
     }
 }
 
-/// Which slot runs where. An agent is timed, so it shares its CPUs with neither its simulator nor
-/// its opponent nor another slot, where there are enough.
+/// The CPUs of all slots. Agents are timed, so if there are enough CPUs, an agent shares its own with neither the
+/// simulator nor its opponent nor another slot.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct CpuLayout {
-    /// One per slot.
+    /// One entry per slot.
     pub slots: Vec<SlotCpus>,
-    /// Does an agent share its CPUs, because there are too few?
+    /// Do agents share CPUs because there are too few?
     pub shared: bool,
-    /// Where the rest of a server runs: requests, database, schedule. Empty = anywhere.
+    /// CPUs for the rest of a server: requests, database, schedule. Empty: any CPU.
     pub service: Vec<usize>,
 }
 
 impl CpuLayout {
-    /// Divides these CPUs among `slots` slots with so many `agents` each: of each slot's equal share
-    /// the first is the simulator's, and the others are the agents', in equal parts. Where that leaves
-    /// an agent without, nothing is pinned, and the operating system balances.
+    /// Divides the CPUs among `slots` slots with `agents` agents each. The first CPU of each slot's equal share is for
+    /// the simulator; the others are for the agents, in equal parts. If that leaves an agent without a CPU, nothing is
+    /// pinned, and the operating system balances the load.
     #[must_use]
     pub fn divide(cpus: &[usize], slots: usize, agents: usize) -> Self {
         let share = cpus.len().checked_div(slots).unwrap_or(0);
-        let of_each_agent = share.saturating_sub(1).checked_div(agents).unwrap_or(0);
-        if of_each_agent == 0 {
+        let per_agent = share.saturating_sub(1).checked_div(agents).unwrap_or(0);
+        if per_agent == 0 {
             let unpinned = SlotCpus {
                 simulator: Vec::new(),
                 agents: vec![Vec::new(); agents],
@@ -76,7 +76,7 @@ impl CpuLayout {
             .map(|cpus| SlotCpus {
                 simulator: vec![cpus[0]],
                 agents: cpus[1..]
-                    .chunks_exact(of_each_agent)
+                    .chunks_exact(per_agent)
                     .take(agents)
                     .map(<[usize]>::to_vec)
                     .collect(),
@@ -89,11 +89,11 @@ impl CpuLayout {
         }
     }
 
-    /// [`Self::divide`] beside a server that answers strangers. Where slots leave a CPU over, a quarter of
-    /// all CPUs, but at least one, is the server's alone, the first ones, which take most devices'
-    /// interrupts; where they leave none it shares the simulators', and never an agent's.
+    /// [`Self::divide`] for a host that also runs a server. If slots leave CPUs over, the server has up to a quarter of
+    /// all CPUs, but at least one, for itself: the first ones, which handle most device interrupts. Otherwise it
+    /// shares the simulators' CPUs, never an agent's.
     #[must_use]
-    pub fn beside_a_service(cpus: &[usize], slots: usize, agents: usize) -> Self {
+    pub fn with_service(cpus: &[usize], slots: usize, agents: usize) -> Self {
         let left_over = cpus.len().saturating_sub(slots * (1 + agents));
         let (service, rest) = cpus.split_at(left_over.min((cpus.len() / 4).max(1)));
         let mut layout = Self::divide(rest, slots, agents);
@@ -106,8 +106,8 @@ impl CpuLayout {
         layout
     }
 
-    /// All agents on `agents`, one slot at a time or not, as the organiser wants it. Of the other CPUs
-    /// each simulator has one and the server the rest; where they are too few, all of these share them.
+    /// All agents on the CPUs `agents`, as configured by the organiser. Each simulator has one of the other CPUs and
+    /// the server the rest; if they are too few, simulators and server share them.
     #[must_use]
     pub fn with_agents_on(agents: &[usize], cpus: &[usize], slots: usize) -> Self {
         let others: Vec<usize> = cpus
@@ -132,22 +132,22 @@ impl CpuLayout {
         }
     }
 
-    /// The layout of a server on this host, for `slots` slots of one agent each; `agent_cpus` as the
-    /// organiser has set them, empty if not. To be asked before a thread is pinned.
+    /// The layout of a server on this host, for `slots` slots of one agent each. `agent_cpus` are those configured by
+    /// the organiser, if any. Call this before any thread is pinned.
     #[must_use]
-    pub fn of_a_server(slots: usize, agent_cpus: &[usize]) -> Self {
+    pub fn for_server(slots: usize, agent_cpus: &[usize]) -> Self {
         let cpus = affinity::allowed().unwrap_or_else(|error| {
-            tracing::warn!(%error, "cannot ask for this process's CPUs; nothing is pinned");
+            tracing::warn!(%error, "cannot read this process's CPUs; nothing is pinned");
             Vec::new()
         });
         if !agent_cpus.is_empty() {
             return Self::with_agents_on(agent_cpus, &cpus, slots);
         }
-        let layout = Self::beside_a_service(&cpus, slots, 1);
+        let layout = Self::with_service(&cpus, slots, 1);
         if layout.shared {
             tracing::warn!(
                 slots,
-                "fewer than two CPUs per slot: agents share theirs, and computation times are uneven"
+                "fewer than two CPUs per slot: agents share CPUs, and computation times are uneven"
             );
         }
         layout
@@ -159,7 +159,7 @@ impl CpuLayout {
     }
 }
 
-/// Pins the calling thread. Timings are less even without it, results are the same.
+/// Pins the calling thread. Without it timings vary more, but results are the same.
 pub(crate) fn pin_simulator(cpus: &[usize]) {
     if let Err(error) = affinity::pin_current_thread(cpus) {
         tracing::warn!(%error, ?cpus, "cannot pin the simulator's thread");
@@ -182,7 +182,7 @@ mod tests {
     }
 
     #[test]
-    fn two_cpus_one_slot_separates_simulator_and_agent() {
+    fn two_cpus_separate_simulator_and_agent() {
         let layout = CpuLayout::divide(&first(2), 1, 1);
         let slots = vec![slot(&[0], &[&[1]])];
         assert_eq!(
@@ -196,33 +196,33 @@ mod tests {
     }
 
     #[test]
-    fn opponents_have_as_many_cpus_each() {
+    fn opponents_have_equally_many_cpus() {
         let layout = CpuLayout::divide(&first(6), 1, 2);
         assert_eq!(layout.slots, [slot(&[0], &[&[1, 2], &[3, 4]])]);
-        assert_eq!(layout.slots[0].of_agent(1), [3, 4]);
+        assert_eq!(layout.slots[0].agent_cpus(1), [3, 4]);
     }
 
     #[test]
-    fn the_sides_of_a_game_have_halves_of_a_slots_cpus_or_share_them_all() {
-        let of_a_game = |simulator: &[usize], agents: &[&[usize]]| {
-            let [first, second] = slot(simulator, agents).of_a_game();
+    fn sides_split_a_slots_cpus_or_share_them() {
+        let side_cpus = |simulator: &[usize], agents: &[&[usize]]| {
+            let [first, second] = slot(simulator, agents).side_cpus();
             (first, second)
         };
         let (none, one) = (Vec::new(), vec![1]);
-        assert_eq!(of_a_game(&[0], &[&[1, 2]]), (one.clone(), vec![2]));
+        assert_eq!(side_cpus(&[0], &[&[1, 2]]), (one.clone(), vec![2]));
         assert_eq!(
-            of_a_game(&[0], &[&[1, 2, 3, 4, 5]]),
+            side_cpus(&[0], &[&[1, 2, 3, 4, 5]]),
             (vec![1, 2], vec![3, 4])
         );
-        assert_eq!(of_a_game(&[0], &[&[1], &[2]]), (one, vec![2]));
-        assert_eq!(of_a_game(&[1], &[&[0]]), (vec![0, 1], vec![0, 1]));
-        assert_eq!(of_a_game(&[], &[&[3]]), (vec![3], vec![3]));
-        assert_eq!(of_a_game(&[], &[&[]]), (none.clone(), none));
-        // As docs/operating.md advises.
+        assert_eq!(side_cpus(&[0], &[&[1], &[2]]), (one, vec![2]));
+        assert_eq!(side_cpus(&[1], &[&[0]]), (vec![0, 1], vec![0, 1]));
+        assert_eq!(side_cpus(&[], &[&[3]]), (vec![3], vec![3]));
+        assert_eq!(side_cpus(&[], &[&[]]), (none.clone(), none));
+        // As recommended in docs/monitoring.md.
         for cpus in 7..=16 {
-            let layout = CpuLayout::beside_a_service(&first(cpus), 2, 1);
+            let layout = CpuLayout::with_service(&first(cpus), 2, 1);
             for slot in &layout.slots {
-                let [first, second] = slot.of_a_game();
+                let [first, second] = slot.side_cpus();
                 assert!(!first.is_empty() && !second.is_empty(), "{cpus}");
                 assert!(first.iter().all(|cpu| !second.contains(cpu)), "{cpus}");
                 assert!(!first.contains(&slot.simulator[0]), "{cpus}");
@@ -248,7 +248,7 @@ mod tests {
     }
 
     #[test]
-    fn no_cpu_belongs_to_two() {
+    fn cpus_are_not_assigned_twice() {
         for cpus in 2..20 {
             for (slots, agents) in (1..=cpus / 2).flat_map(|slots| [(slots, 1), (slots, 2)]) {
                 let layout = CpuLayout::divide(&first(cpus), slots, agents);
@@ -268,7 +268,7 @@ mod tests {
     }
 
     #[test]
-    fn a_server_has_cpus_of_its_own_where_slots_leave_one_and_never_an_agents() {
+    fn server_never_shares_an_agents_cpus() {
         for (cpus, slots, service) in [
             (1, 1, &[][..]),
             (2, 1, &[0]),
@@ -279,7 +279,7 @@ mod tests {
             (8, 3, &[0, 1]),
             (9, 4, &[0]),
         ] {
-            let layout = CpuLayout::beside_a_service(&first(cpus), slots, 1);
+            let layout = CpuLayout::with_service(&first(cpus), slots, 1);
             assert_eq!(layout.service, service, "{cpus} CPUs, {slots} slots");
             assert_eq!(layout.slots.len(), slots);
             let agents: Vec<_> = layout.slots.iter().flat_map(|s| &s.agents[0]).collect();
@@ -292,7 +292,7 @@ mod tests {
     }
 
     #[test]
-    fn agents_where_the_organiser_wants_them_leave_the_rest_to_the_others() {
+    fn configured_agent_cpus_leave_the_rest_to_others() {
         let layout = |agents: &[usize], cpus, slots| {
             let layout = CpuLayout::with_agents_on(agents, &first(cpus), slots);
             (layout.simulators(), layout.service)

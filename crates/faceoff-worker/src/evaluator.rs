@@ -1,14 +1,14 @@
 use faceoff_runner::{
-    AgentEnvironment, Assembled, Commentary, EvaluationMeta, GameAudience, GameReport, GameSpec,
-    Observer, POSITION_EVERY, PlatformFault, ShardReport, ShardSpec, SmokeReport, SmokeSpec,
+    AgentEnvironment, Assembled, LiveFeed, EvaluationMeta, LiveFeedSink, GameReport, GameSpec,
+    Observer, POSITION_INTERVAL, PlatformFault, ShardReport, ShardSpec, ValidationReport, ValidationSpec,
     bundle::{self, Bundle, BundleError, BundleLimits},
 };
 use std::path::{Path, PathBuf};
 
-/// What a slot does with its units. One implementation, the runner; tests put faults of ours in its
-/// place, which cannot be had from a healthy machine.
+/// Runs the jobs of a slot. The only implementation is the runner; tests replace it to inject platform faults, which a
+/// healthy machine does not have.
 pub(crate) trait Evaluator: Send + Sync {
-    /// Unpacks an uploaded archive, unless `cancelled`.
+    /// Unpacks an uploaded archive, unless `cancelled` returns true.
     fn unpack(
         &self,
         archive: &Path,
@@ -17,17 +17,17 @@ pub(crate) trait Evaluator: Send + Sync {
         cancelled: &dyn Fn() -> bool,
     ) -> Result<Bundle, BundleError>;
 
-    /// Does the agent start, answer and keep time?
-    fn smoke(
+    /// Checks that the agent starts, answers and keeps the time limits.
+    fn validate(
         &self,
-        spec: &SmokeSpec,
+        spec: &ValidationSpec,
         bundle: &Bundle,
         env: &AgentEnvironment,
         cancelled: &dyn Fn() -> bool,
-    ) -> Result<SmokeReport, PlatformFault>;
+    ) -> Result<ValidationReport, PlatformFault>;
 
-    /// Plays a shard; its recording is left in `out`.
-    fn play(
+    /// Plays a shard and writes its recording into `out`.
+    fn play_shard(
         &self,
         spec: &ShardSpec,
         bundle: &Bundle,
@@ -36,17 +36,17 @@ pub(crate) trait Evaluator: Send + Sync {
         observer: &mut dyn Observer,
     ) -> Result<ShardReport, PlatformFault>;
 
-    /// Plays a game; its files are left in `out`. Pairs are the home side's first.
+    /// Plays a game and writes its files into `out`. In pairs, the home side comes first.
     fn play_game(
         &self,
         spec: &GameSpec,
         bundles: [&Bundle; 2],
         envs: [&AgentEnvironment; 2],
         out: &Path,
-        audience: &mut dyn GameAudience,
+        audience: &mut dyn LiveFeedSink,
     ) -> Result<GameReport, PlatformFault>;
 
-    /// Joins recordings into a dataset and scores them.
+    /// Merges recordings into a dataset and scores them.
     fn assemble(
         &self,
         meta: &EvaluationMeta,
@@ -56,7 +56,7 @@ pub(crate) trait Evaluator: Send + Sync {
     ) -> Result<Assembled, PlatformFault>;
 }
 
-/// The evaluator that `faceoff eval` runs, too.
+/// The evaluator that `faceoff eval` also uses.
 #[derive(Debug)]
 pub(crate) struct Runner;
 
@@ -71,17 +71,17 @@ impl Evaluator for Runner {
         bundle::unpack(archive, into, limits, cancelled)
     }
 
-    fn smoke(
+    fn validate(
         &self,
-        spec: &SmokeSpec,
+        spec: &ValidationSpec,
         bundle: &Bundle,
         env: &AgentEnvironment,
         cancelled: &dyn Fn() -> bool,
-    ) -> Result<SmokeReport, PlatformFault> {
-        faceoff_runner::smoke(spec, bundle, env, cancelled)
+    ) -> Result<ValidationReport, PlatformFault> {
+        faceoff_runner::validate(spec, bundle, env, cancelled)
     }
 
-    fn play(
+    fn play_shard(
         &self,
         spec: &ShardSpec,
         bundle: &Bundle,
@@ -98,9 +98,9 @@ impl Evaluator for Runner {
         bundles: [&Bundle; 2],
         envs: [&AgentEnvironment; 2],
         out: &Path,
-        audience: &mut dyn GameAudience,
+        audience: &mut dyn LiveFeedSink,
     ) -> Result<GameReport, PlatformFault> {
-        let mut commentary = Commentary::new(audience, POSITION_EVERY);
+        let mut commentary = LiveFeed::new(audience, POSITION_INTERVAL);
         let report = faceoff_runner::run_game(spec, bundles, envs, out, &mut commentary)?;
         commentary.end(&report);
         Ok(report)

@@ -1,20 +1,20 @@
-//! The kinds of work, each from its order to what is to be reported.
+//! Runs the jobs of a slot, one method per kind of job.
 
 use crate::{
     bundle_cache::{BundleCache, Unpacked},
     cpus::SlotCpus,
     evaluator::Evaluator,
     lease::Progress,
-    server::WorkServer,
-    shown::Shown,
+    server::JobServer,
+    game_broadcast::GameBroadcast,
 };
 use anyhow::Context as _;
 use faceoff_runner::{AgentEnvironment, CLIPS_FILE, GameSpec, Supervision, bundle::Bundle};
 use faceoff_sandbox::{Isolation, Runtime};
-use faceoff_types::{AgentLimits, GameId, SlotTiming, SmokeOutcome, StageRuntimes};
-use faceoff_wire::work::{
-    AgentOrder, Assignment, EvaluationMeta, Keeps, Lease, ShardSpec, SmokeSpec, StoredGame,
-    WorkOrder, WorkReport,
+use faceoff_types::{AgentLimits, GameId, SlotTiming, ValidationOutcome, StageRuntimes};
+use faceoff_wire::job::{
+    AgentSpec, JobPayload, EvaluationMeta, OutputFiles, Lease, ShardSpec, ValidationSpec, GameFiles,
+    JobSpec, JobReport,
 };
 use std::{
     collections::BTreeMap,
@@ -22,20 +22,20 @@ use std::{
     sync::Arc,
 };
 
-/// Carries out a slot's orders. All errors are faults of ours; a unit that is no longer the slot's
-/// ends by one, too, soon after [`Progress::stopped`] says so.
+/// Runs the jobs of a slot. All errors are platform faults, with one exception: a job also ends with an error soon after
+/// [`Progress::stopped`] becomes true.
 pub(crate) struct Executor {
-    /// How evenly the slot kept time in the last shard that it played.
+    /// Timing quality of the slot in the last shard.
     pub(crate) timing: Option<SlotTiming>,
-    pub(crate) server: Arc<dyn WorkServer>,
+    pub(crate) server: Arc<dyn JobServer>,
     pub(crate) evaluator: Arc<dyn Evaluator>,
     pub(crate) host: AgentHost,
-    /// For what is under way.
+    /// Folder for temporary files of the current job.
     pub(crate) folder: PathBuf,
     pub(crate) bundles: BundleCache,
 }
 
-/// What the slot's machine gives to agents; what they are held to stands in the order.
+/// The part of an agent's environment that depends on the slot's machine; the limits are part of the job.
 #[derive(Debug, Clone)]
 pub(crate) struct AgentHost {
     pub(crate) isolation: Isolation,
@@ -45,9 +45,9 @@ pub(crate) struct AgentHost {
 }
 
 impl AgentHost {
-    /// Of an agent that plays alone.
+    /// The environment of a single agent.
     fn environment(&self, limits: &AgentLimits, progress: &Progress) -> AgentEnvironment {
-        self.environment_on(self.cpus.of_agent(0).to_vec(), limits, progress)
+        self.environment_on(self.cpus.agent_cpus(0).to_vec(), limits, progress)
     }
 
     fn environment_on(
@@ -64,72 +64,73 @@ impl AgentHost {
             runtimes: self.runtimes.clone(),
             images: self.images,
             agent_cpus,
-            supervision: Supervision::of(move || progress.stopped()),
+            supervision: Supervision::new(move || progress.stopped()),
         }
     }
 }
 
 impl Executor {
-    pub(crate) fn report(
+    /// Runs a job and returns its report.
+    pub(crate) fn run(
         &mut self,
-        order: &WorkOrder,
+        job: &JobSpec,
         progress: &Progress,
-    ) -> anyhow::Result<WorkReport> {
-        match &order.assignment {
-            Assignment::Smoke {
+    ) -> anyhow::Result<JobReport> {
+        match &job.payload {
+            JobPayload::Validation {
                 agent,
                 spec,
                 runtimes,
                 ..
             } => self
-                .smoke(agent, spec, runtimes, progress)
-                .map(WorkReport::Smoke),
-            Assignment::Play {
-                agent, spec, keeps, ..
-            } => self.play(agent, spec, keeps, progress.clone()),
-            Assignment::Game {
+                .validate(agent, spec, runtimes, progress)
+                .map(JobReport::Validation),
+            JobPayload::Shard {
+                agent, spec, output, ..
+            } => self.play_shard(agent, spec, output, progress.clone()),
+            JobPayload::Game {
                 game,
                 attempt,
                 agents,
                 spec,
                 recording,
             } => {
-                let shown = self.show(&order.lease, (*game, *attempt), spec.steps, progress);
-                self.game(agents, spec, recording.as_deref(), shown)
+                let broadcast = self.broadcast(&job.lease, (*game, *attempt), spec.steps, progress);
+                self.play_game(agents, spec, recording.as_deref(), broadcast)
             }
-            Assignment::Finalise {
+            JobPayload::Scoring {
                 meta,
                 recordings,
                 dataset,
                 ..
-            } => self.finalise(meta, recordings, dataset),
+            } => self.score(meta, recordings, dataset),
         }
     }
 
     fn bundle(
         &mut self,
-        agent: &AgentOrder,
-        beside: Option<&AgentOrder>,
+        agent: &AgentSpec,
+        opponent: Option<&AgentSpec>,
         progress: &Progress,
     ) -> anyhow::Result<Unpacked> {
         self.bundles
-            .get(agent, beside, &*self.evaluator, &*self.server, progress)
+            .get(agent, opponent, &*self.evaluator, &*self.server, progress)
     }
 
-    /// The bundle of a valid submission: it passed its smoke run, so that the archive is not to blame.
+    /// The bundle of a valid submission. It passed validation, so an invalid archive is a platform fault.
     fn valid_bundle(
         &mut self,
-        agent: &AgentOrder,
-        beside: Option<&AgentOrder>,
+        agent: &AgentSpec,
+        opponent: Option<&AgentSpec>,
         progress: &Progress,
     ) -> anyhow::Result<Bundle> {
-        match self.bundle(agent, beside, progress)? {
+        match self.bundle(agent, opponent, progress)? {
             Unpacked::Bundle(bundle) => Ok(bundle),
             Unpacked::Invalid(reason) => anyhow::bail!(reason),
         }
     }
 
-    /// An empty folder that vanishes with its guard.
+    /// An empty folder that is removed when the returned guard is dropped.
     fn folder(&self, purpose: &str) -> anyhow::Result<tempfile::TempDir> {
         tempfile::Builder::new()
             .prefix(purpose)
@@ -137,18 +138,18 @@ impl Executor {
             .with_context(|| format!("making a folder for the {purpose}"))
     }
 
-    /// Checks an uploaded bundle in the very sandbox and under the very limits of the real run.
-    fn smoke(
+    /// Validates an uploaded bundle in the same sandbox and under the same limits as an evaluation.
+    fn validate(
         &mut self,
-        agent: &AgentOrder,
-        spec: &SmokeSpec,
+        agent: &AgentSpec,
+        spec: &ValidationSpec,
         runtimes: &[StageRuntimes],
         progress: &Progress,
-    ) -> anyhow::Result<SmokeOutcome> {
+    ) -> anyhow::Result<ValidationOutcome> {
         let bundle = match self.bundle(agent, None, progress)? {
             Unpacked::Bundle(bundle) => bundle,
             Unpacked::Invalid(reason) => {
-                return Ok(SmokeOutcome::Invalid {
+                return Ok(ValidationOutcome::Invalid {
                     agent_name: None,
                     runtime: None,
                     reason,
@@ -158,8 +159,8 @@ impl Executor {
             }
         };
         let runtime = bundle.manifest.runtime.clone();
-        if let Some(reason) = StageRuntimes::refused_by_all(runtimes, &runtime) {
-            return Ok(SmokeOutcome::Invalid {
+        if let Some(reason) = StageRuntimes::reasons_if_all_refuse(runtimes, &runtime) {
+            return Ok(ValidationOutcome::Invalid {
                 agent_name: Some(bundle.manifest.name),
                 runtime: Some(runtime),
                 reason,
@@ -168,52 +169,52 @@ impl Executor {
             });
         }
         let environment = self.host.environment(&agent.limits, progress);
-        let smoke = self
+        let found = self
             .evaluator
-            .smoke(spec, &bundle, &environment, &|| progress.stopped())?;
-        let (agent_name, timing, log) = (bundle.manifest.name, smoke.timing, smoke.log);
-        Ok(match smoke.defect {
-            None => SmokeOutcome::Valid {
+            .validate(spec, &bundle, &environment, &|| progress.stopped())?;
+        let (agent_name, timing, log) = (bundle.manifest.name, found.timing, found.log);
+        Ok(match found.failure {
+            None => ValidationOutcome::Valid {
                 agent_name,
                 runtime,
                 timing,
                 log,
             },
-            Some(defect) => SmokeOutcome::Invalid {
+            Some(failure) => ValidationOutcome::Invalid {
                 agent_name: Some(agent_name),
                 runtime: Some(runtime),
-                reason: defect.to_string(),
+                reason: failure.to_string(),
                 timing,
                 log,
             },
         })
     }
 
-    /// Plays a shard and stores what is kept of it.
-    fn play(
+    /// Plays a shard and stores its output files.
+    fn play_shard(
         &mut self,
-        agent: &AgentOrder,
+        agent: &AgentSpec,
         spec: &ShardSpec,
-        keeps: &Keeps,
+        output: &OutputFiles,
         mut progress: Progress,
-    ) -> anyhow::Result<WorkReport> {
+    ) -> anyhow::Result<JobReport> {
         let bundle = self.valid_bundle(agent, None, &progress)?;
         let environment = self.host.environment(&agent.limits, &progress);
         let out = self.folder("recording")?;
         let played = self
             .evaluator
-            .play(spec, &bundle, &environment, out.path(), &mut progress)?;
-        // What follows is what depends on where the slot is.
+            .play_shard(spec, &bundle, &environment, out.path(), &mut progress)?;
+        // The steps after this one depend on whether the slot is local or remote.
         tracing::debug!("played");
-        let recording = match keeps {
-            Keeps::Nothing => None,
-            Keeps::Clips(key) => {
+        let recording = match output {
+            OutputFiles::None => None,
+            OutputFiles::Clips(key) => {
                 self.server
                     .store_clips(key, &out.path().join(CLIPS_FILE))
                     .context("storing the clips")?;
                 None
             }
-            Keeps::Recording(key) => {
+            OutputFiles::Recording(key) => {
                 self.server
                     .store_recording(key, out.path())
                     .context("storing the recording")?;
@@ -221,7 +222,7 @@ impl Executor {
             }
         };
         self.timing = Some(played.timing);
-        Ok(WorkReport::Play {
+        Ok(JobReport::Shard {
             outcomes: played.outcomes,
             log: played.log,
             stopped_by_faults: played.stopped_by_faults,
@@ -229,8 +230,8 @@ impl Executor {
         })
     }
 
-    fn show(&self, lease: &Lease, game: (GameId, u32), steps: u32, progress: &Progress) -> Shown {
-        Shown::begin(
+    fn broadcast(&self, lease: &Lease, game: (GameId, u32), steps: u32, progress: &Progress) -> GameBroadcast {
+        GameBroadcast::begin(
             Arc::clone(&self.server),
             lease.clone(),
             game,
@@ -239,25 +240,25 @@ impl Executor {
         )
     }
 
-    /// Plays a game, before those who watch, and stores its files, if they are kept.
-    fn game(
+    /// Plays a game with a live broadcast, and stores its files if required.
+    fn play_game(
         &mut self,
-        agents: &[AgentOrder; 2],
+        agents: &[AgentSpec; 2],
         spec: &GameSpec,
         recording: Option<&str>,
-        mut shown: Shown,
-    ) -> anyhow::Result<WorkReport> {
+        mut broadcast: GameBroadcast,
+    ) -> anyhow::Result<JobReport> {
         let [first, second] = agents;
         let bundles = [
-            self.valid_bundle(first, Some(second), shown.progress())?,
-            self.valid_bundle(second, Some(first), shown.progress())?,
+            self.valid_bundle(first, Some(second), broadcast.progress())?,
+            self.valid_bundle(second, Some(first), broadcast.progress())?,
         ];
-        let [first_cpus, second_cpus] = self.host.cpus.of_a_game();
+        let [first_cpus, second_cpus] = self.host.cpus.side_cpus();
         let envs = [
             self.host
-                .environment_on(first_cpus, &first.limits, shown.progress()),
+                .environment_on(first_cpus, &first.limits, broadcast.progress()),
             self.host
-                .environment_on(second_cpus, &second.limits, shown.progress()),
+                .environment_on(second_cpus, &second.limits, broadcast.progress()),
         ];
         let out = self.folder("game")?;
         let played = self.evaluator.play_game(
@@ -265,7 +266,7 @@ impl Executor {
             bundles.each_ref(),
             envs.each_ref(),
             out.path(),
-            &mut shown,
+            &mut broadcast,
         )?;
         if let Some(key) = recording {
             self.server
@@ -273,9 +274,9 @@ impl Executor {
                 .context("storing the game's recording")?;
         }
         let archives = played.archives;
-        Ok(WorkReport::Game {
+        Ok(JobReport::Game {
             score: serde_json::to_value(&archives.score).context("a game's score")?,
-            recording: recording.map(|key| StoredGame {
+            recording: recording.map(|key| GameFiles {
                 key: key.to_owned(),
                 game_blake3: archives.game.blake3,
                 side_blake3: archives.sides.map(|file| file.blake3),
@@ -284,31 +285,31 @@ impl Executor {
         })
     }
 
-    /// Joins the shards' recordings into the dataset, scores them and stores the dataset.
-    fn finalise(
+    /// Merges the shards' recordings into the dataset, scores them and stores the dataset.
+    fn score(
         &self,
         meta: &EvaluationMeta,
         recordings: &[String],
         dataset: &str,
-    ) -> anyhow::Result<WorkReport> {
-        let work = self.folder("dataset")?;
-        let recordings = self.fetch_recordings(recordings, work.path())?;
-        let archive = work.path().join("dataset.zip");
-        let clips = work.path().join("clips");
+    ) -> anyhow::Result<JobReport> {
+        let folder = self.folder("dataset")?;
+        let recordings = self.fetch_recordings(recordings, folder.path())?;
+        let archive = folder.path().join("dataset.zip");
+        let clips = folder.path().join("clips");
         let assembled = self
             .evaluator
             .assemble(meta, &recordings, &archive, &clips)?;
         self.server
             .store_dataset(dataset, &archive, assembled.clips.then_some(&*clips))
             .context("storing the dataset")?;
-        Ok(WorkReport::Finalise {
+        Ok(JobReport::Scoring {
             dataset: dataset.to_owned(),
             blake3: assembled.archive.blake3,
             result: Box::new(assembled.result),
         })
     }
 
-    /// Copies recordings into folders of their own.
+    /// Copies each recording into its own folder.
     fn fetch_recordings(&self, keys: &[String], into: &Path) -> anyhow::Result<Vec<PathBuf>> {
         let mut folders = Vec::with_capacity(keys.len());
         for (position, key) in keys.iter().enumerate() {

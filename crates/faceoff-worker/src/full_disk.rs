@@ -1,45 +1,45 @@
-//! A full disk is nobody's failure: what it interrupts is done again, and meanwhile nothing is begun.
+//! Handling of full disks. An interrupted job is repeated without counting the attempt, and no job starts meanwhile.
 
 use faceoff_runner::{PlatformFault, bundle::BundleError};
 use faceoff_store::{Store, StoreError};
-use faceoff_types::tells_of_full_disk;
+use faceoff_types::is_full_disk;
 use jiff::Timestamp;
 use std::sync::Arc;
 use tokio::sync::Mutex;
 
-/// Does the error, or one that caused it, tell of a full disk?
-pub(crate) fn is_told_by(error: &anyhow::Error) -> bool {
+/// Is a full disk the cause of this error?
+pub(crate) fn is_cause_of(error: &anyhow::Error) -> bool {
     error.chain().any(|cause| {
-        tells_of_full_disk(cause)
-            || matches!(cause.downcast_ref(), Some(StoreError::FullDisk(_)))
+        is_full_disk(cause)
+            || matches!(cause.downcast_ref(), Some(StoreError::DiskFull(_)))
             || matches!(cause.downcast_ref(), Some(PlatformFault::FullDisk(_)))
-            || matches!(cause.downcast_ref(), Some(BundleError::Io(error)) if tells_of_full_disk(error))
+            || matches!(cause.downcast_ref(), Some(BundleError::Io(error)) if is_full_disk(error))
     })
 }
 
-/// While there is too little room nothing is claimed.
+/// Stops claiming jobs while there is too little free disk space.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Pause {
-    held: Arc<Mutex<bool>>,
+pub(crate) struct ClaimPause {
+    is_active: Arc<Mutex<bool>>,
 }
 
-impl Pause {
-    /// Is nothing to be claimed now? At its end every lease gets a new time before the first claim: those
-    /// that ran out did so because no renewal could be written, and their slots are at work.
-    pub(crate) async fn holds(
+impl ClaimPause {
+    /// Is claiming paused now? When the pause ends, all leases are renewed before the next claim: renewals could not be
+    /// written, so leases of running jobs may have expired.
+    pub(crate) async fn is_active(
         &self,
         store: &Store,
         lease_s: u32,
         now: Timestamp,
     ) -> Result<bool, StoreError> {
-        let mut held = self.held.lock().await;
-        if store.room().is_short() {
-            *held = true;
-        } else if *held {
+        let mut is_active = self.is_active.lock().await;
+        if store.free_space().is_short() {
+            *is_active = true;
+        } else if *is_active {
             store.renew_all_leases(lease_s, now).await?;
-            *held = false;
+            *is_active = false;
         }
-        Ok(*held)
+        Ok(*is_active)
     }
 }
 
@@ -54,13 +54,13 @@ mod tests {
     }
 
     #[test]
-    fn a_full_disk_is_seen_in_what_the_parts_of_a_unit_fail_with() {
+    fn full_disk_is_recognised_in_all_job_errors() {
         let failed = [
-            anyhow::Error::from(StoreError::FullDisk("the queue".into())),
+            anyhow::Error::from(StoreError::DiskFull("the queue".into())),
             PlatformFault::FullDisk("steps.parquet".into()).into(),
             BundleError::Io(full()).into(),
             PlatformFault::Io {
-                what: "recording".into(),
+                action: "recording".into(),
                 source: full(),
             }
             .into(),
@@ -68,10 +68,10 @@ mod tests {
         ];
         for error in failed {
             let error = Err::<(), _>(error).context("doing this").unwrap_err();
-            assert!(is_told_by(&error), "{error:#}");
+            assert!(is_cause_of(&error), "{error:#}");
         }
         let damaged = BundleError::Io(ErrorKind::InvalidData.into());
-        assert!(!is_told_by(&damaged.into()));
-        assert!(!is_told_by(&PlatformFault::Cancelled.into()));
+        assert!(!is_cause_of(&damaged.into()));
+        assert!(!is_cause_of(&PlatformFault::Cancelled.into()));
     }
 }

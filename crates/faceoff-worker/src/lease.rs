@@ -1,6 +1,6 @@
-use crate::server::{GivenBack, Holding, WorkServer};
+use crate::server::{ReleaseReason, LeaseStatus, JobServer};
 use faceoff_types::{EpisodeOutcome, WINDOW_STEPS};
-use faceoff_wire::work::Lease;
+use faceoff_wire::job::Lease;
 use std::{
     io,
     sync::{
@@ -12,52 +12,51 @@ use std::{
 };
 use tokio_util::sync::CancellationToken;
 
-/// How often progress is looked at, so that a progress bar moves.
+/// How often progress is checked, so that progress bars move.
 const PROGRESS_TICK: Duration = Duration::from_secs(1);
 
-/// Keeps a unit's lease while a slot works on it: a thread renews it, tells the progress, notices when
-/// it is lost, and at a shutdown gives it back at once, whatever the slot is in the middle of.
-/// Dropping it waits for what the thread is telling the server, so that a slot never ends before its
-/// unit was given back.
+/// Keeps the lease of a job while a slot runs it. A thread renews the lease, reports progress and notices the loss of the
+/// lease. At a shutdown it releases the job at once, whatever the slot is doing. Dropping the keeper waits for the
+/// thread's current request, so a slot never ends before its job is released.
 #[derive(Debug)]
 pub(crate) struct LeaseKeeper {
     progress: Progress,
-    over: CancellationToken,
+    done: CancellationToken,
     /// `None` only while it is being dropped.
     thread: Option<JoinHandle<()>>,
 }
 
-/// What passes between the slot's thread and the keeper's.
+/// State shared by the slot's thread and the keeper's.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Progress {
-    /// Of a game, windows of control steps: what is to a game what an episode is to a shard.
+    /// Episodes of a shard; in a game, windows of control steps.
     episodes_done: Arc<AtomicU32>,
     stop: CancellationToken,
 }
 
 impl LeaseKeeper {
-    /// Fails when the host has no thread left.
+    /// Starts the keeper. Fails if no thread can be started.
     pub(crate) fn keep(
-        server: Arc<dyn WorkServer>,
+        server: Arc<dyn JobServer>,
         lease: Lease,
         shutdown: &CancellationToken,
     ) -> io::Result<Self> {
         let progress = Progress::default();
-        let over = shutdown.child_token();
+        let done = shutdown.child_token();
         let thread = thread::Builder::new()
             .name("faceoff-lease".to_owned())
             .spawn({
-                let (progress, over, shutdown) = (progress.clone(), over.clone(), shutdown.clone());
-                move || keep(&*server, &lease, &progress, &over, &shutdown)
+                let (progress, done, shutdown) = (progress.clone(), done.clone(), shutdown.clone());
+                move || keep(&*server, &lease, &progress, &done, &shutdown)
             })?;
         Ok(Self {
             progress,
-            over,
+            done,
             thread: Some(thread),
         })
     }
 
-    /// For the slot's thread.
+    /// A handle for the slot's thread.
     pub(crate) fn progress(&self) -> Progress {
         self.progress.clone()
     }
@@ -65,22 +64,22 @@ impl LeaseKeeper {
 
 impl Drop for LeaseKeeper {
     fn drop(&mut self) {
-        self.over.cancel();
+        self.done.cancel();
         if let Some(thread) = self.thread.take()
             && thread.join().is_err()
         {
-            tracing::error!("the thread that keeps a lease panicked; the lease will end");
+            tracing::error!("the lease keeper panicked; the lease will expire");
         }
     }
 }
 
 impl Progress {
-    /// Is the unit no longer this slot's?
+    /// Must the slot stop, because of the shutdown or a lost lease?
     pub(crate) fn stopped(&self) -> bool {
         self.stop.is_cancelled()
     }
 
-    /// So many control steps of a game were played.
+    /// Reports the number of control steps of a game played so far.
     pub(crate) fn game_stepped(&self, steps: u32) {
         self.episodes_done
             .store(steps / WINDOW_STEPS, Ordering::Relaxed);
@@ -88,7 +87,7 @@ impl Progress {
 }
 
 impl faceoff_runner::Observer for Progress {
-    fn episode_done(&mut self, _outcome: &EpisodeOutcome) {
+    fn on_episode_end(&mut self, _outcome: &EpisodeOutcome) {
         self.episodes_done.fetch_add(1, Ordering::Relaxed);
     }
 
@@ -97,48 +96,48 @@ impl faceoff_runner::Observer for Progress {
     }
 }
 
-/// Ends with the unit (`over`), with its lease or with the shutdown, which ends `over`, too.
+/// Runs until the job is done (`done`), the lease is lost or the server shuts down, which also cancels `done`.
 fn keep(
-    server: &dyn WorkServer,
+    server: &dyn JobServer,
     lease: &Lease,
     progress: &Progress,
-    over: &CancellationToken,
+    done: &CancellationToken,
     shutdown: &CancellationToken,
 ) {
-    let due_every = server.renews_every(lease);
-    let mut told = 0;
+    let interval = server.renewal_interval(lease);
+    let mut reported = 0;
     let mut renewed_at = Instant::now();
     let mut failing = false;
     loop {
-        server.wait(over, due_every.min(PROGRESS_TICK), None);
+        server.wait(done, interval.min(PROGRESS_TICK), None);
         if shutdown.is_cancelled() {
             progress.stop.cancel();
-            if let Err(error) = server.give_back(lease, GivenBack::Shutdown) {
-                tracing::warn!(unit = %lease.unit, cause = format!("{error:#}"), "the unit could not be given back; its lease will end");
+            if let Err(error) = server.release(lease, ReleaseReason::Shutdown) {
+                tracing::warn!(job = %lease.job_id, cause = format!("{error:#}"), "the job could not be released; its lease will expire");
             }
             return;
         }
-        if over.is_cancelled() {
+        if done.is_cancelled() {
             return;
         }
-        let done = progress.episodes_done.load(Ordering::Relaxed);
-        if done == told && renewed_at.elapsed() < due_every {
+        let episodes_done = progress.episodes_done.load(Ordering::Relaxed);
+        if episodes_done == reported && renewed_at.elapsed() < interval {
             continue;
         }
-        match server.renew(lease, done) {
-            Ok(Holding::Held) => {
-                told = done;
+        match server.renew(lease, episodes_done) {
+            Ok(LeaseStatus::Held) => {
+                reported = episodes_done;
                 renewed_at = Instant::now();
                 failing = false;
             }
-            Ok(Holding::Lost) => {
+            Ok(LeaseStatus::Lost) => {
                 progress.stop.cancel();
                 return;
             }
-            // The next tick tries again. Should the lease end meanwhile, the commit finds out.
+            // The next tick tries again. If the lease expires meanwhile, the commit notices it.
             Err(error) => {
                 if !failing {
-                    tracing::warn!(unit = %lease.unit, cause = format!("{error:#}"), "the lease was not renewed; trying again");
+                    tracing::warn!(job = %lease.job_id, cause = format!("{error:#}"), "the lease was not renewed; trying again");
                 }
                 failing = true;
             }

@@ -1,14 +1,12 @@
-//! The part of the server that works: slots lease units of work, run agents through `faceoff-runner`,
-//! and commit what came of it; and the daily schedule. A slot gets a work order (`faceoff-wire`) from
-//! a server that it knows as a trait; that of its own process sits on the store.
+//! Workers and the daily schedule. Slots lease jobs, run agents through `faceoff-runner` and commit the results. A
+//! slot gets its jobs (`faceoff-wire`) through a trait; the implementation for the server's own process uses the store.
 //!
-//! A slot is a named operating-system thread: physics and the agent's pipes block, and must not share
-//! a thread with the service's async tasks. A unit is leased for seconds and renewed while it runs,
-//! so that the work of a slot that died is done by another. A fault of ours gives the unit back; only
-//! the runner's verdicts on the agent are stored as the agent's.
+//! A slot is a named operating-system thread: physics and the agent's pipes block, so they must not share a thread with
+//! the server's async tasks. A job is leased for seconds and the lease is renewed while the job runs, so another slot
+//! takes over when a slot dies. A platform fault releases the job. Only the runner's verdicts are stored as agent
+//! faults.
 //!
-//! This crate decides nothing about physics, protocol or scores, and holds no state that a kill would
-//! lose: everything is in the store.
+//! This crate makes no decisions about physics, protocol or scores. Its state is in the store, so a kill loses nothing.
 
 mod ablation_clips;
 mod bundle_cache;
@@ -23,21 +21,22 @@ mod schedule;
 mod scratch;
 mod server;
 mod service;
-mod shown;
+mod game_broadcast;
 mod slot;
 mod slot_threads;
 #[cfg(test)]
 mod tests;
-mod tidying;
+mod cleanup;
 
-/// What others await is boxed, so that it is compiled here, once, and not by each crate that awaits it.
+/// Boxes public async functions, so that they are compiled once, here, and not in each crate that awaits them.
 pub(crate) use async_recursion::async_recursion as boxed;
 
 pub use cpus::{CpuLayout, SlotCpus};
 pub use remote::{
-    BucketConfig, Examined, NatsConfig, RemoteConfig, RemoteWorker, dispatch, examine, work,
+    BucketConfig, ConnectionCheck, NatsConfig, RemoteConfig, RemoteWorker, check_connection, dispatch,
+    run_remote_worker,
 };
 pub use schedule::{run_schedule, start_due};
 pub use service::{SlotsConfig, WorkerConfig, run};
 pub use slot_threads::{SlotStarter, SlotThreads};
-pub use tidying::tidy;
+pub use cleanup::clean_up;

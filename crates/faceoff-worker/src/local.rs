@@ -1,82 +1,81 @@
-//! The server of the slots of its own process: the one place of this crate that works the store's
-//! queue.
+//! The job server for slots of the same process: the only place of this crate that uses the store's queue.
 
 use crate::{
-    full_disk::{self, Pause},
-    server::{Claimed, GameShow, GivenBack, Holding, QueueMark, WorkServer},
-    tidying,
+    full_disk::{self, ClaimPause},
+    server::{ClaimResult, GameUpdate, ReleaseReason, LeaseStatus, QueueVersion, JobServer},
+    cleanup,
 };
 use faceoff_store::{
-    Artifacts, Claim, Claimed as Leased, Committed, GameCommit, GameRecording, Lot, RunOwner,
-    ShardCommit, Store, StoreError, Work,
+    Artifacts, JobClaim, ClaimedJob, CommitOutcome, GameCommit, GameRecording, JobFilter, RunOwner,
+    ShardCommit, Store, StoreError, Job,
 };
 use faceoff_types::{AgentLimits, BundleRef, Clock, EvaluationResult, GameId, StageLimits};
 use faceoff_wire::{
     game::GameSpec,
-    work::{
-        AgentOrder, Assignment, EvaluationMeta, Keeps, Lease, ShardSpec, SmokeSpec, StoredGame,
-        WorkOrder, WorkReport,
+    job::{
+        AgentSpec, JobPayload, EvaluationMeta, OutputFiles, Lease, ShardSpec, ValidationSpec, GameFiles,
+        JobSpec, JobReport,
     },
 };
 use std::{path::Path, time::Duration};
 use tokio::runtime::Handle;
 use tokio_util::sync::CancellationToken;
 
-/// A store, and what the organiser has configured for all orders.
+/// A store, and the configuration for all jobs.
 #[derive(Debug, Clone)]
 pub(crate) struct LocalServer {
     pub(crate) store: Store,
     pub(crate) runtime: Handle,
     pub(crate) clock: Clock,
-    /// How long a claim lasts without renewal, seconds.
+    /// Duration of a lease without renewal, seconds.
     pub(crate) lease_s: u32,
     pub(crate) limits: AgentLimits,
-    pub(crate) pause: Pause,
-    /// Which work its slots ask for.
-    pub(crate) lot: Lot,
+    pub(crate) pause: ClaimPause,
+    /// The kinds of jobs that its slots claim.
+    pub(crate) job_filter: JobFilter,
 }
 
 impl LocalServer {
-    /// Ends the leases of a worker that is dead: its units need not wait for them to run out.
+    /// Ends the leases of a dead worker, so that its jobs need not wait for their expiry.
     pub(crate) async fn end_leases_of(&self, worker: &str) -> Result<u64, StoreError> {
         self.store.end_leases_of(worker, self.clock.now()).await
     }
 
-    /// Is a lease's unit still its holder's?
+    /// Is the lease still valid?
     pub(crate) fn is_held(&self, lease: &Lease) -> anyhow::Result<bool> {
-        let held = self.store.is_held(lease.unit, lease.nonce);
+        let held = self.store.is_leased(lease.job_id, lease.nonce);
         Ok(self.runtime.block_on(held)?)
     }
 
-    fn order(&self, leased: Leased) -> WorkOrder {
-        let Leased { claim, work } = leased;
-        let assignment = match work {
-            Work::Smoke {
+    fn job_spec(&self, claimed: ClaimedJob) -> JobSpec {
+        let ClaimedJob { claim, job } = claimed;
+        let payload = match job {
+            Job::Validation {
                 submission,
                 seeds,
                 limits,
                 runtimes,
-            } => Assignment::Smoke {
+            } => JobPayload::Validation {
                 submission: submission.id,
                 agent: self.agent(submission.bundle, &limits),
-                spec: SmokeSpec {
+                spec: ValidationSpec {
                     seed: seeds.episodes,
                     mismatch_seed: seeds.mismatch,
                 },
                 runtimes,
             },
-            Work::Shard {
+            Job::Shard {
                 owner,
                 run,
                 shard,
                 bundle,
                 seeds,
                 platform_retries,
-            } => Assignment::Play {
+            } => JobPayload::Shard {
                 part_of: match owner {
                     RunOwner::Evaluation(id) => id.as_uuid(),
                     RunOwner::Ablation(id) => id.as_uuid(),
-                    RunOwner::Draft { id, .. } => id.as_uuid(),
+                    RunOwner::ProposedEvaluation { id, .. } => id.as_uuid(),
                 },
                 agent: self.agent(bundle, &run.plan.limits),
                 spec: ShardSpec {
@@ -90,18 +89,18 @@ impl LocalServer {
                     max_faults: run.plan.max_faults,
                     perturbations: run.plan.variation.perturbations.clone(),
                 },
-                keeps: match owner {
-                    _ if run.keeps_recordings => Keeps::Recording(claim.recording_key(run.id)),
-                    RunOwner::Ablation(id) => Keeps::Clips(Artifacts::ablation_part(
+                output: match owner {
+                    _ if run.keeps_recordings => OutputFiles::Recording(claim.recording_key(run.id)),
+                    RunOwner::Ablation(id) => OutputFiles::Clips(Artifacts::ablation_part_key(
                         id,
                         run.plan.profile,
                         shard.task,
                         shard.first_episode,
                     )),
-                    RunOwner::Evaluation(_) | RunOwner::Draft { .. } => Keeps::Nothing,
+                    RunOwner::Evaluation(_) | RunOwner::ProposedEvaluation { .. } => OutputFiles::None,
                 },
             },
-            Work::Game {
+            Job::Game {
                 game,
                 rules,
                 bundles,
@@ -109,7 +108,7 @@ impl LocalServer {
                 attempt,
                 platform_retries,
                 keeps_recording,
-            } => Assignment::Game {
+            } => JobPayload::Game {
                 game,
                 attempt,
                 agents: Box::new(bundles.map(|bundle| self.agent(bundle, &rules.limits))),
@@ -125,13 +124,13 @@ impl LocalServer {
                 },
                 recording: keeps_recording.then(|| game_recording_key(game, &claim)),
             },
-            Work::Finalise {
+            Job::Scoring {
                 evaluation,
                 run,
                 recordings,
                 agent_name,
                 seeds,
-            } => Assignment::Finalise {
+            } => JobPayload::Scoring {
                 evaluation,
                 meta: EvaluationMeta {
                     profile: run.plan.profile,
@@ -146,41 +145,41 @@ impl LocalServer {
             },
         };
         let lease = Lease {
-            unit: claim.unit,
+            job_id: claim.job,
             nonce: claim.nonce,
             slot: claim.worker,
             expires_at: claim.lease_until,
             duration_s: self.lease_s,
         };
-        WorkOrder { lease, assignment }
+        JobSpec { lease, payload }
     }
 
-    fn agent(&self, bundle: BundleRef, own: &StageLimits) -> AgentOrder {
-        AgentOrder {
+    fn agent(&self, bundle: BundleRef, own: &StageLimits) -> AgentSpec {
+        AgentSpec {
             bundle,
-            limits: own.over(&self.limits),
+            limits: own.apply_to(&self.limits),
         }
     }
 
-    /// A lost lease's recording is removed; after an error nobody knows whether the commit stands, and
-    /// it is left.
-    async fn commit_played(&self, claim: &Claim, played: ShardCommit) -> anyhow::Result<Holding> {
+    /// Commits a shard. The recording of a lost lease is removed. After an error the commit may still have succeeded, so
+    /// the recording is left.
+    async fn commit_shard(&self, claim: &JobClaim, played: ShardCommit) -> anyhow::Result<LeaseStatus> {
         let recording = played.recording.clone();
         let committed = self.store.commit_shard(claim, played, self.clock.now());
-        let holding = holding(committed.await?);
-        if holding == Holding::Lost
+        let status = lease_status(committed.await?);
+        if status == LeaseStatus::Lost
             && let Some(recording) = recording
             && let Err(error) = self.store.artifacts().delete_folder(&recording).await
         {
-            tracing::warn!(recording, %error, "the recording of a lost lease is left");
+            tracing::warn!(recording, %error, "the recording of a lost lease could not be removed");
         }
-        Ok(holding)
+        Ok(status)
     }
 
-    /// As [`commit_played`](Self::commit_played). Of a game's recordings only the one of the attempt that counts is kept: what
-    /// earlier attempts left that were killed between upload and commit, or whose result was voided, goes once another
-    /// result stands.
-    async fn commit_game(&self, claim: &Claim, played: GameCommit) -> anyhow::Result<Holding> {
+    /// Commits a game, as [`commit_shard`](Self::commit_shard) does. Only the recording of the counting attempt is kept.
+    /// Recordings of voided results, and of attempts that were killed between upload and commit, are removed with the
+    /// next result.
+    async fn commit_game(&self, claim: &JobClaim, played: GameCommit) -> anyhow::Result<LeaseStatus> {
         let committed = self
             .store
             .commit_game(claim, &played, self.clock.now())
@@ -188,105 +187,105 @@ impl LocalServer {
         let artifacts = self.store.artifacts();
         let key = played.recording.map(|recording| recording.key);
         if let Some(key) = key {
-            let tidied = match (committed, key.rsplit_once('/')) {
-                (Committed::Now, Some((of_the_game, _))) => {
-                    artifacts.delete_others(of_the_game, &key).await
+            let cleaned = match (committed, key.rsplit_once('/')) {
+                (CommitOutcome::Stored, Some((game_prefix, _))) => {
+                    artifacts.delete_others(game_prefix, &key).await
                 }
-                // Of one that was repeated nobody knows what began since.
-                (Committed::Now | Committed::Before, _) => Ok(()),
-                (Committed::LeaseLost, _) => artifacts.delete_folder(&key).await,
+                // After a repeated commit, another attempt may have started since.
+                (CommitOutcome::Stored | CommitOutcome::AlreadyStored, _) => Ok(()),
+                (CommitOutcome::LeaseLost, _) => artifacts.delete_folder(&key).await,
             };
-            if let Err(error) = tidied {
-                tracing::warn!(key, %error, "a game's recording that nobody needs is left");
+            if let Err(error) = cleaned {
+                tracing::warn!(key, %error, "an obsolete recording of a game could not be removed");
             }
         }
-        Ok(holding(committed))
+        Ok(lease_status(committed))
     }
 
-    /// Publishes the dataset. It is removed only when it certainly was not published; after an error
-    /// it may have been, and then the next finalisation, if there is one, removes it.
-    async fn commit_finalised(
+    /// Commits a score and its dataset. The dataset is removed only if the commit certainly failed. After another error it
+    /// may be in use; if it is not, the next scoring removes it.
+    async fn commit_score(
         &self,
-        claim: &Claim,
+        claim: &JobClaim,
         dataset: &str,
         blake3: &str,
         result: &EvaluationResult,
-    ) -> anyhow::Result<Holding> {
+    ) -> anyhow::Result<LeaseStatus> {
         let finished =
             self.store
                 .finish_evaluation(claim, result, dataset, blake3, self.clock.now());
-        let holding = holding(finished.await?);
+        let status = lease_status(finished.await?);
         let artifacts = self.store.artifacts();
-        let tidied = match (holding, dataset.rsplit_once('/')) {
-            // what finalisations left that were killed between upload and commit
-            (Holding::Held, Some((datasets, _))) => {
+        let cleaned = match (status, dataset.rsplit_once('/')) {
+            // Removes datasets of scorings that were killed between upload and commit.
+            (LeaseStatus::Held, Some((datasets, _))) => {
                 artifacts.delete_others(datasets, dataset).await
             }
-            (Holding::Held, None) => Ok(()),
-            // no other lease names this key
-            (Holding::Lost, _) => artifacts.delete_dataset(dataset).await,
+            (LeaseStatus::Held, None) => Ok(()),
+            // No other lease uses this key.
+            (LeaseStatus::Lost, _) => artifacts.delete_dataset(dataset).await,
         };
-        if let Err(error) = tidied {
-            tracing::warn!(dataset, %error, "a dataset that nobody needs is left");
+        if let Err(error) = cleaned {
+            tracing::warn!(dataset, %error, "an obsolete dataset could not be removed");
         }
-        Ok(holding)
+        Ok(status)
     }
 }
 
-impl WorkServer for LocalServer {
-    fn claim(&self, slot: &str) -> anyhow::Result<Claimed> {
-        let queue = QueueMark(*self.store.work_signal().borrow());
+impl JobServer for LocalServer {
+    fn claim(&self, slot: &str) -> anyhow::Result<ClaimResult> {
+        let queue = QueueVersion(*self.store.job_signal().borrow());
         self.runtime.block_on(async {
             let now = self.clock.now();
-            if self.pause.holds(&self.store, self.lease_s, now).await? {
-                return Ok(Claimed::Nothing { queue });
+            if self.pause.is_active(&self.store, self.lease_s, now).await? {
+                return Ok(ClaimResult::Empty { queue });
             }
             let claimed = self
                 .store
-                .claim_of(self.lot, slot, self.lease_s, now)
+                .claim_matching(self.job_filter, slot, self.lease_s, now)
                 .await?;
-            self.store.looked_for_work(now);
+            self.store.record_poll(now);
             Ok(match claimed {
-                Some(leased) => Claimed::Order(Box::new(self.order(leased))),
-                None => Claimed::Nothing { queue },
+                Some(claimed) => ClaimResult::Job(Box::new(self.job_spec(claimed))),
+                None => ClaimResult::Empty { queue },
             })
         })
     }
 
-    fn renew(&self, lease: &Lease, episodes_done: u32) -> anyhow::Result<Holding> {
+    fn renew(&self, lease: &Lease, episodes_done: u32) -> anyhow::Result<LeaseStatus> {
         let claim = claim(lease);
         let renewed = self
             .store
             .heartbeat(&claim, episodes_done, self.lease_s, self.clock.now());
         Ok(if self.runtime.block_on(renewed)? {
-            Holding::Held
+            LeaseStatus::Held
         } else {
-            Holding::Lost
+            LeaseStatus::Lost
         })
     }
 
-    fn show(&self, _: &Lease, (game, attempt): (GameId, u32), show: GameShow) {
+    fn publish_game(&self, _: &Lease, (game, attempt): (GameId, u32), update: GameUpdate) {
         let live = self.store.live_games();
-        match show {
-            GameShow::Begun { steps } => live.begin(game, attempt, steps),
-            GameShow::Goes {
-                happenings,
+        match update {
+            GameUpdate::Started { steps } => live.begin(game, attempt, steps),
+            GameUpdate::Progress {
+                events,
                 position,
-            } => live.advance(game, attempt, happenings, Some(position)),
-            GameShow::Over => live.over(game, attempt),
+            } => live.advance(game, attempt, events, Some(position)),
+            GameUpdate::Ended => live.end_attempt(game, attempt),
         }
     }
 
-    fn commit(&self, lease: &Lease, report: WorkReport) -> anyhow::Result<Holding> {
+    fn commit(&self, lease: &Lease, report: JobReport) -> anyhow::Result<LeaseStatus> {
         let (claim, now) = (claim(lease), self.clock.now());
         self.runtime.block_on(async {
             match report {
-                WorkReport::Smoke(outcome) => {
-                    let holding = holding(self.store.commit_smoke(&claim, outcome, now).await?);
-                    tidying::remove_refused(&self.store, now).await;
-                    Ok(holding)
+                JobReport::Validation(outcome) => {
+                    let status = lease_status(self.store.commit_validation(&claim, outcome, now).await?);
+                    cleanup::remove_invalid_bundles(&self.store, now).await;
+                    Ok(status)
                 }
-                WorkReport::Play {
+                JobReport::Shard {
                     outcomes,
                     log,
                     stopped_by_faults,
@@ -298,14 +297,14 @@ impl WorkServer for LocalServer {
                         stopped_by_faults,
                         recording,
                     };
-                    self.commit_played(&claim, played).await
+                    self.commit_shard(&claim, played).await
                 }
-                WorkReport::Game {
+                JobReport::Game {
                     score,
                     recording,
                     logs,
                 } => {
-                    let recording = recording.map(stored_game);
+                    let recording = recording.map(game_recording);
                     let played = GameCommit {
                         score,
                         recording,
@@ -313,48 +312,48 @@ impl WorkServer for LocalServer {
                     };
                     self.commit_game(&claim, played).await
                 }
-                WorkReport::Finalise {
+                JobReport::Scoring {
                     dataset,
                     blake3,
                     result,
                 } => {
-                    self.commit_finalised(&claim, &dataset, &blake3, &result)
+                    self.commit_score(&claim, &dataset, &blake3, &result)
                         .await
                 }
             }
         })
     }
 
-    fn give_back(&self, lease: &Lease, why: GivenBack<'_>) -> anyhow::Result<()> {
+    fn release(&self, lease: &Lease, reason: ReleaseReason<'_>) -> anyhow::Result<()> {
         let (claim, now) = (claim(lease), self.clock.now());
         Ok(self.runtime.block_on(async {
-            match why {
-                GivenBack::Shutdown => self.store.release(&claim, now).await,
-                GivenBack::FullDisk => self.store.release_full(&claim, now).await,
-                GivenBack::PlatformFault(reason) => {
-                    self.store.release_failed(&claim, reason, now).await
+            match reason {
+                ReleaseReason::Shutdown => self.store.release(&claim, now).await,
+                ReleaseReason::FullDisk => self.store.release_disk_full(&claim, now).await,
+                ReleaseReason::PlatformFault(summary) => {
+                    self.store.release_failed(&claim, summary, now).await
                 }
             }
         })?)
     }
 
-    fn met_full_disk(&self, error: &anyhow::Error) -> bool {
-        // Whatever fails while there is no room may fail for that: it is to be tried again with room.
-        full_disk::is_told_by(error) || self.store.room().is_short()
+    fn is_full_disk(&self, error: &anyhow::Error) -> bool {
+        // Any failure while the disk is short of space may be due to that: the job is tried again later.
+        full_disk::is_cause_of(error) || self.store.free_space().is_short()
     }
 
-    fn wait(&self, stop: &CancellationToken, at_most: Duration, queue: Option<QueueMark>) {
-        let mut signal = self.store.work_signal();
-        let grown = async {
+    fn wait(&self, stop: &CancellationToken, at_most: Duration, queue: Option<QueueVersion>) {
+        let mut signal = self.store.job_signal();
+        let changed = async {
             match queue {
-                Some(QueueMark(seen)) => drop(signal.wait_for(|mark| *mark != seen).await),
+                Some(QueueVersion(seen)) => drop(signal.wait_for(|version| *version != seen).await),
                 None => std::future::pending().await,
             }
         };
         self.runtime.block_on(async {
             tokio::select! {
                 () = stop.cancelled() => {}
-                () = grown => {}
+                () = changed => {}
                 () = tokio::time::sleep(at_most) => {}
             }
         });
@@ -374,11 +373,11 @@ impl WorkServer for LocalServer {
         let artifacts = self.store.artifacts();
         self.runtime.block_on(async {
             let stored = artifacts.put_folder(key, folder).await;
-            // Nobody will name a part of a recording, and it takes room that may be wanting.
+            // A partial recording is useless and takes disk space.
             if stored.is_err()
                 && let Err(error) = artifacts.delete_folder(key).await
             {
-                tracing::warn!(key, %error, "a part of a recording is left");
+                tracing::warn!(key, %error, "a partial recording could not be removed");
             }
             Ok(stored?)
         })
@@ -395,17 +394,17 @@ impl WorkServer for LocalServer {
     }
 }
 
-/// Artifact key prefix for the recording that is made under a lease: each has its own, as those of shards.
-fn game_recording_key(game: GameId, claim: &Claim) -> String {
+/// Artifact key prefix of a game's recording; each lease has its own, as with shards.
+fn game_recording_key(game: GameId, claim: &JobClaim) -> String {
     format!("games/{game}/{}", claim.nonce)
 }
 
-fn stored_game(stored: StoredGame) -> GameRecording {
-    let StoredGame {
+fn game_recording(files: GameFiles) -> GameRecording {
+    let GameFiles {
         key,
         game_blake3,
         side_blake3,
-    } = stored;
+    } = files;
     GameRecording {
         key,
         game_blake3,
@@ -413,18 +412,18 @@ fn stored_game(stored: StoredGame) -> GameRecording {
     }
 }
 
-fn claim(lease: &Lease) -> Claim {
-    Claim {
-        unit: lease.unit,
+fn claim(lease: &Lease) -> JobClaim {
+    JobClaim {
+        job: lease.job_id,
         nonce: lease.nonce,
         worker: lease.slot.clone(),
         lease_until: lease.expires_at,
     }
 }
 
-fn holding(committed: Committed) -> Holding {
-    match committed {
-        Committed::Now | Committed::Before => Holding::Held,
-        Committed::LeaseLost => Holding::Lost,
+fn lease_status(outcome: CommitOutcome) -> LeaseStatus {
+    match outcome {
+        CommitOutcome::Stored | CommitOutcome::AlreadyStored => LeaseStatus::Held,
+        CommitOutcome::LeaseLost => LeaseStatus::Lost,
     }
 }

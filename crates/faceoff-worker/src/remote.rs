@@ -1,39 +1,50 @@
-//! Work on other machines. The queue stays the store's: the server claims from it as much as free slots elsewhere ask for, and NATS carries
-//! the orders there and what came of them back. A unit's lease is the only truth about whose it is: what NATS loses ends with its
-//! lease, or is taken back before, and is given out again; what it delivers twice is begun once, by whoever says first that it
-//! begins, and committed once.
+//! Remote workers. The store's queue stays the only queue: the server claims as many jobs as free remote slots request, and
+//! NATS carries jobs to the workers and results back.
 //!
-//! `names.rs` is what both sides call things and `connection.rs` how both reach NATS. The server's side: `streams.rs` are its streams,
-//! `dispatch.rs` gives out what `granted.rs` and `bucket.rs` open, and `taken_back.rs` knows what nobody has begun; `answers.rs` is what workers ask
-//! meanwhile, and `like.rs` which of them get work; `taken_in.rs` takes in what came of it, `checked.rs` is why it believes that, and `handed_in.rs`
-//! knows what waits for it. `examine.rs` asks as a worker would. `far_server.rs` is the server as a worker's slots see it: `next_order.rs` how they come
-//! by orders, `order_files.rs` and `transfer.rs` files, `handing_in.rs` what came of them; `worker.rs` is the process that they run in, `link.rs` what
-//! they share.
+//! A job's lease alone decides which slot has the job. A job that NATS loses is released earlier, or when its lease
+//! expires, and is sent again. A job that NATS delivers twice is started once, by the first worker that asks to start it,
+//! and committed once.
+//!
+//! Both sides: `names.rs` has the names of streams and subjects, and `connection.rs` the connection to NATS.
+//!
+//! The server's side:
+//! * `streams.rs` sets up the streams;
+//! * `dispatch.rs` publishes jobs, with access to files by `grants.rs` or `bucket.rs`; `published_jobs.rs` keeps track of
+//!   published jobs that no worker has started;
+//! * `requests.rs` answers requests of workers; `compatibility.rs` decides which workers get jobs;
+//! * `accepted_results.rs` accepts results after the checks of `result_checks.rs`; `pending_results.rs` keeps track of
+//!   results that have not been accepted.
+//!
+//! The worker's side:
+//! * `worker.rs` is the process, and `worker_link.rs` the connection that its slots share;
+//! * `server_client.rs` is the server as its slots see it: `next_job.rs` receives jobs, `job_files.rs` and `transfer.rs`
+//!   transfer files, and `result_sender.rs` sends results;
+//! * `connection_check.rs` checks in advance whether a worker would get jobs.
 
-mod answers;
+mod requests;
 mod bucket;
-mod checked;
+mod result_checks;
 mod connection;
 mod dispatch;
-mod examine;
-mod far_server;
-mod granted;
-mod handed_in;
-mod handing_in;
-mod like;
-mod link;
+mod connection_check;
+mod server_client;
+mod grants;
+mod pending_results;
+mod result_sender;
+mod compatibility;
+mod worker_link;
 mod names;
-mod next_order;
-mod order_files;
+mod next_job;
+mod job_files;
 mod streams;
-mod taken_back;
-mod taken_in;
+mod published_jobs;
+mod accepted_results;
 mod transfer;
 mod worker;
 
 pub use bucket::BucketConfig;
 pub use connection::NatsConfig;
 pub use dispatch::{RemoteConfig, dispatch};
-pub use examine::{Examined, examine};
-pub(crate) use handing_in::TooLarge;
-pub use worker::{RemoteWorker, work};
+pub use connection_check::{ConnectionCheck, check_connection};
+pub(crate) use result_sender::TooLarge;
+pub use worker::{RemoteWorker, run_remote_worker};

@@ -6,13 +6,13 @@ use jiff::Timestamp;
 use std::{num::NonZeroU32, time::Duration};
 use tokio_util::sync::CancellationToken;
 
-/// The longest sleep: a stage may be changed, a machine's clock set, or the machine suspended, while we wait, and
-/// a day is to start within the second that is shown.
+/// The longest sleep. A stage may be changed, the clock set or the machine suspended meanwhile, and a day must start in
+/// the second that pages show.
 const LONGEST_SLEEP: Duration = Duration::from_secs(1);
 
-/// Ends the days whose deadline has come, and starts those of all stages that have a schedule, each once, at its
-/// time, until `shutdown` is cancelled. A day whose time passed while the server was down is started when it comes
-/// up, on the same date still. What a failing database keeps from ending or starting is tried again every second.
+/// Ends overdue days and starts scheduled days at their times, each once, until `shutdown` is cancelled. A day that
+/// became due while the server was down starts when the server is up again, if the date is still the same. After a
+/// database error it tries again every second.
 #[boxed]
 pub async fn run_schedule(
     store: Store,
@@ -28,7 +28,7 @@ pub async fn run_schedule(
                 next
             }
             Err(error) => {
-                // Once: it comes again every second.
+                // Logged once, since it recurs every second.
                 if !failed {
                     tracing::error!(
                         error = format!("{error:#}"),
@@ -49,25 +49,25 @@ pub async fn run_schedule(
     }
 }
 
-/// Ends and starts what is due at `now`; when the next day is, if one comes. [`run_schedule`] does so at the right
-/// times.
+/// Ends and starts all days that are due at `now`, and returns the time of the next start, if any. [`run_schedule`]
+/// calls it at the right times.
 #[boxed]
 pub async fn start_due(store: &Store, now: Timestamp) -> anyhow::Result<Option<Timestamp>> {
-    // A day that cannot be ended keeps no other from starting.
+    // A failure to end a day must not prevent others from starting.
     let ended = end_overdue(store, now).await;
     let mut first = None;
     let stages = store.stages().await.context("reading the stages")?;
     for stage in stages {
-        let next = match next_cut(store, &stage, now).await? {
+        let next = match next_cutoff(store, &stage, now).await? {
             Some(at) if at <= now => {
                 let started = store.start_scheduled_day(stage.id, now).await;
                 let started = started.with_context(|| format!("the stage {}", stage.name))?;
                 if let Some(started) = started {
-                    tracing::info!(stage = %stage.name, evaluations = started.len(), "the day was started");
-                    order_ablations(store, &stage, &started, now).await;
+                    tracing::info!(stage = %stage.name, evaluations = started.len(), "day started");
+                    create_ablations(store, &stage, &started, now).await;
                 }
-                // It is not due again unless something keeps it from starting, which may last.
-                let next = next_cut(store, &stage, now).await?;
+                // If it is still due, something lasting prevents the start: do not retry at once.
+                let next = next_cutoff(store, &stage, now).await?;
                 next.filter(|at| *at > now)
             }
             next => next,
@@ -85,14 +85,14 @@ async fn end_overdue(store: &Store, now: Timestamp) -> anyhow::Result<()> {
     for (of, not_played) in ended.context("ending the days whose deadline has come")? {
         tracing::warn!(
             stage = %of.stage, day = %of.date, not_played,
-            "the day's deadline came before all of it was played"
+            "the day's deadline passed with evaluations not played"
         );
     }
     Ok(())
 }
 
-/// When the schedule starts the stage's next day.
-async fn next_cut(
+/// The time of the stage's next scheduled cutoff.
+async fn next_cutoff(
     store: &Store,
     stage: &Stage,
     now: Timestamp,
@@ -101,13 +101,13 @@ async fn next_cut(
         .newest_day(stage.id)
         .await
         .context("reading the days")?;
-    let next = stage.next_cut(newest.map(|day| day.of.date), now);
+    let next = stage.next_cutoff(newest.map(|day| day.stage_day.date), now);
     Ok(next.and_then(|(_, at)| at))
 }
 
-/// Orders an ablation of each submission that has none, if the stage wants them. One that cannot be ordered is the
-/// organiser's to order by hand: what counts must not wait for it.
-async fn order_ablations(store: &Store, stage: &Stage, started: &[Evaluation], now: Timestamp) {
+/// Creates an ablation for each submission that has none, if the stage is configured so. Failures are only logged, since
+/// counting evaluations must not depend on them; organisers can create the ablation by hand.
+async fn create_ablations(store: &Store, stage: &Stage, started: &[Evaluation], now: Timestamp) {
     let Some(episodes) = NonZeroU32::new(stage.settings.ablation_episodes) else {
         return;
     };
@@ -117,17 +117,17 @@ async fn order_ablations(store: &Store, stage: &Stage, started: &[Evaluation], n
     };
     for evaluation in started {
         let submission = evaluation.submission;
-        let ordered = match store.newest_ablation(submission).await {
+        let created = match store.newest_ablation(submission).await {
             Ok(Some(_)) => continue,
             Ok(None) => {
                 store
-                    .create_ablation(Actor::Schedule, submission, &plan, now)
+                    .request_ablation(Actor::Schedule, submission, &plan, now)
                     .await
             }
             Err(error) => Err(error),
         };
-        if let Err(error) = ordered {
-            tracing::error!(%submission, %error, "an ablation could not be ordered");
+        if let Err(error) = created {
+            tracing::error!(%submission, %error, "an ablation could not be created");
         }
     }
 }

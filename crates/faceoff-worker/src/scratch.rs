@@ -7,8 +7,8 @@ use std::{
 };
 use uuid::Uuid;
 
-/// The folder for what is unpacked and recorded until it is committed. Nothing in it is worth
-/// keeping, so it is emptied at the start; it belongs to one process at a time.
+/// The folder for unpacked bundles and uncommitted recordings. Its content is temporary and is removed at the start.
+/// Only one process at a time may use it.
 #[derive(Debug)]
 pub(crate) struct Scratch {
     folder: PathBuf,
@@ -17,7 +17,7 @@ pub(crate) struct Scratch {
 }
 
 impl Scratch {
-    /// Takes the folder, creating it if need be, and removes what an earlier process left.
+    /// Locks the folder, creating it if necessary, and removes leftovers of an earlier process.
     pub(crate) fn take(folder: &Path) -> anyhow::Result<Self> {
         fs::create_dir_all(folder).context("making the scratch folder")?;
         let mut lock = fs::OpenOptions::new()
@@ -40,15 +40,15 @@ impl Scratch {
         }
         for entry in fs::read_dir(folder)? {
             let entry = entry?;
-            let ours = entry
+            let is_slot_folder = entry
                 .file_name()
                 .to_str()
                 .is_some_and(|name| name.starts_with("slot-"));
-            if ours {
+            if is_slot_folder {
                 fs::remove_dir_all(entry.path())?;
             }
         }
-        let worker = worker_name(&mut lock).context("cannot keep the worker's name")?;
+        let worker = worker_name(&mut lock).context("cannot store the worker's name")?;
         Ok(Self {
             folder: folder.to_owned(),
             worker,
@@ -56,8 +56,8 @@ impl Scratch {
         })
     }
 
-    /// The name of whoever holds this folder, from one process to the next. Since the lock is ours,
-    /// all earlier holders are dead.
+    /// The name of the worker that uses this folder; it persists across processes. The lock is held, so all earlier
+    /// processes have ended.
     pub(crate) fn worker(&self) -> &str {
         &self.worker
     }
@@ -70,7 +70,7 @@ impl Scratch {
     }
 }
 
-/// Reads the name from the lock file, or draws and writes one.
+/// Reads the name from the lock file, or writes a new one.
 fn worker_name(lock: &mut File) -> std::io::Result<String> {
     let mut text = String::new();
     lock.read_to_string(&mut text)?;
@@ -89,10 +89,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn leftovers_are_removed_and_foreign_files_kept() {
+    fn scratch_removes_leftovers_but_no_other_files() {
         let folder = tempfile::tempdir().unwrap();
         fs::create_dir_all(folder.path().join("slot-7/bundle/x")).unwrap();
-        fs::write(folder.path().join("notes.txt"), "not ours").unwrap();
+        fs::write(folder.path().join("notes.txt"), "a file of the user").unwrap();
         let scratch = Scratch::take(folder.path()).unwrap();
         assert!(!folder.path().join("slot-7").exists());
         assert!(folder.path().join("notes.txt").exists());
@@ -100,7 +100,7 @@ mod tests {
     }
 
     #[test]
-    fn a_second_process_is_turned_away() {
+    fn scratch_is_refused_to_a_second_process() {
         let folder = tempfile::tempdir().unwrap();
         let scratch = Scratch::take(folder.path()).unwrap();
         let error = Scratch::take(folder.path()).unwrap_err().to_string();
@@ -110,7 +110,7 @@ mod tests {
         assert_eq!(
             Scratch::take(folder.path()).unwrap().worker(),
             name,
-            "the name stays"
+            "the name persists"
         );
     }
 }

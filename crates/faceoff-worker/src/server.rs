@@ -1,44 +1,41 @@
-use faceoff_types::{BundleRef, GameId, LiveHappening, LivePosition};
-use faceoff_wire::work::{Lease, WorkOrder, WorkReport};
+use faceoff_types::{BundleRef, GameId, LiveEvent, LivePosition};
+use faceoff_wire::job::{Lease, JobSpec, JobReport};
 use std::{path::Path, time::Duration};
 use tokio_util::sync::CancellationToken;
 
-/// Where a slot gets its work and leaves what came of it: the one who owns queue and artifacts, in
-/// this process or on another machine. A slot is a thread of its own, so every call blocks. Instants
-/// are the server's: it stamps what it is told when it is told.
+/// The server as a slot sees it: the owner of queue and artifacts, in this process or on another machine. A slot has its
+/// own thread, so all calls block. The server sets all timestamps, at the time of the call.
 ///
-/// An error says that the outcome is unknown: what was asked for may have happened all the same.
-pub(crate) trait WorkServer: Send + Sync {
-    /// Leases the next unit of work to the slot of this name.
-    fn claim(&self, slot: &str) -> anyhow::Result<Claimed>;
+/// After an error the outcome is unknown: the request may have been carried out.
+pub(crate) trait JobServer: Send + Sync {
+    /// Leases the next job to the slot with this name.
+    fn claim(&self, slot: &str) -> anyhow::Result<ClaimResult>;
 
-    /// Extends the lease and tells how far the work is.
-    fn renew(&self, lease: &Lease, episodes_done: u32) -> anyhow::Result<Holding>;
+    /// Renews the lease and reports progress.
+    fn renew(&self, lease: &Lease, episodes_done: u32) -> anyhow::Result<LeaseStatus>;
 
-    /// How often a slot asks whether its work is still its own: three tries before the lease ends.
-    fn renews_every(&self, lease: &Lease) -> Duration {
+    /// Interval between renewals: three tries before the lease expires.
+    fn renewal_interval(&self, lease: &Lease) -> Duration {
         Duration::from_secs(lease.duration_s.into()) / 3
     }
 
-    /// Shows an attempt at a game to those who watch it. Cheap, and as good as it goes: a connection that is slow or
-    /// broken loses positions.
-    fn show(&self, lease: &Lease, attempt: (GameId, u32), show: GameShow);
+    /// Publishes a live update of a game. Cheap and best-effort: over a slow or broken connection, updates may get lost.
+    fn publish_game(&self, lease: &Lease, attempt: (GameId, u32), update: GameUpdate);
 
-    /// Stores what came of a unit; harmless when repeated under the same lease. What was uploaded
-    /// under a lease that turns out to be lost is removed.
-    fn commit(&self, lease: &Lease, report: WorkReport) -> anyhow::Result<Holding>;
+    /// Stores the result of a job; idempotent under the same lease. Files that were uploaded under a lost lease are
+    /// removed.
+    fn commit(&self, lease: &Lease, report: JobReport) -> anyhow::Result<LeaseStatus>;
 
-    /// Puts a unit back into the queue. Of a lost lease nothing is recorded.
-    fn give_back(&self, lease: &Lease, why: GivenBack<'_>) -> anyhow::Result<()>;
+    /// Puts a job back into the queue. For a lost lease nothing is recorded.
+    fn release(&self, lease: &Lease, reason: ReleaseReason<'_>) -> anyhow::Result<()>;
 
-    /// Was it a full disk that made this fail, the slot's or the server's? Then nobody failed.
-    fn met_full_disk(&self, error: &anyhow::Error) -> bool;
+    /// Was a full disk of the slot or the server the cause of this error? Then the attempt does not count.
+    fn is_full_disk(&self, error: &anyhow::Error) -> bool;
 
-    /// Waits until `stop` is cancelled, `at_most` has passed or, given a mark, the queue has grown
-    /// since.
-    fn wait(&self, stop: &CancellationToken, at_most: Duration, queue: Option<QueueMark>);
+    /// Waits until `stop` is cancelled, `at_most` has passed or, given a version, jobs were added to the queue since.
+    fn wait(&self, stop: &CancellationToken, at_most: Duration, queue: Option<QueueVersion>);
 
-    /// Copies an uploaded archive to a new file.
+    /// Copies an uploaded bundle to a new file.
     fn fetch_bundle(&self, bundle: &BundleRef, archive: &Path) -> anyhow::Result<()>;
 
     /// Copies the files of a committed recording into an empty folder.
@@ -47,58 +44,58 @@ pub(crate) trait WorkServer: Send + Sync {
     /// Stores the files of a folder as a recording.
     fn store_recording(&self, key: &str, folder: &Path) -> anyhow::Result<()>;
 
-    /// Stores what replays of a shard's episodes are drawn from, in the place of what was there.
+    /// Stores the clips of a shard's episodes, replacing earlier ones.
     fn store_clips(&self, key: &str, clips: &Path) -> anyhow::Result<()>;
 
-    /// Stores a dataset, with what replays are drawn from; nobody sees it before the commit that names it.
+    /// Stores a dataset, with the clips for replays. It becomes visible with the commit that names it.
     fn store_dataset(&self, key: &str, archive: &Path, clips: Option<&Path>) -> anyhow::Result<()>;
 }
 
-/// The answer to a claim.
+/// The result of a claim.
 #[derive(Debug)]
-pub(crate) enum Claimed {
-    Order(Box<WorkOrder>),
-    /// There is nothing to do now.
-    Nothing {
-        /// From before the look at the queue, so that no later addition is missed.
-        queue: QueueMark,
+pub(crate) enum ClaimResult {
+    Job(Box<JobSpec>),
+    /// No job can be claimed now.
+    Empty {
+        /// Version of the queue before the claim, so that no later addition is missed.
+        queue: QueueVersion,
     },
 }
 
-/// A state of the queue that a slot has seen; another value after every addition.
+/// A version of the queue; it changes with every addition.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct QueueMark(pub(crate) u64);
+pub(crate) struct QueueVersion(pub(crate) u64);
 
-/// Whose the unit is.
+/// Whether a slot still has the lease of a job.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Holding {
-    /// Still the asking slot's, or done by it.
+pub(crate) enum LeaseStatus {
+    /// The slot has the lease, or has completed the job.
     Held,
-    /// Another's, or nobody's any more.
+    /// The lease has expired, or the job was cancelled or given to another slot.
     Lost,
 }
 
-/// What is told of a game while a slot plays it. It decides nothing, and nobody waits for it.
+/// A live update of a game that a slot plays. It has no influence on the result.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) enum GameShow {
-    /// It begins; this many control steps are to be played.
-    Begun { steps: u32 },
-    /// What happened, and where things are.
-    Goes {
-        happenings: Vec<LiveHappening>,
+pub(crate) enum GameUpdate {
+    /// The game has started; `steps` are the control steps of the whole game.
+    Started { steps: u32 },
+    /// Events since the last update, and the current positions.
+    Progress {
+        events: Vec<LiveEvent>,
         position: LivePosition,
     },
-    /// Nothing more comes of this attempt.
-    Over,
+    /// The attempt is over; no further update follows.
+    Ended,
 }
 
-/// Why a unit goes back to the queue undone.
+/// Why a job goes back to the queue.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum GivenBack<'a> {
-    /// The slot is asked to end; the attempt does not count.
+pub(crate) enum ReleaseReason<'a> {
+    /// The slot shuts down; the attempt does not count.
     Shutdown,
-    /// There was no room for it; it is tried again once there is, and the attempt does not count.
+    /// The disk was full. The job is tried again when there is free space, and the attempt does not count.
     FullDisk,
-    /// A fault of ours, in words for the team; after several the unit is given up.
+    /// A platform fault, with a description for the team. After several attempts the job fails.
     PlatformFault(&'a str),
 }

@@ -4,34 +4,34 @@ use crate::{
     cpus::{self, CpuLayout},
     evaluator::{Evaluator, Runner},
     executor::{AgentHost, Executor},
-    full_disk::Pause,
+    full_disk::ClaimPause,
     local::LocalServer,
     scratch::Scratch,
-    server::WorkServer,
-    slot::{Rests, Slot},
+    server::JobServer,
+    slot::{Backoff, Slot},
     slot_threads::SlotThreads,
-    tidying,
+    cleanup,
 };
 use anyhow::Context as _;
 use faceoff_metrics::Metrics;
 use faceoff_runner::{AgentEnvironment, bundle::BundleLimits};
-use faceoff_store::{Lot, Store, StoreError};
+use faceoff_store::{JobFilter, Store, StoreError};
 use faceoff_types::{AgentLimits, Clock};
 use std::{path::PathBuf, sync::Arc, time::Duration};
 use tokio::{runtime::Handle, sync::oneshot, task::JoinSet};
 use tokio_util::sync::CancellationToken;
 
-/// How often things are done that nothing calls for; tests are quicker.
+/// Intervals of periodic tasks; tests use shorter ones.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Intervals {
     /// See [`Slot::idle_poll`].
     pub(crate) idle_poll: Duration,
-    /// After faults of ours.
-    pub(crate) rests: Rests,
-    /// How often the recordings of evaluations that are over are removed.
-    pub(crate) tidy: Duration,
-    /// How long slots may take to leave what they are in the middle of (a step of an agent, an
-    /// upload) once their units were given back.
+    /// Pauses of a slot after platform faults.
+    pub(crate) backoff: Backoff,
+    /// Interval of the cleanup of old data.
+    pub(crate) cleanup: Duration,
+    /// How long slots may take to finish their current operation (a step of an agent, an upload) after the release of
+    /// their jobs.
     pub(crate) shutdown_grace: Duration,
 }
 
@@ -39,46 +39,46 @@ impl Default for Intervals {
     fn default() -> Self {
         Self {
             idle_poll: Duration::from_secs(2),
-            rests: Rests {
+            backoff: Backoff {
                 first: Duration::from_secs(2),
                 longest: Duration::from_secs(300),
             },
-            tidy: Duration::from_secs(300),
+            cleanup: Duration::from_secs(300),
             shutdown_grace: Duration::from_secs(20),
         }
     }
 }
 
-/// How this process works.
+/// Configuration of the workers of a server process.
 #[derive(Debug, Clone)]
 pub struct WorkerConfig {
     pub slots: SlotsConfig,
-    /// Which work they do.
-    pub lot: Lot,
-    /// How long a claim lasts without renewal, seconds; after a crash the work rests that long.
+    /// The kinds of jobs that they run.
+    pub job_filter: JobFilter,
+    /// Duration of a lease without renewal, seconds. After a crash, jobs wait this long.
     pub lease_s: u32,
-    /// What an archive may hold.
+    /// Limits of bundles.
     pub bundle_limits: BundleLimits,
 }
 
-/// How slots work, whoever gives them work.
+/// Configuration of slots, local or remote.
 #[derive(Debug, Clone)]
 pub struct SlotsConfig {
-    /// The slots, each with its CPUs; at least one. So many units are worked on at a time.
+    /// The slots, each with its CPUs; at least one. Each slot runs one job at a time.
     pub cpus: CpuLayout,
-    /// Who starts the slots' threads.
+    /// Starts the slots' threads.
     pub threads: SlotThreads,
-    /// A folder of this process's own for unpacked bundles and recordings; emptied at the start.
+    /// A folder for unpacked bundles and recordings, used by this process alone; emptied at the start.
     pub scratch_dir: PathBuf,
-    /// How agents are run; each slot's agent on the slot's CPUs.
+    /// Environment of agents; the CPUs are set per slot.
     pub agent: AgentEnvironment,
-    /// What slots do is counted here.
+    /// Metrics of the slots.
     pub metrics: Metrics,
 }
 
-/// Runs a named thread per slot (`faceoff-slot-0` …) until `shutdown` is cancelled. On a shutdown every
-/// unit is given back at once, and the threads are waited for, for 20 s at most: an agent in the
-/// middle of an answer may take that long. Fails if the scratch folder cannot be had or a slot dies.
+/// Runs a named thread per slot (`faceoff-slot-0` …) until `shutdown` is cancelled. On shutdown all jobs are released at
+/// once; the threads are given 20 s to end, since an agent may be in the middle of an answer. Fails if the scratch folder
+/// cannot be locked or a slot dies.
 #[boxed]
 pub async fn run(
     store: Store,
@@ -101,28 +101,28 @@ pub async fn run(
 }
 
 impl WorkerConfig {
-    /// Hands out work as configured here.
+    /// The job server with this configuration.
     pub(crate) fn local_server(&self, store: Store, clock: Clock) -> LocalServer {
         LocalServer {
             store,
             runtime: Handle::current(),
             clock,
             lease_s: self.lease_s,
-            pause: Pause::default(),
+            pause: ClaimPause::default(),
             limits: AgentLimits {
                 bundle: self.bundle_limits,
                 resources: self.slots.agent.limits.clone(),
                 time: self.slots.agent.time.clone(),
             },
-            lot: self.lot,
+            job_filter: self.job_filter,
         }
     }
 }
 
-/// `slots_server` is what the slots see of `server`.
+/// `slots_server` is the server that the slots use; in tests it may wrap `server`.
 pub(crate) async fn run_with(
     server: LocalServer,
-    slots_server: Arc<dyn WorkServer>,
+    slots_server: Arc<dyn JobServer>,
     evaluator: Arc<dyn Evaluator>,
     config: WorkerConfig,
     intervals: Intervals,
@@ -134,40 +134,40 @@ pub(crate) async fn run_with(
 
     match server.end_leases_of(scratch.worker()).await {
         Ok(0) => {}
-        Ok(ended) => tracing::info!(units = ended, "taken over from this worker's last life"),
-        // they end by themselves, if later
-        Err(error @ StoreError::FullDisk(_)) => {
-            tracing::warn!(%error, "the leases of this worker's last life stay until they run out");
+        Ok(ended) => tracing::info!(jobs = ended, "released the jobs of this worker's previous process"),
+        // They expire anyway.
+        Err(error @ StoreError::DiskFull(_)) => {
+            tracing::warn!(%error, "the leases of this worker's previous process remain until they expire");
         }
         Err(error) => return Err(error.into()),
     }
 
-    let tidying = tokio::spawn(tidy(server, intervals.tidy, shutdown.clone()));
-    let of_slots = (0..config.slots.cpus.slots.len()).map(|index| SlotServer {
+    let cleanup = tokio::spawn(run_cleanup(server, intervals.cleanup, shutdown.clone()));
+    let slot_servers = (0..config.slots.cpus.slots.len()).map(|index| SlotServer {
         slot: format!("{}/slot-{index}", scratch.worker()),
         server: Arc::clone(&slots_server),
     });
-    let of_slots = of_slots.collect();
+    let slot_servers = slot_servers.collect();
     let ended = run_slots(
         config.slots,
         &scratch,
-        of_slots,
+        slot_servers,
         evaluator,
         intervals,
         shutdown,
     )
     .await;
-    tidying.abort();
+    cleanup.abort();
     ended
 }
 
-/// What a slot is called, and who gives it work.
+/// The name of a slot, and the server from which it gets jobs.
 pub(crate) struct SlotServer {
     pub(crate) slot: String,
-    pub(crate) server: Arc<dyn WorkServer>,
+    pub(crate) server: Arc<dyn JobServer>,
 }
 
-/// Runs the slots, for as many servers, until `shutdown` is cancelled.
+/// Runs one slot per entry of `servers` until `shutdown` is cancelled.
 pub(crate) async fn run_slots(
     config: SlotsConfig,
     scratch: &Scratch,
@@ -181,9 +181,9 @@ pub(crate) async fn run_slots(
         "a worker needs at least one slot"
     );
     let stop = shutdown.child_token();
-    // However this function ends, its threads do, too.
+    // Ends the threads when this function ends, for whatever reason.
     let _stop = stop.clone().drop_guard();
-    tokio::spawn(tell_who_stands_still(config.metrics.clone(), stop.clone()));
+    tokio::spawn(report_stalled_slots(config.metrics.clone(), stop.clone()));
     let mut slots = JoinSet::new();
     let all = config.cpus.slots.into_iter().zip(servers);
     for (index, (cpus, SlotServer { slot: name, server })) in all.enumerate() {
@@ -193,7 +193,7 @@ pub(crate) async fn run_slots(
             number: index.to_string(),
             metrics: config.metrics.clone(),
             idle_poll: intervals.idle_poll,
-            rests: intervals.rests,
+            backoff: intervals.backoff,
             executor: Executor {
                 timing: None,
                 server: Arc::clone(&server),
@@ -216,22 +216,22 @@ pub(crate) async fn run_slots(
     wait_for(slots, intervals.shutdown_grace, &stop).await
 }
 
-/// Starts a slot's thread; the receiver hears of its end, or of its panic by the sender's drop.
+/// Starts a slot's thread. The receiver gets a value at its normal end, and an error if it panics.
 fn start(threads: &SlotThreads, index: usize, slot: Slot) -> anyhow::Result<oneshot::Receiver<()>> {
     let (ended, end) = oneshot::channel();
     threads
         .start(format!("faceoff-slot-{index}"), move || {
             cpus::pin_simulator(&slot.executor.host.cpus.simulator);
             slot.run();
-            // nobody listens any more after the grace
+            // After the grace period there is no receiver.
             let _ = ended.send(());
         })
         .context("starting a slot's thread")?;
     Ok(end)
 }
 
-/// Waits for the end of all slots. One that dies takes the others down: a server that looks well and
-/// does half of the work helps nobody.
+/// Waits for the end of all slots. If one dies, the others are stopped too: a server must not look healthy while it runs
+/// only part of its jobs.
 async fn wait_for(
     mut slots: JoinSet<Result<(), usize>>,
     shutdown_grace: Duration,
@@ -258,19 +258,19 @@ async fn wait_for(
             Ok(())
         }
         () = overdue => {
-            tracing::warn!("a slot is still in the middle of something; its unit was given back");
+            tracing::warn!("a slot has not ended in time; its job was released");
             Ok(())
         }
     }
 }
 
-/// Keeps the numbers, and with them the server's health, up to date about slots that something holds.
-async fn tell_who_stands_still(metrics: Metrics, stop: CancellationToken) {
+/// Keeps the metric of stalled slots up to date; the server's health depends on it.
+async fn report_stalled_slots(metrics: Metrics, stop: CancellationToken) {
     const EVERY: Duration = Duration::from_secs(1);
     loop {
         metrics
             .slots()
-            .set_standing_still(faceoff_runner::standing_still());
+            .set_stuck(faceoff_runner::stuck_threads());
         tokio::select! {
             () = stop.cancelled() => return,
             () = tokio::time::sleep(EVERY) => {}
@@ -278,10 +278,10 @@ async fn tell_who_stands_still(metrics: Metrics, stop: CancellationToken) {
     }
 }
 
-/// Clears away, now and then, what nobody needs.
-async fn tidy(server: LocalServer, every: Duration, shutdown: CancellationToken) {
+/// Removes obsolete data periodically.
+async fn run_cleanup(server: LocalServer, every: Duration, shutdown: CancellationToken) {
     loop {
-        tidying::tidy(&server.store, server.clock.now()).await;
+        cleanup::clean_up(&server.store, server.clock.now()).await;
         tokio::select! {
             () = shutdown.cancelled() => return,
             () = tokio::time::sleep(every) => {}

@@ -2,11 +2,11 @@ use crate::{
     executor::Executor,
     lease::{LeaseKeeper, Progress},
     remote::TooLarge,
-    server::{Claimed, GivenBack, Holding, WorkServer},
+    server::{ClaimResult, ReleaseReason, LeaseStatus, JobServer},
 };
-use faceoff_metrics::{Metrics, UnitEnd};
+use faceoff_metrics::{Metrics, JobEnd};
 use faceoff_runner::PlatformFault;
-use faceoff_wire::work::{Assignment, WorkOrder, WorkReport};
+use faceoff_wire::job::{JobPayload, JobSpec, JobReport};
 use std::{
     panic::AssertUnwindSafe,
     sync::Arc,
@@ -14,62 +14,62 @@ use std::{
 };
 use tokio_util::sync::CancellationToken;
 
-/// How long a slot leaves the queue to others after a fault of ours: twice as long each time, until it has played something. One whose
-/// sandbox or folder is broken would use up the attempts at everything that waits.
+/// How long a slot claims no job after a platform fault: twice as long after each further fault in a row. Otherwise a slot
+/// with a broken sandbox or disk would use up the attempts of all pending jobs.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Rests {
-    /// After the first.
+pub(crate) struct Backoff {
+    /// Pause after the first fault.
     pub(crate) first: Duration,
-    /// At most.
+    /// Longest pause.
     pub(crate) longest: Duration,
 }
 
-impl Rests {
-    /// After so many faults in a row.
+impl Backoff {
+    /// Pause after this many faults in a row.
     fn after(self, faults: u32) -> Duration {
         let doubled = 1_u32.checked_shl(faults.saturating_sub(1));
-        let rest = doubled.and_then(|times| self.first.checked_mul(times));
-        rest.unwrap_or(self.longest).min(self.longest)
+        let pause = doubled.and_then(|times| self.first.checked_mul(times));
+        pause.unwrap_or(self.longest).min(self.longest)
     }
 }
 
-/// One slot: claims units and works them off, one at a time, on its own thread.
+/// A slot: claims and runs jobs, one at a time, on its own thread.
 pub(crate) struct Slot {
     pub(crate) name: String,
-    /// As the server's numbers name it.
+    /// Label of the slot in metrics.
     pub(crate) number: String,
     pub(crate) metrics: Metrics,
-    /// How long to wait, idle, before looking for units that became claimable by the passing of time:
-    /// an expired lease, the end of a back-off, work added by another process.
+    /// How often an idle slot polls the queue for jobs that became claimable without a signal: by an expired lease, at
+    /// the end of a back-off, or by another process.
     pub(crate) idle_poll: Duration,
-    pub(crate) rests: Rests,
-    pub(crate) server: Arc<dyn WorkServer>,
+    pub(crate) backoff: Backoff,
+    pub(crate) server: Arc<dyn JobServer>,
     pub(crate) executor: Executor,
     pub(crate) shutdown: CancellationToken,
 }
 
 impl Slot {
-    /// Works until the shutdown.
+    /// Runs jobs until the shutdown.
     pub(crate) fn run(mut self) {
-        // The log is told of a change, not of every try.
+        // Only the first of several failures in a row is logged.
         let mut failing = false;
-        // Since it last played something.
+        // Platform faults in a row.
         let mut faults = 0;
         while !self.shutdown.is_cancelled() {
             let queue = match self.server.claim(&self.name) {
-                Ok(Claimed::Order(order)) => {
+                Ok(ClaimResult::Job(job)) => {
                     failing = false;
-                    match self.work_on(&order) {
-                        UnitEnd::Committed => faults = 0,
-                        UnitEnd::PlatformFault => {
+                    match self.run_job(&job) {
+                        JobEnd::Committed => faults = 0,
+                        JobEnd::PlatformFault => {
                             faults += 1;
-                            self.rest(faults);
+                            self.back_off(faults);
                         }
-                        UnitEnd::Lost | UnitEnd::FullDisk => {}
+                        JobEnd::Lost | JobEnd::FullDisk => {}
                     }
                     continue;
                 }
-                Ok(Claimed::Nothing { queue }) => {
+                Ok(ClaimResult::Empty { queue }) => {
                     failing = false;
                     Some(queue)
                 }
@@ -77,7 +77,7 @@ impl Slot {
                     if !failing {
                         tracing::error!(
                             cause = format!("{error:#}"),
-                            "cannot claim work; trying again"
+                            "cannot claim a job; trying again"
                         );
                     }
                     failing = true;
@@ -88,18 +88,18 @@ impl Slot {
         }
     }
 
-    /// After a fault of ours.
-    fn rest(&self, faults: u32) {
-        let rest = self.rests.after(faults);
+    /// Pauses after a platform fault.
+    fn back_off(&self, faults: u32) {
+        let pause = self.backoff.after(faults);
         tracing::warn!(
             slot = self.name,
-            ?rest,
+            ?pause,
             faults,
-            "resting after a platform fault"
+            "pausing after a platform fault"
         );
-        let woken = Instant::now() + rest;
+        let end = Instant::now() + pause;
         while !self.shutdown.is_cancelled() {
-            let left = woken.saturating_duration_since(Instant::now());
+            let left = end.saturating_duration_since(Instant::now());
             if left.is_zero() {
                 return;
             }
@@ -107,33 +107,33 @@ impl Slot {
         }
     }
 
-    fn work_on(&mut self, order: &WorkOrder) -> UnitEnd {
-        let (unit, work) = (order.lease.unit, &order.assignment);
-        // All that is logged meanwhile, by whatever this calls on the slot's thread, says for whom.
-        let _span = span(order).entered();
-        tracing::info!(%unit, %work, "begun");
-        let (busy, began) = (self.metrics.slots().begin(kind(work)), Instant::now());
-        // A defect of ours in the middle of an episode must not end the slot, nor the evaluation.
-        let ended = std::panic::catch_unwind(AssertUnwindSafe(|| self.perform(order)))
+    fn run_job(&mut self, job: &JobSpec) -> JobEnd {
+        let (id, payload) = (job.lease.job_id, &job.payload);
+        // All log lines of this thread carry the job's ids until the span ends.
+        let _span = span(job).entered();
+        tracing::info!(job = %id, description = %payload, "started");
+        let (busy, began) = (self.metrics.slots().start_job(kind(payload)), Instant::now());
+        // A panic in the evaluator must end neither the slot nor the evaluation.
+        let ended = std::panic::catch_unwind(AssertUnwindSafe(|| self.execute(job)))
             .unwrap_or_else(|panic| {
-                Err(anyhow::anyhow!("the evaluator failed: {}", words(&*panic)))
+                Err(anyhow::anyhow!("the evaluator failed: {}", panic_message(&*panic)))
             });
         let end = match ended {
-            Ok(Holding::Held) => {
-                tracing::info!(%unit, %work, "committed");
-                UnitEnd::Committed
+            Ok(LeaseStatus::Held) => {
+                tracing::info!(job = %id, description = %payload, "committed");
+                JobEnd::Committed
             }
-            Ok(Holding::Lost) => {
-                tracing::info!(%unit, %work, "no longer this slot's");
-                UnitEnd::Lost
+            Ok(LeaseStatus::Lost) => {
+                tracing::info!(job = %id, description = %payload, "lease lost");
+                JobEnd::Lost
             }
             Err(error) => {
-                let end = if self.server.met_full_disk(&error) {
-                    UnitEnd::FullDisk
+                let end = if self.server.is_full_disk(&error) {
+                    JobEnd::FullDisk
                 } else {
-                    UnitEnd::PlatformFault
+                    JobEnd::PlatformFault
                 };
-                self.give_back(order, &error);
+                self.release(job, &error);
                 end
             }
         };
@@ -141,58 +141,57 @@ impl Slot {
         end
     }
 
-    /// From order to commit. An error is a fault of ours.
-    fn perform(&mut self, order: &WorkOrder) -> anyhow::Result<Holding> {
+    /// Runs and commits a job. An error is a platform fault.
+    fn execute(&mut self, job: &JobSpec) -> anyhow::Result<LeaseStatus> {
         let keeper = LeaseKeeper::keep(
             Arc::clone(&self.server),
-            order.lease.clone(),
+            job.lease.clone(),
             &self.shutdown,
         )?;
         let progress = keeper.progress();
-        let committed = self.executor.report(order, &progress).and_then(|report| {
-            let holding = self.commit(order, &report, &progress)?;
-            if holding == Holding::Held {
+        let committed = self.executor.run(job, &progress).and_then(|report| {
+            let status = self.commit(job, &report, &progress)?;
+            if status == LeaseStatus::Held {
                 self.count(&report);
             }
-            Ok(holding)
+            Ok(status)
         });
-        // Whatever it is being told is told by then: whose the unit is decides what an error is.
+        // Waits for a renewal in progress: an error after the lease was lost is not a platform fault.
         drop(keeper);
         match committed {
-            // no fault: the unit was given back, or is another's
+            // Not a fault: the job was released, or another slot has it.
             Err(error) if progress.stopped() => {
-                tracing::info!(unit = %order.lease.unit, cause = format!("{error:#}"), "stopped");
-                Ok(Holding::Lost)
+                tracing::info!(job = %job.lease.job_id, cause = format!("{error:#}"), "stopped");
+                Ok(LeaseStatus::Lost)
             }
             committed => committed,
         }
     }
 
-    /// Counts what came of a unit.
-    fn count(&self, report: &WorkReport) {
-        if let (WorkReport::Play { outcomes, .. }, Some(timing)) = (report, &self.executor.timing) {
+    /// Counts the result of a job in the metrics.
+    fn count(&self, report: &JobReport) {
+        if let (JobReport::Shard { outcomes, .. }, Some(timing)) = (report, &self.executor.timing) {
             let slots = self.metrics.slots();
-            slots.played(&self.number, outcomes, timing);
+            slots.record_episodes(&self.number, outcomes, timing);
         }
     }
 
-    /// Commits; while a full disk is in the way, again and again: what was played need not be played
-    /// twice for that.
+    /// Commits the report. While the disk is full it tries again, so that the job need not be repeated.
     fn commit(
         &self,
-        order: &WorkOrder,
-        report: &WorkReport,
+        job: &JobSpec,
+        report: &JobReport,
         progress: &Progress,
-    ) -> anyhow::Result<Holding> {
-        let unit = order.lease.unit;
-        let mut told = false;
+    ) -> anyhow::Result<LeaseStatus> {
+        let id = job.lease.job_id;
+        let mut is_logged = false;
         loop {
-            let committed = self.server.commit(&order.lease, report.clone());
+            let committed = self.server.commit(&job.lease, report.clone());
             match committed {
-                Err(error) if self.server.met_full_disk(&error) && !progress.stopped() => {
-                    if !told {
-                        tracing::warn!(%unit, cause = format!("{error:#}"), "no room to commit; waiting for it");
-                        told = true;
+                Err(error) if self.server.is_full_disk(&error) && !progress.stopped() => {
+                    if !is_logged {
+                        tracing::warn!(job = %id, cause = format!("{error:#}"), "disk full: waiting to commit");
+                        is_logged = true;
                     }
                     self.server.wait(&self.shutdown, self.idle_poll, None);
                 }
@@ -201,30 +200,30 @@ impl Slot {
         }
     }
 
-    /// Our fault, or a full disk's.
-    fn give_back(&self, order: &WorkOrder, error: &anyhow::Error) {
-        let unit = order.lease.unit;
+    /// Releases the job after a platform fault or because of a full disk.
+    fn release(&self, job: &JobSpec, error: &anyhow::Error) {
+        let id = job.lease.job_id;
         let cause = format!("{error:#}");
-        // The cause names folders of this host; a team is told enough to ask about it.
-        let reason = format!("{} (in the server's log: unit {unit})", outside(error));
-        let why = if self.server.met_full_disk(error) {
-            tracing::warn!(%unit, work = %order.assignment, cause, "no room for the unit: it is given back");
-            GivenBack::FullDisk
+        // The cause names folders of this host, so the team gets only a summary and the job's id.
+        let summary = format!("{} (in the server's log: job {id})", public_reason(error));
+        let reason = if self.server.is_full_disk(error) {
+            tracing::warn!(job = %id, description = %job.payload, cause, "disk full: job released");
+            ReleaseReason::FullDisk
         } else {
-            tracing::error!(%unit, work = %order.assignment, cause, "platform fault");
-            GivenBack::PlatformFault(&reason)
+            tracing::error!(job = %id, description = %job.payload, cause, "platform fault");
+            ReleaseReason::PlatformFault(&summary)
         };
         loop {
-            match self.server.give_back(&order.lease, why) {
+            match self.server.release(&job.lease, reason) {
                 Ok(()) => return,
-                // Without this its lease would end, and that would count against it.
+                // Otherwise the lease would expire, and the attempt would count.
                 Err(error)
-                    if self.server.met_full_disk(&error) && !self.shutdown.is_cancelled() =>
+                    if self.server.is_full_disk(&error) && !self.shutdown.is_cancelled() =>
                 {
                     self.server.wait(&self.shutdown, self.idle_poll, None);
                 }
                 Err(error) => {
-                    tracing::error!(%unit, cause = format!("{error:#}"), "the unit could not be given back; its lease will end");
+                    tracing::error!(job = %id, cause = format!("{error:#}"), "the job could not be released; its lease will expire");
                     return;
                 }
             }
@@ -232,38 +231,38 @@ impl Slot {
     }
 }
 
-/// Names the unit, and whose work it is.
-fn span(order: &WorkOrder) -> tracing::Span {
-    let (unit, slot) = (order.lease.unit, &order.lease.slot);
-    match &order.assignment {
-        Assignment::Smoke { submission, .. } => {
-            tracing::info_span!("slot", %unit, slot, %submission)
+/// A span with the ids of the job and of what it belongs to.
+fn span(job: &JobSpec) -> tracing::Span {
+    let (id, slot) = (job.lease.job_id, &job.lease.slot);
+    match &job.payload {
+        JobPayload::Validation { submission, .. } => {
+            tracing::info_span!("slot", job = %id, slot, %submission)
         }
-        // Of an ablation or a draft it is theirs.
-        Assignment::Play { part_of, .. } => {
-            tracing::info_span!("slot", %unit, slot, evaluation = %part_of)
+        // For ablations and proposals, the field `evaluation` has their id.
+        JobPayload::Shard { part_of, .. } => {
+            tracing::info_span!("slot", job = %id, slot, evaluation = %part_of)
         }
-        Assignment::Game { game, .. } => tracing::info_span!("slot", %unit, slot, %game),
-        Assignment::Finalise { evaluation, .. } => {
-            tracing::info_span!("slot", %unit, slot, %evaluation)
+        JobPayload::Game { game, .. } => tracing::info_span!("slot", job = %id, slot, %game),
+        JobPayload::Scoring { evaluation, .. } => {
+            tracing::info_span!("slot", job = %id, slot, %evaluation)
         }
     }
 }
 
-/// As the server's numbers call it.
-const fn kind(work: &Assignment) -> &'static str {
-    match work {
-        Assignment::Smoke { .. } => "smoke",
-        Assignment::Play { .. } => "play",
-        Assignment::Game { .. } => "game",
-        Assignment::Finalise { .. } => "finalise",
+/// Label of the kind of job in metrics.
+const fn kind(payload: &JobPayload) -> &'static str {
+    match payload {
+        JobPayload::Validation { .. } => "smoke",
+        JobPayload::Shard { .. } => "play",
+        JobPayload::Game { .. } => "game",
+        JobPayload::Scoring { .. } => "finalise",
     }
 }
 
-/// What a team may know of a fault of ours.
-fn outside(error: &anyhow::Error) -> &'static str {
+/// The description of a platform fault for the team.
+fn public_reason(error: &anyhow::Error) -> &'static str {
     if error.is::<TooLarge>() {
-        return "what came of it is larger than NATS takes: its max_payload is to be raised";
+        return "the result exceeds the max_payload of NATS, which must be raised";
     }
     match error.downcast_ref::<PlatformFault>() {
         Some(PlatformFault::Sandbox(_)) => "the sandbox could not be set up",
@@ -277,8 +276,8 @@ fn outside(error: &anyhow::Error) -> &'static str {
     }
 }
 
-/// What a panic said.
-fn words(panic: &(dyn std::any::Any + Send)) -> &str {
+/// The message of a panic.
+fn panic_message(panic: &(dyn std::any::Any + Send)) -> &str {
     panic
         .downcast_ref::<&str>()
         .copied()
@@ -291,12 +290,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn rests_double_up_to_the_longest() {
-        let rests = Rests {
+    fn backoff_doubles_up_to_the_longest() {
+        let backoff = Backoff {
             first: Duration::from_secs(2),
             longest: Duration::from_secs(300),
         };
-        let rests = [1, 2, 3, 8, 9, 32, 33, u32::MAX].map(|faults| rests.after(faults).as_secs());
-        assert_eq!(rests, [2, 4, 8, 256, 300, 300, 300, 300]);
+        let pauses = [1, 2, 3, 8, 9, 32, 33, u32::MAX].map(|faults| backoff.after(faults).as_secs());
+        assert_eq!(pauses, [2, 4, 8, 256, 300, 300, 300, 300]);
     }
 }

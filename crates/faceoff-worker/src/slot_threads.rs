@@ -1,6 +1,7 @@
-//! Who starts the slots' threads. A thread inherits the CPUs and the priority of the one that starts it, and
-//! may not raise its priority again: so a server that answers requests on threads of low priority starts
-//! its slots from another one.
+//! Starts the threads of slots.
+//!
+//! A thread inherits the CPUs and the priority of the thread that starts it, and may not raise its priority. A server
+//! answers requests on threads of low priority, so it starts its slots from a separate thread.
 
 use std::{
     io,
@@ -17,7 +18,7 @@ struct Request {
     started: Sender<io::Result<()>>,
 }
 
-/// A thread's work, which says nothing of itself.
+/// A thread's closure, with a `Debug` implementation.
 struct BodyOf(Body);
 
 impl std::fmt::Debug for BodyOf {
@@ -26,7 +27,7 @@ impl std::fmt::Debug for BodyOf {
     }
 }
 
-/// Starts threads, wherever it is called from.
+/// Starts threads; may be used from any thread.
 #[derive(Debug, Clone)]
 pub struct SlotThreads(Starter);
 
@@ -36,20 +37,20 @@ enum Starter {
     Other(Sender<Request>),
 }
 
-/// To be [tended](Self::tend) by the thread whose CPUs and priority the slots inherit.
+/// [Runs](Self::run) on the thread whose CPUs and priority the slots inherit.
 #[derive(Debug)]
 pub struct SlotStarter(Receiver<Request>);
 
 impl SlotThreads {
-    /// Each thread is started by the one that asks for it.
+    /// Threads are started by the calling thread.
     #[must_use]
-    pub const fn of_the_caller() -> Self {
+    pub const fn from_caller() -> Self {
         Self(Starter::Caller)
     }
 
-    /// Each thread is started by the one that tends the other half.
+    /// Threads are started by the thread that runs the returned [`SlotStarter`].
     #[must_use]
-    pub fn of_another() -> (Self, SlotStarter) {
+    pub fn from_starter() -> (Self, SlotStarter) {
         let (requests, starter) = mpsc::channel();
         (Self(Starter::Other(requests)), SlotStarter(starter))
     }
@@ -79,15 +80,15 @@ impl SlotThreads {
 }
 
 impl SlotStarter {
-    /// Starts what is asked for until nobody is left who could ask.
-    pub fn tend(self) {
+    /// Starts the requested threads until all [`SlotThreads`] are dropped.
+    pub fn run(self) {
         for Request {
             name,
             body,
             started,
         } in self.0
         {
-            // Who has asked and is gone is told nothing.
+            // The requester may be gone.
             let _ = started.send(spawn(name, body.0));
         }
     }
@@ -103,24 +104,24 @@ mod tests {
     use faceoff_sandbox::affinity;
 
     #[test]
-    fn a_thread_inherits_from_the_one_that_starts_it_and_not_from_the_one_that_asks() {
-        let (threads, starter) = SlotThreads::of_another();
+    fn slot_threads_inherit_from_the_starter() {
+        let (threads, starter) = SlotThreads::from_starter();
         let all = affinity::allowed().unwrap();
-        let asking = thread::spawn(move || {
-            affinity::give_way(&all[..1]).unwrap();
-            let (tell, told) = mpsc::channel();
+        let requester = thread::spawn(move || {
+            affinity::lower_priority(&all[..1]).unwrap();
+            let (sender, receiver) = mpsc::channel();
             threads
-                .start("asked for".into(), move || {
+                .start("requested".into(), move || {
                     let seen = (affinity::allowed().unwrap(), affinity::niceness().unwrap());
-                    tell.send(seen).unwrap();
+                    sender.send(seen).unwrap();
                 })
                 .unwrap();
-            (told.recv().unwrap(), affinity::niceness().unwrap())
+            (receiver.recv().unwrap(), affinity::niceness().unwrap())
         });
-        starter.tend();
-        let ((cpus, nice), asking) = asking.join().unwrap();
+        starter.run();
+        let ((cpus, nice), requester_nice) = requester.join().unwrap();
         assert_eq!(cpus, affinity::allowed().unwrap());
         assert_eq!(nice, affinity::niceness().unwrap());
-        assert!(asking > nice, "{asking} > {nice}");
+        assert!(requester_nice > nice, "{requester_nice} > {nice}");
     }
 }

@@ -1,12 +1,12 @@
-//! Slots on a real store, with an evaluator that plays what a test tells it to: faults of ours and
-//! moments of time that a healthy runner does not offer. The real runner is in `tests/it`.
+//! Slots on a real store, with an evaluator scripted by the tests. It injects platform faults and timings that a healthy
+//! runner does not have. The real runner is tested in `tests/it`.
 
-mod between;
+mod intercepted_server;
 mod fixture;
 mod full_disk;
 mod games;
 mod interrupted;
-mod orders;
+mod jobs;
 mod runtimes;
 mod scripted_game;
 mod slots;

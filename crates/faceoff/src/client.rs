@@ -4,7 +4,7 @@ mod archive;
 mod download;
 mod game;
 mod http;
-mod kept;
+mod files;
 mod links;
 mod pages;
 mod people;
@@ -18,12 +18,12 @@ mod webhooks;
 mod workers;
 
 use anyhow::{Context, anyhow, bail};
-pub use download::Downloaded;
+pub use download::DownloadedFile;
 use faceoff_api::{
     API_BASE,
     requests::{
         BoardFormat, BoardQuery, Cancellation, CloseSeason, ComparisonQuery, Confirmation,
-        Decision, ExtraTurn, MissedDay, NewStage, NewTeam, Reason, StageChange, StartDay,
+        Decision, NewExtraEvaluation, MissedDay, NewStage, NewTeam, Reason, StageChange, StartDay,
     },
     views::{
         board::BoardView,
@@ -43,33 +43,33 @@ use faceoff_api::{
 use faceoff_types::{EvaluationId, StageDay, StageId, Task, TeamId};
 use http::Address;
 use jiff::civil::Date;
-pub use links::Linked;
+pub use links::LinkTarget;
 use reqwest::{Method, RequestBuilder, Response, StatusCode, header};
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 pub use sse::ServerEvent;
 use std::{path::Path, time::Duration};
-pub use tls::{none as no_tls, trusting as trusting_tls};
+pub use tls::{plain_client_config, tls_client_config};
 
-/// Longest silence of the server.
-const PATIENCE: Duration = Duration::from_secs(60);
+/// Longest silence of the server before a request fails.
+const READ_TIMEOUT: Duration = Duration::from_secs(60);
 
 /// A problem that the server reported (RFC 9457).
 #[derive(Debug, Clone, thiserror::Error)]
 #[error("the server refused ({status}, {title}): {detail}")]
 pub struct ApiError {
     pub status: StatusCode,
-    /// The kind of problem in words.
+    /// The kind of problem, readable.
     pub title: String,
-    /// What was expected, what came and what to do.
+    /// Expected and received value, and the remedy.
     pub detail: String,
 }
 
-/// No answer, or none that a Faceoff server gives; the cause says more.
+/// No answer, or an answer that no Faceoff server gives. The error's source has the cause.
 #[derive(Debug, Clone, thiserror::Error)]
 #[error("{0}")]
 pub struct Unreachable(pub String);
 
-/// A server, and who we are to it.
+/// A server and the token to call it with.
 #[derive(Debug, Clone)]
 pub struct Client {
     http: reqwest::Client,
@@ -78,21 +78,21 @@ pub struct Client {
 }
 
 impl Client {
-    /// A client of `server` (e.g. `https://faceoff.example.org`), with a bearer token or without. Behind TLS the authorities
-    /// of `ca_file` are believed, too.
+    /// A client of `server` (e.g. `https://faceoff.example.org`), with or without a bearer token. For TLS, the
+    /// certificate authorities of `ca_file` are trusted in addition to the machine's.
     ///
     /// # Errors
-    /// If `server` is no `http://` or `https://` address, or there is no authority to believe.
+    /// If `server` is no `http://` or `https://` address, or no certificate authority is available.
     pub fn new(server: &str, token: Option<&str>, ca_file: Option<&Path>) -> anyhow::Result<Self> {
         let address = Address::new(server, ca_file)?;
         Ok(Self {
-            http: address.http(PATIENCE)?,
+            http: address.http(READ_TIMEOUT)?,
             address,
             token: token.map(str::to_owned),
         })
     }
 
-    /// The same server, as somebody else.
+    /// The same server with another token.
     #[must_use]
     pub fn with_token(&self, token: &str) -> Self {
         Self {
@@ -101,10 +101,10 @@ impl Client {
         }
     }
 
-    /// Is the server fit for work?
+    /// The server's health.
     ///
     /// # Errors
-    /// If it does not answer, or is not: what is missing.
+    /// If the server does not answer or is unhealthy; the error names what is missing.
     pub async fn health(&self) -> anyhow::Result<HealthView> {
         self.get("/health").await
     }
@@ -112,63 +112,63 @@ impl Client {
     /// The board of a task, or the overall one.
     ///
     /// # Errors
-    /// As [`ApiError`], or when the server cannot be reached; so for all calls below.
+    /// [`ApiError`] if the server refuses, [`Unreachable`] if it does not answer; the same holds for all calls below.
     pub async fn board(
         &self,
         task: Option<Task>,
-        wanted: &BoardQuery,
+        query: &BoardQuery,
     ) -> anyhow::Result<BoardView> {
-        let request = self.request(Method::GET, &board_path(task)).query(wanted);
-        read(self.send(request).await?).await
+        let request = self.request(Method::GET, &board_path(task)).query(query);
+        read_json(self.send(request).await?).await
     }
 
-    /// A board as a table for spreadsheets.
+    /// A board as CSV.
     pub async fn board_csv(
         &self,
         task: Option<Task>,
-        wanted: &BoardQuery,
+        query: &BoardQuery,
     ) -> anyhow::Result<String> {
-        let wanted = BoardQuery {
+        let query = BoardQuery {
             format: Some(BoardFormat::Csv),
-            ..wanted.clone()
+            ..query.clone()
         };
-        let request = self.request(Method::GET, &board_path(task)).query(&wanted);
+        let request = self.request(Method::GET, &board_path(task)).query(&query);
         let text = self.send(request).await?.text().await;
         text.context("reading the server's answer")
     }
 
-    /// Two finished evaluations on the same episodes.
+    /// Compares two finished evaluations on the same episodes.
     pub async fn compare(
         &self,
         a: EvaluationId,
         b: EvaluationId,
-        wanted: ComparisonQuery,
+        query: ComparisonQuery,
     ) -> anyhow::Result<ComparisonView> {
         let path = format!("/evaluations/{a}/compare/{b}");
-        let request = self.request(Method::GET, &path).query(&wanted);
-        read(self.send(request).await?).await
+        let request = self.request(Method::GET, &path).query(&query);
+        read_json(self.send(request).await?).await
     }
 
     pub async fn season(&self) -> anyhow::Result<SeasonView> {
         self.get("/season").await
     }
 
-    /// Organiser: closes the season for good; `confirm` is its name.
+    /// Organiser: closes the season permanently; `confirm` is its name.
     pub async fn close_season(&self, confirm: &str) -> anyhow::Result<SeasonView> {
         let request = self
             .request(Method::POST, "/season/close")
             .json(&CloseSeason {
                 confirm: confirm.to_owned(),
             });
-        read(self.send(request).await?).await
+        read_json(self.send(request).await?).await
     }
 
-    /// Organiser: creates a team; its token comes this once.
+    /// Organiser: creates a team. Only this response has its token.
     pub async fn create_team(&self, name: &str) -> anyhow::Result<TeamWithToken> {
         let request = self.request(Method::POST, "/teams").json(&NewTeam {
             name: name.to_owned(),
         });
-        read(self.send(request).await?).await
+        read_json(self.send(request).await?).await
     }
 
     /// Organiser: all teams.
@@ -176,37 +176,37 @@ impl Client {
         self.list(self.request(Method::GET, "/teams")).await
     }
 
-    /// Organiser: a new token for a team; the old one is worth nothing from then on.
+    /// Organiser: issues a new token for a team and revokes the old one.
     pub async fn replace_token(&self, team: TeamId) -> anyhow::Result<TeamWithToken> {
         let request = self.request(Method::POST, &format!("/teams/{team}/token"));
-        read(self.send(request).await?).await
+        read_json(self.send(request).await?).await
     }
 
-    /// Organiser: starts the day of a stage, or of the one that is open.
+    /// Organiser: starts the evaluation day of a stage, by default of the open one.
     pub async fn start_day(&self, stage: Option<StageId>) -> anyhow::Result<DayView> {
         let request = self
             .request(Method::POST, "/days")
             .json(&StartDay { stage });
-        read(self.send(request).await?).await
+        read_json(self.send(request).await?).await
     }
 
-    /// All stages, the first to open first.
+    /// All stages, by opening time.
     pub async fn stages(&self) -> anyhow::Result<Vec<StageView>> {
         self.get("/stages").await
     }
 
-    /// What agents find on the server.
+    /// The environment of agents on the server: runtimes, packages, limits.
     ///
     /// # Errors
-    /// If it does not answer, or not as one of this version would.
+    /// If the server does not answer, or is of another version.
     pub async fn runtimes(&self) -> anyhow::Result<RuntimesView> {
         self.get("/runtimes").await.map_err(|error| {
-            let unknown = error
+            let is_unknown_route = error
                 .downcast_ref::<ApiError>()
                 .is_some_and(|error| error.status == StatusCode::NOT_FOUND);
-            if unknown {
+            if is_unknown_route {
                 error.context(
-                    "it does not tell what agents find there; is it an older version of Faceoff?",
+                    "the server does not describe its runtimes; is it an older version of Faceoff?",
                 )
             } else {
                 error
@@ -214,49 +214,49 @@ impl Client {
         })
     }
 
-    /// Organiser: how the days of a stage fit into their time.
+    /// Organiser: whether the evaluation days of a stage fit into their time.
     pub async fn capacity(&self, id: StageId) -> anyhow::Result<CapacityView> {
         self.get(&format!("/stages/{id}/capacity")).await
     }
 
-    /// Organiser: has the boards of a stage stand still.
+    /// Organiser: freezes the boards of a stage.
     pub async fn freeze(&self, id: StageId, reason: &str) -> anyhow::Result<StageView> {
         let request = self.request(Method::POST, &format!("/stages/{id}/freeze"));
         let reason = reason.to_owned();
-        read(self.send(request.json(&Reason { reason })).await?).await
+        read_json(self.send(request.json(&Reason { reason })).await?).await
     }
 
-    /// Organiser: has the boards of a stage show everything again.
+    /// Organiser: unfreezes the boards of a stage.
     pub async fn unfreeze(&self, id: StageId) -> anyhow::Result<StageView> {
         let request = self.request(Method::POST, &format!("/stages/{id}/unfreeze"));
-        read(self.send(request).await?).await
+        read_json(self.send(request).await?).await
     }
 
-    /// Organiser: plays a day that was missed.
+    /// Organiser: starts an evaluation day that was missed.
     pub async fn start_missed_day(
         &self,
         id: StageId,
-        wanted: &MissedDay,
+        missed: &MissedDay,
     ) -> anyhow::Result<DayView> {
         let request = self.request(Method::POST, &format!("/stages/{id}/days"));
-        read(self.send(request.json(wanted)).await?).await
+        read_json(self.send(request.json(missed)).await?).await
     }
 
-    /// Organiser: gives a team one more evaluation of a day.
-    pub async fn extra_turn(
+    /// Organiser: adds one evaluation of a team to an evaluation day.
+    pub async fn add_evaluation(
         &self,
-        of: StageDay,
-        wanted: &ExtraTurn,
+        day: StageDay,
+        extra: &NewExtraEvaluation,
     ) -> anyhow::Result<EvaluationView> {
-        let path = format!("/stages/{}/days/{}/extra-turn", of.stage, of.date);
+        let path = format!("/stages/{}/days/{}/extra-turn", day.stage, day.date);
         let request = self.request(Method::POST, &path);
-        read(self.send(request.json(wanted)).await?).await
+        read_json(self.send(request.json(extra)).await?).await
     }
 
-    /// Organiser: makes a stage.
+    /// Organiser: creates a stage.
     pub async fn create_stage(&self, new: &NewStage) -> anyhow::Result<StageView> {
         let request = self.request(Method::POST, "/stages").json(new);
-        read(self.send(request).await?).await
+        read_json(self.send(request).await?).await
     }
 
     /// Organiser: changes a stage.
@@ -266,35 +266,35 @@ impl Client {
         change: &StageChange,
     ) -> anyhow::Result<StageView> {
         let request = self.request(Method::PATCH, &format!("/stages/{id}"));
-        read(self.send(request.json(change)).await?).await
+        read_json(self.send(request.json(change)).await?).await
     }
 
     /// Organiser: starts a stage's final day.
     pub async fn start_final_day(&self, id: StageId) -> anyhow::Result<DayView> {
         let request = self.request(Method::POST, &format!("/stages/{id}/final"));
-        read(self.send(request).await?).await
+        read_json(self.send(request).await?).await
     }
 
-    /// Organiser: signs a stage's result off; `confirm` is its name.
+    /// Organiser: signs off a stage's result; `confirm` is the stage's name.
     pub async fn finalise(
         &self,
         id: StageId,
         confirm: Option<String>,
     ) -> anyhow::Result<StageView> {
         let request = self.request(Method::POST, &format!("/stages/{id}/finalise"));
-        read(self.send(request.json(&Confirmation { confirm })).await?).await
+        read_json(self.send(request.json(&Confirmation { confirm })).await?).await
     }
 
-    /// Team: makes an evaluation of its own public.
+    /// Team: publishes one of its own evaluations.
     pub async fn publish(&self, id: EvaluationId) -> anyhow::Result<EvaluationView> {
         let request = self.request(Method::POST, &format!("/evaluations/{id}/publish"));
-        read(self.send(request).await?).await
+        read_json(self.send(request).await?).await
     }
 
-    /// Organiser: plays an evaluation again that was cancelled or failed by the server's fault.
+    /// Organiser: repeats an evaluation that was cancelled or failed by a platform fault.
     pub async fn rerun(&self, id: EvaluationId) -> anyhow::Result<EvaluationView> {
         let request = self.request(Method::POST, &format!("/evaluations/{id}/rerun"));
-        read(self.send(request).await?).await
+        read_json(self.send(request).await?).await
     }
 
     /// Organiser: stops an evaluation.
@@ -304,34 +304,34 @@ impl Client {
             .json(&Cancellation {
                 reason: reason.to_owned(),
             });
-        read(self.send(request).await?).await
+        read_json(self.send(request).await?).await
     }
 
-    /// Organiser: takes a result off the boards.
+    /// Organiser: voids a result, which leaves the boards.
     pub async fn void(
         &self,
         id: EvaluationId,
         decision: &Decision,
     ) -> anyhow::Result<EvaluationView> {
         let request = self.request(Method::POST, &format!("/evaluations/{id}/void"));
-        read(self.send(request.json(decision)).await?).await
+        read_json(self.send(request.json(decision)).await?).await
     }
 
-    /// Organiser: takes a whole day off the boards.
-    pub async fn void_day(&self, of: StageDay, decision: &Decision) -> anyhow::Result<DayView> {
-        let path = format!("/stages/{}/days/{}/void", of.stage, of.date);
+    /// Organiser: voids a whole evaluation day.
+    pub async fn void_day(&self, day: StageDay, decision: &Decision) -> anyhow::Result<DayView> {
+        let path = format!("/stages/{}/days/{}/void", day.stage, day.date);
         let request = self.request(Method::POST, &path);
-        read(self.send(request.json(decision)).await?).await
+        read_json(self.send(request.json(decision)).await?).await
     }
 
-    /// Organiser: holds the queue.
+    /// Organiser: pauses the queue.
     pub async fn pause(&self, reason: &str) -> anyhow::Result<()> {
         let reason = reason.to_owned();
         let request = self.request(Method::POST, "/queue/pause");
         self.send(request.json(&Reason { reason })).await.map(drop)
     }
 
-    /// Organiser: lets the queue go on.
+    /// Organiser: resumes the queue.
     pub async fn resume(&self) -> anyhow::Result<()> {
         let request = self.request(Method::POST, "/queue/resume");
         self.send(request).await.map(drop)
@@ -340,22 +340,22 @@ impl Client {
     /// Organiser: disqualifies a team.
     pub async fn disqualify(&self, id: TeamId, decision: &Decision) -> anyhow::Result<TeamView> {
         let request = self.request(Method::POST, &format!("/teams/{id}/disqualify"));
-        read(self.send(request.json(decision)).await?).await
+        read_json(self.send(request.json(decision)).await?).await
     }
 
-    /// Organiser: lets a disqualified team play again.
+    /// Organiser: reinstates a disqualified team.
     pub async fn reinstate(&self, id: TeamId, reason: &str) -> anyhow::Result<TeamView> {
         let request = self.request(Method::POST, &format!("/teams/{id}/reinstate"));
         let reason = reason.to_owned();
-        read(self.send(request.json(&Reason { reason })).await?).await
+        read_json(self.send(request.json(&Reason { reason })).await?).await
     }
 
-    /// Team: who we are, what plays for us today, and what we enter next.
+    /// Team: its name and limits, today's evaluations and its active submission.
     pub async fn me(&self) -> anyhow::Result<MeView> {
         self.get("/me").await
     }
 
-    /// Organiser: all evaluations of a day (today). Team: its own (all).
+    /// Organiser: all evaluations of a day (default: today). Team: its own (default: of all days).
     pub async fn evaluations(&self, day: Option<Date>) -> anyhow::Result<Vec<EvaluationView>> {
         let request = self.request(Method::GET, "/evaluations");
         let request = match day {
@@ -365,19 +365,19 @@ impl Client {
         self.list(request).await
     }
 
-    /// Team: its newest evaluations, so many at most.
+    /// Team: its newest evaluations, at most `limit` (up to 200).
     pub async fn newest_evaluations(&self, limit: usize) -> anyhow::Result<Vec<EvaluationView>> {
         let request = self.request(Method::GET, "/evaluations");
         let request = request.query(&[("limit", limit.clamp(1, 200))]);
-        let mut newest: Vec<EvaluationView> = read(self.send(request).await?).await?;
+        let mut newest: Vec<EvaluationView> = read_json(self.send(request).await?).await?;
         newest.truncate(limit);
         Ok(newest)
     }
 
-    /// Organiser: what was changed last, of what the parameters of `GET /events` let through.
-    pub async fn events(&self, wanted: &[(&str, String)]) -> anyhow::Result<EventsView> {
-        let request = self.request(Method::GET, "/events").query(wanted);
-        read(self.send(request).await?).await
+    /// Organiser: the newest entries of the log that match the parameters of `GET /events`.
+    pub async fn events(&self, parameters: &[(&str, String)]) -> anyhow::Result<EventsView> {
+        let request = self.request(Method::GET, "/events").query(parameters);
+        read_json(self.send(request).await?).await
     }
 
     /// Team or organiser: one evaluation.
@@ -396,27 +396,27 @@ impl Client {
     }
 
     async fn get<T: DeserializeOwned>(&self, path: &str) -> anyhow::Result<T> {
-        read(self.send(self.request(Method::GET, path)).await?).await
+        read_json(self.send(self.request(Method::GET, path)).await?).await
     }
 
-    async fn tell<T: DeserializeOwned>(
+    async fn call_with_body<T: DeserializeOwned>(
         &self,
         method: Method,
         path: &str,
         body: &impl Serialize,
     ) -> anyhow::Result<T> {
         let request = self.request(method, path).json(body);
-        read(self.send(request).await?).await
+        read_json(self.send(request).await?).await
     }
 
-    async fn act<T: DeserializeOwned>(&self, method: Method, path: &str) -> anyhow::Result<T> {
-        read(self.send(self.request(method, path)).await?).await
+    async fn call<T: DeserializeOwned>(&self, method: Method, path: &str) -> anyhow::Result<T> {
+        read_json(self.send(self.request(method, path)).await?).await
     }
 
     async fn send(&self, request: RequestBuilder) -> anyhow::Result<Response> {
         let base = &self.address.base;
-        let sent = request.send().await.map_err(reqwest::Error::without_url);
-        let response = sent.map_err(|error| {
+        let result = request.send().await.map_err(reqwest::Error::without_url);
+        let response = result.map_err(|error| {
             let error = anyhow::Error::from(error);
             let error = match tls::advice(&error) {
                 Some(advice) => error.context(advice),
@@ -428,13 +428,13 @@ impl Client {
         if status.is_success() {
             return Ok(response);
         }
-        if let (true, Some(elsewhere)) = (
+        if let (true, Some(location)) = (
             status.is_redirection(),
             response.headers().get(header::LOCATION),
         ) {
             bail!(
-                "{base} says that it is elsewhere now ({}); give that server's address",
-                String::from_utf8_lossy(elsewhere.as_bytes())
+                "{base} redirects to another address ({}); use that server's address",
+                String::from_utf8_lossy(location.as_bytes())
             );
         }
         #[derive(Deserialize)]
@@ -445,7 +445,7 @@ impl Client {
         let text = response.text().await.unwrap_or_default();
         let Ok(Problem { title, detail }) = serde_json::from_str(&text) else {
             return Err(
-                anyhow!("it answered {status}, and not as a Faceoff server would")
+                anyhow!("it answered {status}, but not as a Faceoff server does")
                     .context(Unreachable(format!("talking to {base}"))),
             );
         };
@@ -458,13 +458,13 @@ impl Client {
     }
 }
 
-async fn read<T: DeserializeOwned>(response: Response) -> anyhow::Result<T> {
+async fn read_json<T: DeserializeOwned>(response: Response) -> anyhow::Result<T> {
     let bytes = response
         .bytes()
         .await
         .context("reading the server's answer")?;
     serde_json::from_slice(&bytes).context(Unreachable(
-        "the server's answer is not understood; is it another version of Faceoff?".to_owned(),
+        "the server's answer cannot be read; is it another version of Faceoff?".to_owned(),
     ))
 }
 

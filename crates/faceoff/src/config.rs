@@ -1,18 +1,18 @@
 //! The configuration: one TOML file in which every field may be left out.
 //!
 //! The defaults are the `Default` implementations below and of the types that the sections hold, so
-//! that the file, the documentation (`docs/operating.md`, held to them by a test) and the code
+//! that the file, the documentation (`docs/configuration.md`, held to them by a test) and the code
 //! cannot state different ones.
 
 use anyhow::{Context, anyhow};
-use faceoff_http::{ConnectionLimits, HttpLimits, LeastRate};
+use faceoff_http::{ConnectionLimits, HttpLimits, MinTransferRate};
 use faceoff_notify::WebhookRules;
 use faceoff_runner::{AgentEnvironment, Supervision, TimeLimits, bundle::BundleLimits};
 use faceoff_sandbox::{Isolation, Layer, Limits, Runtime, affinity};
 use faceoff_store::UploadQuota;
 use faceoff_types::{
-    DayDeadline, InvalidSchedule, PerturbationSettings, Profile, Publishes, Ruleset, Schedule,
-    StageRules, StageSettings, Standings, Task, TaskWeights, TierBounds, Variation, Zone,
+    DayDeadline, InvalidSchedule, PerturbationSettings, Profile, Publication, Ruleset, Schedule,
+    StageRules, StageSettings, CountingResult, Task, TaskWeights, TierBounds, Variation, Zone,
 };
 use jiff::civil::{Date, Time};
 use serde::{Deserialize, Serialize};
@@ -22,10 +22,10 @@ use std::{
     path::{Path, PathBuf},
 };
 
-/// The file that is read when none is named and it exists.
+/// The file that is read by default, if it exists.
 pub const DEFAULT_FILE: &str = "faceoff.toml";
 
-/// The defaults, with units and meanings: what `faceoff init` writes.
+/// The defaults with units and meanings, written by `faceoff init`.
 pub const COMMENTED: &str = include_str!("config/faceoff.toml");
 
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
@@ -33,31 +33,31 @@ pub const COMMENTED: &str = include_str!("config/faceoff.toml");
 pub struct Config {
     /// Address and data folder.
     pub server: ServerConfig,
-    /// What the season is called.
+    /// Name of the season.
     pub season: SeasonConfig,
     pub evaluation: EvaluationConfig,
-    /// How this machine evaluates.
+    /// Worker slots of this machine.
     pub workers: WorkersConfig,
-    /// Work on other machines.
+    /// Remote workers.
     pub nats: NatsSection,
-    /// What an agent's process tree may use.
+    /// Resource limits of an agent's process tree.
     pub limits: Limits,
-    /// How long an agent may take.
+    /// Time limits of agents.
     pub time: TimeLimits,
-    /// What a bundle may hold.
+    /// Size limits of bundles.
     pub bundle: BundleLimits,
-    /// How much a team may upload, and how slowly.
+    /// Limits of uploads per team.
     pub uploads: UploadsConfig,
-    /// How much of the server a stranger may hold.
+    /// Limits of connections per client.
     pub connections: ConnectionsConfig,
-    /// How often a stranger may ask.
+    /// Limits of request rates.
     pub rates: RatesConfig,
-    /// Where programs may be told of what happens.
+    /// Allowed addresses of webhooks.
     pub webhooks: WebhookRules,
-    /// What is not enforced.
+    /// Isolation of agents.
     pub sandbox: SandboxConfig,
-    /// Runtimes by the name that `agent.toml` gives; added to `python3` and `native`, or in their
-    /// place.
+    /// Runtimes by their name in `agent.toml`, in addition to `python3` and `native` or instead of
+    /// them.
     pub runtimes: BTreeMap<String, RuntimeConfig>,
 }
 
@@ -65,12 +65,12 @@ pub struct Config {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct ServerConfig {
-    /// Address of API and pages. Bind a public address only behind a proxy that speaks TLS.
+    /// Address of API and pages. Bind a public address only behind a proxy that provides TLS.
     pub listen: SocketAddr,
-    /// The address by which people reach the server, for links: of http or https, without a slash at its end.
+    /// Public address of the server, for links: http or https, without a trailing slash.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub public_url: Option<String>,
-    /// Where numbers and health are there without a token; left out: nowhere.
+    /// Address of metrics and health checks without a token; left out: none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub metrics_listen: Option<SocketAddr>,
     /// Folder of the database, the artifacts and the organiser's token.
@@ -96,46 +96,46 @@ impl Default for ServerConfig {
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct SeasonConfig {
-    /// Its name, kept in the data folder; left out, it stays as it is there (at first “Season 1”).
+    /// The season's name; left out, the name in the data folder remains (initially “Season 1”).
     pub name: Option<String>,
 }
 
-/// `[evaluation]`: rules and settings of the season's first stage, as long as nobody changes them through the API.
+/// `[evaluation]`: rules and settings of the season's first stage, until they are changed through the API.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct EvaluationConfig {
     pub profile: Profile,
     pub tasks: Vec<Task>,
-    /// Episodes of each task.
+    /// Episodes per task.
     pub episodes_per_task: u32,
-    /// Episodes of one unit of work. Scores do not depend on it; smaller units lose less when a
-    /// worker dies, larger ones start fewer agents.
+    /// Episodes per shard. Scores do not depend on it; smaller shards lose less when a worker dies, larger ones
+    /// start fewer agents.
     pub episodes_per_shard: u32,
-    /// Time of the daily cut in `zone`; left out, `cron` says when, or the organiser starts each day.
+    /// Time of the daily cutoff in `zone`; left out, `cron` applies, or organisers start each day.
     pub at: Option<Time>,
-    /// When days start, in place of `at`: minute, hour, day of the month, month, day of the week in `zone`.
+    /// Times of cutoffs instead of `at`: minute, hour, day of the month, month, day of the week in `zone`.
     pub cron: Option<String>,
-    /// Dates on which neither starts a day.
+    /// Dates without a cutoff by `at` or `cron`.
     pub days_off: Vec<Date>,
-    /// Time zone of `at` and `cron`; days are dates there.
+    /// Time zone of `at` and `cron`, and of the dates of evaluation days.
     pub zone: Zone,
-    /// Until when a day may be played.
+    /// Deadline of evaluation days.
     pub day_deadline: DayDeadline,
-    /// More agent faults than this end an evaluation without a score.
+    /// Allowed agent faults; with more, an evaluation ends without a score.
     pub max_faults: u32,
-    /// Episodes of each task and profile of the ablation that the schedule orders of every submission
-    /// it starts; 0: none.
+    /// Episodes per task and profile of the ablation that the schedule starts for each submission;
+    /// 0: none.
     pub ablation_episodes: u32,
-    /// What each task's success rate weighs in the score.
+    /// Weights of the tasks' success rates in the score.
     pub weights: TaskWeights,
-    /// Penalty points per episode up to which an agent is in a tier.
+    /// Most penalty points per episode of each tier.
     pub tier_bounds: TierBounds,
-    /// Magnitudes of the perturbations that the profile switches on; left out, the ruleset's.
+    /// Magnitudes of the perturbations that the profile enables; left out, the ruleset's.
     pub perturbations: Option<Box<PerturbationSettings>>,
-    /// When datasets of released days are there for everybody.
-    pub publishes: Publishes,
-    /// What a team's row on the board is made of.
-    pub standings: Standings,
+    /// When the datasets of released days are published.
+    pub publishes: Publication,
+    /// The result that counts for a team's row on the board.
+    pub standings: CountingResult,
 }
 
 impl Default for EvaluationConfig {
@@ -155,8 +155,8 @@ impl Default for EvaluationConfig {
             weights: TaskWeights::default(),
             tier_bounds: TierBounds::default(),
             perturbations: None,
-            publishes: Publishes::AtClose,
-            standings: Standings::Latest,
+            publishes: Publication::AtClose,
+            standings: CountingResult::Latest,
         }
     }
 }
@@ -165,18 +165,19 @@ impl Default for EvaluationConfig {
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct WorkersConfig {
-    /// Evaluations at the same time; left out, one per two CPUs and one CPU less, so that an agent, its
-    /// simulator and the rest of the server have a CPU each.
+    /// Parallel evaluations; left out, one per two CPUs after one CPU is reserved, so that an agent, its simulator
+    /// and the rest of the server each have a CPU.
     pub slots: Option<usize>,
-    /// Seconds after which the work of a dead worker is given to another.
+    /// Seconds after which the jobs of a dead worker are given to another one.
     pub lease_s: u32,
-    /// Do this server's own slots play? If not, they only try uploads and score what others have played.
+    /// The server's own slots run evaluations. Otherwise they only validate submissions and compute scores.
     pub play: bool,
-    /// How many episodes of each shard that another machine has played are simulated again before they count; 0: none, and no games.
+    /// Episodes of each shard of a remote worker that are simulated again before the result is accepted; 0: none, and
+    /// no games.
     pub checked_episodes: u32,
-    /// CPUs of all agents; empty = every slot has its own, where there are two per slot.
+    /// CPUs of all agents; empty: each slot has its own, if there are two per slot.
     pub agent_cpus: Vec<usize>,
-    /// Folder for unpacked bundles and recordings under way; left out, `scratch` in the data folder.
+    /// Folder for unpacked bundles and unfinished recordings; left out, `scratch` in the data folder.
     pub scratch_dir: Option<PathBuf>,
 }
 
@@ -197,15 +198,15 @@ impl Default for WorkersConfig {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct UploadsConfig {
-    /// Uploads of one team under way at the same time.
+    /// Parallel uploads of one team.
     pub at_once: usize,
-    /// How fast the body of an upload must come, in the mean.
+    /// Lowest mean transfer rate of an upload.
     pub least_bytes_per_s: u64,
-    /// How many seconds it may be behind that.
+    /// Seconds that a transfer may lag behind that rate.
     pub grace_s: f64,
-    /// How much a team may upload on a UTC day, in bytes.
+    /// Bytes that a team may upload per UTC day.
     pub day_bytes: u64,
-    /// How much is kept of a team at the same time, in bytes.
+    /// Bytes of bundles that the server stores per team.
     pub stored_bytes: u64,
 }
 
@@ -213,7 +214,7 @@ impl Default for UploadsConfig {
     fn default() -> Self {
         let HttpLimits {
             team_uploads,
-            upload_rate,
+            min_upload_rate: upload_rate,
             upload_quota,
             ..
         } = HttpLimits::default();
@@ -228,12 +229,12 @@ impl Default for UploadsConfig {
 }
 
 impl UploadsConfig {
-    /// As the web side takes them.
+    /// The limits for the HTTP server.
     #[must_use]
     pub fn limits(&self) -> HttpLimits {
         HttpLimits {
             team_uploads: self.at_once,
-            upload_rate: LeastRate {
+            min_upload_rate: MinTransferRate {
                 bytes_per_s: self.least_bytes_per_s,
                 grace: TimeLimits::duration(self.grace_s),
             },
@@ -250,17 +251,17 @@ impl UploadsConfig {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct ConnectionsConfig {
-    /// Open at the same time, where there are descriptors for so many.
+    /// Most open connections, if there are enough file descriptors.
     pub most: usize,
-    /// Of one address, or IPv6 network of 64 bits; a quarter of all at most.
+    /// Most connections of one address or IPv6 network of 64 bits; at most a quarter of all.
     pub per_address: usize,
-    /// Addresses without a bound of their own: proxies'.
+    /// Addresses without this limit, for proxies.
     pub exempt: Vec<IpAddr>,
-    /// Seconds to send the head of a request, or to be idle before the next.
+    /// Seconds to send the head of a request, and to be idle between requests.
     pub head_s: f64,
-    /// What a reader must take of an answer, in the mean.
+    /// Lowest mean rate at which a client must read a response.
     pub least_bytes_per_s: u64,
-    /// How many seconds it may be behind that.
+    /// Seconds that a transfer may lag behind that rate.
     pub grace_s: f64,
 }
 
@@ -270,8 +271,8 @@ impl Default for ConnectionsConfig {
             open,
             per_address,
             exempt,
-            head,
-            reading,
+            head_timeout: head,
+            min_read_rate: reading,
         } = ConnectionLimits::default();
         Self {
             most: open,
@@ -285,15 +286,15 @@ impl Default for ConnectionsConfig {
 }
 
 impl ConnectionsConfig {
-    /// As the web side takes them, if there are descriptors for all.
+    /// The limits for the HTTP server, if there are enough file descriptors.
     #[must_use]
     pub fn limits(&self) -> ConnectionLimits {
         ConnectionLimits {
             open: self.most,
             per_address: self.per_address,
             exempt: self.exempt.clone(),
-            head: TimeLimits::duration(self.head_s),
-            reading: LeastRate {
+            head_timeout: TimeLimits::duration(self.head_s),
+            min_read_rate: MinTransferRate {
                 bytes_per_s: self.least_bytes_per_s,
                 grace: TimeLimits::duration(self.grace_s),
             },
@@ -305,11 +306,11 @@ impl ConnectionsConfig {
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct SandboxConfig {
-    /// Layers that this host cannot provide and the organiser does without.
+    /// Layers of the sandbox that are not used.
     pub given_up: Vec<Layer>,
-    /// The runtimes' files are copied into memory if they have no more bytes than this; 0: never.
+    /// The runtimes' files are copied into memory if they are at most this large; 0: never.
     pub resident_bytes: u64,
-    /// May agents be container images? They need the namespaces, so none can where those are given up.
+    /// Agents may be container images. Images need namespaces, so they cannot run if those are given up.
     pub images: bool,
 }
 
@@ -328,8 +329,7 @@ impl Config {
     /// defaults.
     ///
     /// # Errors
-    /// A file that cannot be read, or a field that is unknown or has a value that cannot be; the
-    /// error names the file and the field.
+    /// If the file cannot be read, or a field is unknown or has an invalid value; the error names file and field.
     pub fn load(file: Option<&Path>) -> anyhow::Result<Self> {
         let (file, text) = match file {
             Some(file) => {
@@ -354,7 +354,7 @@ impl Config {
         };
         let read = || -> anyhow::Result<Self> {
             let config = Self::parse(&text)?;
-            config.check_host(&affinity::allowed().context("asking for this host's CPUs")?)?;
+            config.check_host(&affinity::allowed().context("reading the CPU affinity of this process")?)?;
             Ok(config)
         };
         read().with_context(|| format!("the configuration {}", file.display()))
@@ -362,12 +362,12 @@ impl Config {
 
     fn parse(text: &str) -> anyhow::Result<Self> {
         let config: Self = toml::from_str(text)
-            .map_err(|error: toml::de::Error| anyhow!(nearest::told(&error.to_string())))?;
+            .map_err(|error: toml::de::Error| anyhow!(suggestion::with_suggestion(&error.to_string())))?;
         config.check()?;
         Ok(config)
     }
 
-    /// What scores of the first stage depend on.
+    /// The rules of the first stage, on which scores depend.
     #[must_use]
     pub fn rules(&self) -> StageRules {
         let evaluation = &self.evaluation;
@@ -387,17 +387,17 @@ impl Config {
         }
     }
 
-    /// What they do not depend on.
+    /// The settings of the first stage, on which scores do not depend.
     ///
     /// # Errors
-    /// If there is no such schedule, which no configuration that was read has.
+    /// If the schedule is invalid, which is not possible after [`Self::load`].
     pub fn settings(&self) -> Result<StageSettings, InvalidSchedule> {
         let evaluation = &self.evaluation;
         let schedule = match (evaluation.at, &evaluation.cron) {
             (None, None) => None,
             (Some(at), None) => Some(Schedule::daily(at)),
             (None, Some(pattern)) => Some(Schedule::cron(pattern)?),
-            (Some(_), Some(_)) => return Err(InvalidSchedule::Which),
+            (Some(_), Some(_)) => return Err(InvalidSchedule::OneKindExpected),
         };
         Ok(StageSettings {
             schedule: schedule.map(|schedule| schedule.without(evaluation.days_off.clone())),
@@ -410,8 +410,8 @@ impl Config {
         })
     }
 
-    /// How agents are run here: all layers but those given up; `native`, `python3` where this host
-    /// has one, and the configured runtimes.
+    /// The environment of agents on this host: all layers that are not given up; the runtimes `native`, `python3` if
+    /// the host has Python, and the configured ones.
     #[must_use]
     pub fn agent_environment(&self) -> AgentEnvironment {
         let mut runtimes = BTreeMap::from([("native".to_owned(), Runtime::native())]);
@@ -431,28 +431,28 @@ impl Config {
         }
     }
 
-    /// Has NATS be elsewhere than the file says, if it is named.
+    /// Overrides the address of NATS, if `url` is given.
     ///
     /// # Errors
-    /// If it is no address.
-    pub fn reach_nats(&mut self, url: Option<String>) -> anyhow::Result<()> {
+    /// If the address is invalid.
+    pub fn override_nats_url(&mut self, url: Option<String>) -> anyhow::Result<()> {
         if url.is_some() {
             self.nats.url = url;
         }
         self.nats.check()
     }
 
-    /// Has so many slots, whatever the file says.
+    /// Overrides the number of slots.
     ///
     /// # Errors
-    /// If this host cannot have so many.
-    pub fn have_slots(&mut self, slots: usize) -> anyhow::Result<()> {
+    /// If this host has too few CPUs for the slots.
+    pub fn override_slots(&mut self, slots: usize) -> anyhow::Result<()> {
         anyhow::ensure!(slots > 0, "--slots: expected at least 1");
         self.workers.slots = Some(slots);
-        self.check_host(&affinity::allowed().context("asking for this host's CPUs")?)
+        self.check_host(&affinity::allowed().context("reading the CPU affinity of this process")?)
     }
 
-    /// Worker slots: as configured, or one per two CPUs once the server has one.
+    /// Number of worker slots: configured, or one per two CPUs after one is reserved for the server.
     #[must_use]
     pub fn slots(&self) -> usize {
         self.workers.slots.unwrap_or_else(|| {
@@ -461,13 +461,13 @@ impl Config {
         })
     }
 
-    /// How many slots so many CPUs have without disturbing each other or the server: one at least.
+    /// Number of slots that do not disturb each other or the server on so many CPUs; at least one.
     #[must_use]
     pub const fn slots_on(cpus: usize) -> usize {
         if cpus < 3 { 1 } else { (cpus - 1) / 2 }
     }
 
-    /// Folder for unpacked bundles and recordings under way.
+    /// Folder for unpacked bundles and unfinished recordings.
     #[must_use]
     pub fn scratch_dir(&self) -> PathBuf {
         self.workers
@@ -479,9 +479,9 @@ impl Config {
 
 mod check;
 mod nats;
-mod nearest;
 mod rates;
 mod runtime;
+mod suggestion;
 #[cfg(test)]
 mod tests;
 

@@ -1,59 +1,59 @@
-//! File descriptors: how many this process may have, and how many of them are for whom.
+//! File descriptors: the limit of this process, and its division between evaluations and connections.
 
 use faceoff_http::ConnectionLimits;
 use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
 use serde::Serialize;
 
-/// No more than this are asked for: enough for all connections that a server could want, while a table of
-/// millions, as some hosts allow, costs whoever walks it.
-const MOST: u64 = 1 << 16;
-/// What the service itself holds open: database, log, runtime, listener.
+/// Largest limit to request: enough for all connections of a server. Some hosts allow millions, and programs that
+/// iterate over all descriptors would become slow.
+const MAX_LIMIT: u64 = 1 << 16;
+/// Descriptors of the service itself: database, log, runtime, listener.
 const SERVICE: u64 = 64;
-/// What a slot holds open at most: of each of two agents the sockets, the kernel's counters (two files for each of
-/// its first 16 threads) and what ends it; a bundle that is unpacked, recordings and datasets that are written.
+/// Most descriptors of a slot. Each of its two agents has sockets, kernel counters (two files for each of its first 16
+/// threads) and files for its termination; the slot has an unpacked bundle, recordings and datasets.
 const PER_SLOT: u64 = 160;
-/// A connection, and the file that is sent over it, or received by one handle and stored by another.
+/// Descriptors per connection: the socket, and a file that is sent, or two handles of a file that is received.
 const PER_CONNECTION: u64 = 3;
-/// Fewer connections than this are no service.
-const FEWEST: usize = 8;
-/// One address gets no more than this part of the connections, so that it cannot take all.
-const SHARE: usize = 4;
+/// With fewer connections, the server is not usable.
+const MIN_CONNECTIONS: usize = 8;
+/// One address gets at most this fraction (1/4) of the connections, so that it cannot occupy all of them.
+const ADDRESS_SHARE: usize = 4;
 
-/// How the descriptors are divided.
+/// Division of the descriptors.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub struct Descriptors {
-    /// Open at the same time, at most.
+    /// Limit of open descriptors.
     pub limit: u64,
-    /// Kept for evaluations and the service itself.
+    /// Reserved for evaluations and the service itself.
     pub reserved: u64,
-    /// Connections at the same time.
+    /// Most open connections.
     pub connections: usize,
     pub per_address: usize,
 }
 
 impl Descriptors {
-    /// How many this process may have once it has raised its soft limit.
+    /// The limit of this process after its soft limit is raised.
     #[must_use]
     pub fn available() -> u64 {
         let Rlimit { current, maximum } = getrlimit(Resource::Nofile);
-        let soft = current.unwrap_or(MOST);
-        soft.max(maximum.unwrap_or(MOST).min(MOST))
+        let soft = current.unwrap_or(MAX_LIMIT);
+        soft.max(maximum.unwrap_or(MAX_LIMIT).min(MAX_LIMIT))
     }
 
-    /// Raises the soft limit to the hard one; agents have a limit of their own. Returns what there is.
+    /// Raises the soft limit to the hard one and returns the new limit. Agents have a separate limit.
     #[must_use]
     pub fn raise() -> u64 {
         let Rlimit { current, maximum } = getrlimit(Resource::Nofile);
-        let wanted = Self::available();
+        let limit = Self::available();
         let raised = Rlimit {
-            current: Some(wanted),
+            current: Some(limit),
             maximum,
         };
         match setrlimit(Resource::Nofile, raised) {
-            Ok(()) => wanted,
+            Ok(()) => limit,
             Err(error) => {
-                tracing::warn!(%error, "the soft limit of file descriptors stays as it is");
-                current.unwrap_or(MOST)
+                tracing::warn!(%error, "cannot raise the soft limit of file descriptors");
+                current.unwrap_or(MAX_LIMIT)
             }
         }
     }
@@ -62,32 +62,32 @@ impl Descriptors {
     ///
     /// # Errors
     /// If too few are left for connections.
-    pub fn divide(limit: u64, slots: usize, wanted: &ConnectionLimits) -> anyhow::Result<Self> {
+    pub fn divide(limit: u64, slots: usize, requested: &ConnectionLimits) -> anyhow::Result<Self> {
         let reserved = SERVICE + PER_SLOT * slots as u64;
         let left = limit.saturating_sub(reserved) / PER_CONNECTION;
-        let connections = usize::try_from(left).unwrap_or(usize::MAX).min(wanted.open);
+        let connections = usize::try_from(left).unwrap_or(usize::MAX).min(requested.open);
         anyhow::ensure!(
-            connections >= FEWEST,
-            "{limit} file descriptors are too few: evaluations in {slots} slot(s) and the service keep \
-             {reserved}, and {FEWEST} connections need {} more; raise the limit (ulimit -n, LimitNOFILE= of \
+            connections >= MIN_CONNECTIONS,
+            "{limit} file descriptors are too few: evaluations in {slots} slot(s) and the service need \
+             {reserved}, and {MIN_CONNECTIONS} connections need {} more; raise the limit (ulimit -n, LimitNOFILE= of \
              systemd) or set fewer workers.slots",
-            FEWEST as u64 * PER_CONNECTION
+            MIN_CONNECTIONS as u64 * PER_CONNECTION
         );
         Ok(Self {
             limit,
             reserved,
             connections,
-            per_address: wanted.per_address.min((connections / SHARE).max(1)),
+            per_address: requested.per_address.min((connections / ADDRESS_SHARE).max(1)),
         })
     }
 
-    /// The limits with which connections are accepted.
+    /// The requested limits, reduced to the available descriptors.
     #[must_use]
-    pub fn limits(self, wanted: ConnectionLimits) -> ConnectionLimits {
+    pub fn limits(self, requested: ConnectionLimits) -> ConnectionLimits {
         ConnectionLimits {
             open: self.connections,
             per_address: self.per_address,
-            ..wanted
+            ..requested
         }
     }
 }
@@ -97,14 +97,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn evaluations_come_first_and_nobody_gets_all_of_the_rest() {
-        let wanted = ConnectionLimits::default();
-        let divide = |limit, slots| Descriptors::divide(limit, slots, &wanted);
-        let plenty = divide(65_536, 4).unwrap();
-        assert_eq!((plenty.connections, plenty.per_address), (1024, 64));
-        let few = divide(300, 1).unwrap();
+    fn evaluations_come_first_and_addresses_are_limited() {
+        let requested = ConnectionLimits::default();
+        let divide = |limit, slots| Descriptors::divide(limit, slots, &requested);
+        let large = divide(65_536, 4).unwrap();
+        assert_eq!((large.connections, large.per_address), (1024, 64));
+        let small = divide(300, 1).unwrap();
         assert_eq!(
-            (few.reserved, few.connections, few.per_address),
+            (small.reserved, small.connections, small.per_address),
             (224, 25, 6)
         );
         let error = divide(240, 1).unwrap_err().to_string();

@@ -1,39 +1,39 @@
-//! The statuses that commands end with; docs/cli.md has the same table.
+//! Exit statuses of the commands; docs/cli.md has the same table.
 
 use crate::client::{ApiError, Unreachable};
 use reqwest::StatusCode;
 use std::process::ExitCode;
 
-/// How a command ended.
+/// The exit status of a command.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Exit {
-    /// It did what was asked.
+    /// The command succeeded.
     Done = 0,
-    /// It did not, or what it looked at is not well: an invalid agent, faults, a difference, a host that lacks something.
+    /// The command failed or found a problem: an invalid agent, faults, a difference, a host with missing features.
     Failed = 1,
-    /// What was given cannot be used: the command line is not understood, or there is nothing to verify.
+    /// The command line is invalid, or there is nothing to verify.
     Misused = 2,
-    /// The server refused, with a reason.
+    /// The server refused the request, with a reason.
     Refused = 3,
-    /// The server did not answer, or not as it should.
+    /// The server did not answer, or not as expected.
     Unreachable = 4,
-    /// The server does not know who is asking, or that is not for them.
+    /// The caller is not signed in, the token is invalid, or its account lacks the permission.
     NotAllowed = 5,
 }
 
-/// There is no token where one is needed.
+/// A token is needed, but there is none.
 #[derive(Debug, thiserror::Error)]
 #[error("{0}")]
 pub struct NotSignedIn(pub String);
 
 impl Exit {
-    /// What an error comes to.
+    /// The exit status of an error.
     pub fn of(error: &anyhow::Error) -> Self {
         if error.downcast_ref::<NotSignedIn>().is_some() {
             return Self::NotAllowed;
         }
-        // The second: an answer that broke off.
+        // A `reqwest::Error` is an interrupted response.
         if error.downcast_ref::<Unreachable>().is_some()
             || error.chain().any(|cause| cause.is::<reqwest::Error>())
         {
@@ -47,11 +47,11 @@ impl Exit {
         }
     }
 
-    /// Of a command: done, or the error with its causes on standard error.
+    /// The exit status of a command; prints an error with its causes to standard error.
     pub fn from_outcome(outcome: anyhow::Result<()>) -> Self {
         match outcome {
             Ok(()) => Self::Done,
-            // The reader of our output went away, as in `faceoff sim trace | head`: nothing to report.
+            // The reader of the output has closed the pipe, as in `faceoff sim trace | head`; that is no error.
             Err(error) if Self::of(&error) == Self::Failed && is_broken_pipe(&error) => Self::Done,
             Err(error) => {
                 eprintln!("error: {error:#}");
@@ -88,7 +88,7 @@ mod tests {
         Exit::NotAllowed,
     ];
 
-    /// In a sentence: `NotAllowed` is `not allowed`.
+    /// The name as words: `NotAllowed` becomes `not allowed`.
     fn words(exit: Exit) -> String {
         let mut words = String::new();
         for letter in format!("{exit:?}").chars() {
@@ -101,7 +101,7 @@ mod tests {
     }
 
     #[test]
-    fn the_documented_statuses_are_these() {
+    fn documented_statuses_match() {
         let documented = include_str!("../../../docs/cli.md");
         let (_, table) = documented.split_once("## Exit status").unwrap();
         let rows: Vec<_> = table
@@ -121,12 +121,12 @@ mod tests {
     }
 
     #[test]
-    fn a_reader_that_went_away_is_no_failure_and_a_server_that_did_is() {
-        let gone = || std::io::Error::from(std::io::ErrorKind::BrokenPipe);
-        let ours = anyhow::Error::from(gone()).context("writing");
-        assert_eq!(Exit::from_outcome(Err(ours)), Exit::Done);
-        let theirs = anyhow::Error::from(gone()).context(Unreachable("the server hung up".into()));
-        assert_eq!(Exit::from_outcome(Err(theirs)), Exit::Unreachable);
+    fn closed_pipe_is_no_failure_but_a_lost_server_is() {
+        let broken_pipe = || std::io::Error::from(std::io::ErrorKind::BrokenPipe);
+        let output = anyhow::Error::from(broken_pipe()).context("writing");
+        assert_eq!(Exit::from_outcome(Err(output)), Exit::Done);
+        let connection = anyhow::Error::from(broken_pipe()).context(Unreachable("the server hung up".into()));
+        assert_eq!(Exit::from_outcome(Err(connection)), Exit::Unreachable);
     }
 
     fn refused(status: u16) -> Exit {
@@ -139,7 +139,7 @@ mod tests {
     }
 
     #[test]
-    fn a_refusal_a_silence_and_a_stranger_are_told_apart() {
+    fn api_errors_have_distinct_statuses() {
         for (status, exit) in [
             (401, Exit::NotAllowed),
             (403, Exit::NotAllowed),
@@ -151,10 +151,10 @@ mod tests {
         ] {
             assert_eq!(refused(status), exit, "{status}");
         }
-        let silent: anyhow::Result<()> =
+        let unreachable: anyhow::Result<()> =
             Err(anyhow!("connection refused").context(Unreachable("x".into())));
         assert_eq!(
-            Exit::of(&silent.context("asking").unwrap_err()),
+            Exit::of(&unreachable.context("asking").unwrap_err()),
             Exit::Unreachable
         );
         assert_eq!(

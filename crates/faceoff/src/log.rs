@@ -1,4 +1,4 @@
-//! The server's log: what is written, and how.
+//! Level and format of the log.
 
 use anyhow::Context;
 use clap::ValueEnum;
@@ -13,30 +13,30 @@ use tracing_subscriber::{
     util::SubscriberInitExt,
 };
 
-/// How log lines look.
+/// Format of log lines.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum LogFormat {
-    /// For people.
+    /// Readable text.
     Text,
     /// One JSON object per line.
     Json,
 }
 
 impl LogFormat {
-    /// From now on the log goes to standard error: what `RUST_LOG` asks for, or `info`.
+    /// Starts the log on standard error, with the filter of `RUST_LOG` or the level `info`.
     ///
     /// # Errors
-    /// If `RUST_LOG` is no list of `LEVEL` and `TARGET=LEVEL`.
+    /// If `RUST_LOG` is not a list of `LEVEL` and `TARGET=LEVEL`.
     pub fn start(self) -> anyhow::Result<()> {
-        let wanted = match env::var("RUST_LOG") {
-            Ok(wanted) => self::wanted(&wanted)?,
-            Err(VarError::NotPresent) => self::wanted("info")?,
+        let filter = match env::var("RUST_LOG") {
+            Ok(list) => parse_filter(&list)?,
+            Err(VarError::NotPresent) => parse_filter("info")?,
             Err(error) => return Err(error).context("RUST_LOG"),
         };
         let lines = tracing_subscriber::fmt::layer()
             .with_writer(io::stderr)
-            // A line that cannot be written would be told of on the same standard error, whose failure is a
-            // panic: a full disk under the log would end the slots.
+            // Errors of the log itself would also be written to standard error, where a second failure is a
+            // panic: a full disk under the log would stop the slots.
             .log_internal_errors(false)
             .with_ansi(io::stderr().is_terminal());
         let lines: Box<dyn Layer<Registry> + Send + Sync> = match self {
@@ -44,29 +44,30 @@ impl LogFormat {
             Self::Json => lines.json().boxed(),
         };
         tracing_subscriber::registry()
-            .with(lines.with_filter(wanted))
+            .with(lines.with_filter(filter))
             .try_init()
             .context("starting the log")
     }
 }
 
-/// The client of NATS tells of each try to connect, and why it fails; server and worker say so once for each reason.
-const TALKATIVE: &str = "async_nats";
+/// The NATS client logs each failed attempt to connect. It is silenced by default, because server and worker log each
+/// cause once.
+const NATS_CLIENT: &str = "async_nats";
 
-fn wanted(list: &str) -> anyhow::Result<Targets> {
-    let wanted: Targets = list.parse().with_context(|| {
-        format!("RUST_LOG={list:?}: expected for example info,sqlx::query=debug")
+fn parse_filter(list: &str) -> anyhow::Result<Targets> {
+    let filter: Targets = list.parse().with_context(|| {
+        format!("RUST_LOG={list:?}: expected e.g. info,sqlx::query=debug")
     })?;
-    let is_named = wanted
+    let is_named = filter
         .iter()
-        .any(|(target, _)| target.starts_with(TALKATIVE));
-    let asks_for_all = wanted
+        .any(|(target, _)| target.starts_with(NATS_CLIENT));
+    let is_verbose = filter
         .default_level()
         .is_some_and(|level| level > LevelFilter::INFO);
-    Ok(if is_named || asks_for_all {
-        wanted
+    Ok(if is_named || is_verbose {
+        filter
     } else {
-        wanted.with_target(TALKATIVE, LevelFilter::OFF)
+        filter.with_target(NATS_CLIENT, LevelFilter::OFF)
     })
 }
 
@@ -75,10 +76,10 @@ mod tests {
     use tracing_subscriber::filter::LevelFilter;
 
     #[test]
-    fn parts_of_the_program_can_have_a_level_of_their_own() {
-        let wanted = super::wanted("info,sqlx::query=debug").unwrap();
+    fn target_can_have_its_own_level() {
+        let filter = super::parse_filter("info,sqlx::query=debug").unwrap();
         let enabled = |target, level: LevelFilter| {
-            wanted.would_enable(target, &level.into_level().expect("a level"))
+            filter.would_enable(target, &level.into_level().expect("a level"))
         };
         assert!(enabled("sqlx::query", LevelFilter::DEBUG));
         assert!(enabled("faceoff_worker::slot", LevelFilter::INFO));
@@ -86,24 +87,24 @@ mod tests {
     }
 
     #[test]
-    fn the_client_of_nats_is_heard_when_it_is_asked_for() {
-        for (list, heard) in [
+    fn nats_client_is_silent_unless_requested() {
+        for (list, expected) in [
             ("info", false),
             ("warn,sqlx=debug", false),
             ("info,async_nats=warn", true),
             ("info,async_nats::connector=warn", true),
             ("debug", true),
         ] {
-            let wanted = super::wanted(list).unwrap();
-            let is_heard = wanted.would_enable("async_nats::connector", &tracing::Level::ERROR);
-            assert_eq!(is_heard, heard, "{list}");
-            assert!(wanted.would_enable("faceoff_worker::slot", &tracing::Level::WARN));
+            let filter = super::parse_filter(list).unwrap();
+            let is_enabled = filter.would_enable("async_nats::connector", &tracing::Level::ERROR);
+            assert_eq!(is_enabled, expected, "{list}");
+            assert!(filter.would_enable("faceoff_worker::slot", &tracing::Level::WARN));
         }
     }
 
     #[test]
-    fn a_list_that_is_none_is_named() {
-        let error = super::wanted("faceoff=loud").unwrap_err();
+    fn invalid_filter_is_quoted_in_the_error() {
+        let error = super::parse_filter("faceoff=loud").unwrap_err();
         assert!(format!("{error:#}").contains("faceoff=loud"), "{error:#}");
     }
 }

@@ -1,16 +1,16 @@
-//! This machine, as far as agents notice, and what it counts of this process.
+//! Properties of this machine that agents notice, and resource usage of this process.
 
 use faceoff_metrics::Process;
 use faceoff_sandbox::affinity;
 use faceoff_types::AgentMachine;
 use std::fs;
 
-/// What agents that are bound to `cpus` run on; to none: anywhere that this process may.
+/// The machine as seen by agents that are bound to `cpus`. Without any, agents use all CPUs of this process.
 #[must_use]
-pub fn of_agents(cpus: &[usize]) -> AgentMachine {
+pub fn agent_machine(cpus: &[usize]) -> AgentMachine {
     let count = match cpus {
         [] => affinity::allowed().map_or(1, |cpus| cpus.len()),
-        own => own.len(),
+        cpus => cpus.len(),
     };
     AgentMachine {
         architecture: std::env::consts::ARCH.to_owned(),
@@ -19,7 +19,7 @@ pub fn of_agents(cpus: &[usize]) -> AgentMachine {
     }
 }
 
-/// What the system counts of this process; 0 where it does not tell.
+/// Resource usage of this process; unknown values are 0.
 #[must_use]
 pub fn process() -> Process {
     let status = fs::read_to_string("/proc/self/status").unwrap_or_default();
@@ -40,7 +40,7 @@ fn resident_bytes(status: &str) -> Option<u64> {
     Some(kib * 1024)
 }
 
-/// The first that the kernel names.
+/// The first CPU model in /proc/cpuinfo.
 fn cpu_model(cpuinfo: &str) -> Option<String> {
     cpuinfo.lines().find_map(|line| {
         let (name, value) = line.split_once(':')?;
@@ -53,16 +53,16 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_model_is_read_where_the_kernel_tells_it() {
+    fn cpu_model_is_read_if_the_kernel_names_it() {
         let x86 = "processor\t: 0\nmodel\t\t: 85\nmodel name\t: A CPU @ 2 GHz\n\nprocessor\t: 1\n";
         assert_eq!(cpu_model(x86).as_deref(), Some("A CPU @ 2 GHz"));
         assert_eq!(cpu_model("processor\t: 0\nFeatures\t: fp\n"), None);
-        assert_eq!(of_agents(&[4, 5]).cpus_per_agent, 2);
-        assert!(of_agents(&[]).cpus_per_agent >= 1);
+        assert_eq!(agent_machine(&[4, 5]).cpus_per_agent, 2);
+        assert!(agent_machine(&[]).cpus_per_agent >= 1);
     }
 
     #[test]
-    fn the_system_counts_this_process() {
+    fn process_usage_is_read() {
         assert_eq!(
             resident_bytes("Name:\tx\nVmRSS:\t  12 kB\n"),
             Some(12 * 1024)

@@ -1,4 +1,4 @@
-//! The `faceoff` binary: parses the command line and hands over to one file per subcommand.
+//! The `faceoff` binary: parses the command line and runs a subcommand, each of which has its own file.
 
 #[macro_use]
 mod terminal;
@@ -30,33 +30,33 @@ enum Command {
     /// Run the competition server: API, board and worker slots.
     Serve(commands::serve::ServeCommand),
     Worker(commands::worker::WorkerCommand),
-    /// Write a configuration with every default, unit and meaning.
+    /// Write a configuration file with all defaults, units and meanings.
     Init(commands::init::InitCommand),
-    /// Play a whole competition day with the reference agents.
+    /// Run a whole evaluation day with example agents.
     Demo(commands::demo::DemoCommand),
-    /// Start an agent of your own: a folder that runs as it is.
+    /// Create a new agent: a folder that works immediately.
     New(commands::new::NewCommand),
     /// Evaluate a bundle locally with the server's evaluator.
     Eval(commands::eval::EvalCommand),
-    /// Play one game between two bundles.
+    /// Play one game or a series of games between two bundles.
     Play(commands::play::PlayCommand),
-    /// Compare two evaluations that played the same episodes.
+    /// Compare two evaluations on the same episodes.
     Compare(commands::compare::CompareCommand),
-    /// Draw an episode of a dataset, and say why it ended as it did.
+    /// Draw an episode of a dataset as a page or picture.
     Replay(commands::replay::ReplayCommand),
     /// Simulate a dataset or a game again and compare every state and score.
     Verify(commands::verify::VerifyCommand),
-    /// Look into a dataset, or cut pieces out of it.
+    /// Download datasets and print their content.
     Dataset(commands::dataset::DatasetCommand),
-    /// Score results by hand: a qualifying board or a tournament.
+    /// Score results from a file: a qualifying board or a tournament.
     Score(commands::score::ScoreCommand),
-    /// Simulate open loop, export the model, measure the simulator, or check its bits.
+    /// Run the simulator alone: open-loop simulation, model export, benchmark, golden hashes.
     Sim(commands::sim::SimCommand),
-    /// Upload a bundle and follow its validation.
+    /// Upload a bundle and wait for its validation.
     Submit(commands::submit::SubmitCommand),
-    /// Choose which submission plays at the next cut.
+    /// Make a submission active for the next cutoff.
     Activate(commands::activate::ActivateCommand),
-    /// Make an evaluation of the team's public, with its dataset.
+    /// Publish an evaluation of the team with its dataset.
     Publish(commands::publish::PublishCommand),
     Withdraw(commands::withdraw::WithdrawCommand),
     Evaluation(commands::evaluation::EvaluationCommand),
@@ -79,12 +79,12 @@ enum Command {
     Game(commands::game::GameCommand),
     Token(commands::token::TokenCommand),
     Webhook(commands::webhook::WebhookCommand),
-    /// Organise a running competition.
+    /// Run a competition: days, teams, users, stages, tournaments, workers.
     Admin(commands::admin::AdminCommand),
     Import(commands::import::ImportCommand),
     Backup(commands::backup::BackupCommand),
     Restore(commands::restore::RestoreCommand),
-    /// Check what this host offers and what is missing.
+    /// Check whether this host can run agents, and how to fix what is missing.
     Doctor(commands::doctor::DoctorCommand),
     Completions(commands::completions::CompletionsCommand),
 }

@@ -1,15 +1,14 @@
-//! A bundle's folder as an archive: what goes in and what does not, the same bytes of the same files whenever and
-//! wherever it is packed. `submit` sends it, `eval` and `play` unpack it as the server would.
+//! Packs the folder of a bundle into an archive. The same files always give the same bytes. `submit` uploads the
+//! archive, `eval` and `play` unpack it like the server.
 
 mod bundle_file;
 mod rules;
 mod selection;
-mod whole;
-
+mod sized_reader;
 pub use bundle_file::BundleFile;
 pub use rules::IGNORE_FILE;
 pub use selection::{Kind, Selection};
-use whole::Whole;
+use sized_reader::SizedReader;
 
 use anyhow::Context;
 use flate2::{Compression, GzBuilder};
@@ -19,16 +18,16 @@ use std::{
     path::Path,
 };
 
-/// A file as large as this is worth a word: a model may be, a recording or a core dump has slipped in.
+/// From this size on, a file is mentioned: it may be a model, but also a recording or core dump by mistake.
 pub const LARGE_BYTES: u64 = 20_000_000;
 
 impl Selection {
     /// Writes the archive, a `.tar.gz`.
     ///
     /// # Errors
-    /// If a file cannot be read, or has another size than when it was looked at.
+    /// If a file cannot be read, or its size has changed since the selection.
     pub fn pack(&self, to: File) -> anyhow::Result<()> {
-        // No name and no time in its header.
+        // The header contains no name and no time.
         let gzip = GzBuilder::new().write(BufWriter::new(to), Compression::default());
         let mut archive = tar::Builder::new(gzip);
         for entry in self.entries() {
@@ -53,7 +52,7 @@ impl Selection {
         kind: &Kind,
     ) -> io::Result<()> {
         let mut header = tar::Header::new_gnu();
-        // When, by whom and where it was made is left out.
+        // Time and owner are left out, so that the archive only depends on the files.
         header.set_mtime(0);
         header.set_uid(0);
         header.set_gid(0);
@@ -73,12 +72,12 @@ impl Selection {
                 let found = file.metadata()?.len();
                 if found != *bytes {
                     return Err(io::Error::other(format!(
-                        "it had {bytes} bytes a moment ago and has {found} now; is something still writing it?"
+                        "its size changed from {bytes} to {found} bytes; is another program still writing it?"
                     )));
                 }
-                archive.append_data(&mut header, path, Whole::of(file, *bytes))
+                archive.append_data(&mut header, path, SizedReader::new(file, *bytes))
             }
-            // As a link: following it could pick up files from outside of the folder.
+            // The link itself is packed, because its target could be outside of the folder.
             Kind::Link { target } => {
                 header.set_entry_type(tar::EntryType::Symlink);
                 header.set_mode(0o777);

@@ -1,9 +1,9 @@
-//! The one way from commands to the terminal. Names, logs and lines of agents, and files from anywhere, are
-//! shown with it, so nothing passes that steers a terminal, hides, or turns the writing direction.
+//! All output of commands to the terminal. Names, logs and files may come from others, so control characters,
+//! invisible characters and changes of the writing direction are escaped.
 //!
-//! `print!`, `println!` and `eprintln!` are these in the whole program.
+//! The macros `print!`, `println!` and `eprintln!` replace the standard ones in the whole program.
 
-use faceoff_types::harmless;
+use faceoff_types::escape_unprintable;
 use std::{
     fmt,
     io::{self, BufWriter, Stderr, StdoutLock, Write},
@@ -22,23 +22,24 @@ macro_rules! eprintln {
     ($($text:tt)*) => { $crate::terminal::print_error(::std::format_args!($($text)*)) };
 }
 
-static NOBODY_READS: AtomicBool = AtomicBool::new(false);
+static STDOUT_CLOSED: AtomicBool = AtomicBool::new(false);
 
-/// Has whoever read standard output gone away? Then nothing that is told again and again has a reader.
-pub fn nobody_reads() -> bool {
-    NOBODY_READS.load(Ordering::Relaxed)
+/// The reader of standard output has closed the pipe, so commands with endless output may stop.
+pub fn stdout_is_closed() -> bool {
+    STDOUT_CLOSED.load(Ordering::Relaxed)
 }
 
-/// Where nobody reads on, as in `faceoff board | head`, the rest is said to nobody, and the command goes on to its own end.
+/// Prints to standard output. If its reader has closed the pipe, as in `faceoff board | head`, further output is
+/// dropped and the command continues.
 pub fn print(text: fmt::Arguments<'_>) {
-    if nobody_reads() {
+    if stdout_is_closed() {
         return;
     }
     let text = text.to_string();
-    match write!(io::stdout(), "{}", harmless(&text)) {
+    match write!(io::stdout(), "{}", escape_unprintable(&text)) {
         Ok(()) => {}
         Err(error) if error.kind() == io::ErrorKind::BrokenPipe => {
-            NOBODY_READS.store(true, Ordering::Relaxed);
+            STDOUT_CLOSED.store(true, Ordering::Relaxed);
         }
         Err(error) => {
             print_error(format_args!("error: writing to standard output: {error}\n"));
@@ -49,42 +50,42 @@ pub fn print(text: fmt::Arguments<'_>) {
 
 #[expect(
     clippy::print_stderr,
-    reason = "an error of a command meets the terminal"
+    reason = "this is the only place that writes errors to the terminal"
 )]
 pub fn print_error(text: fmt::Arguments<'_>) {
-    ::std::eprintln!("{}", harmless(&text.to_string()));
+    ::std::eprintln!("{}", escape_unprintable(&text.to_string()));
 }
 
-/// Standard output for a stream of lines; it ends with a flush.
+/// Standard output for a stream of lines; it has to be flushed at the end.
 pub fn stdout() -> Lines<BufWriter<StdoutLock<'static>>> {
-    Lines::to(BufWriter::new(io::stdout().lock()))
+    Lines::new(BufWriter::new(io::stdout().lock()))
 }
 
-/// Standard error, line by line.
+/// Standard error, written line by line.
 pub fn stderr() -> Lines<Stderr> {
-    Lines::to(io::stderr())
+    Lines::new(io::stderr())
 }
 
-/// Passes on whole lines, harmless ones.
+/// Writes whole lines, with unprintable characters escaped.
 #[derive(Debug)]
 pub struct Lines<W> {
     out: W,
-    /// What came since the last line break.
+    /// Bytes since the last line break.
     line: Vec<u8>,
 }
 
 impl<W: Write> Lines<W> {
-    fn to(out: W) -> Self {
+    fn new(out: W) -> Self {
         Self {
             out,
             line: Vec::new(),
         }
     }
 
-    fn pass_on(&mut self) -> io::Result<()> {
+    fn write_line(&mut self) -> io::Result<()> {
         let line = std::mem::take(&mut self.line);
         self.out
-            .write_all(harmless(&String::from_utf8_lossy(&line)).as_bytes())
+            .write_all(escape_unprintable(&String::from_utf8_lossy(&line)).as_bytes())
     }
 }
 
@@ -96,14 +97,14 @@ impl<W: Write> Write for Lines<W> {
                 Some(end) => self.line.split_off(end + 1),
                 None => Vec::new(),
             };
-            self.pass_on()?;
+            self.write_line()?;
             self.line = rest;
         }
         Ok(bytes.len())
     }
 
     fn flush(&mut self) -> io::Result<()> {
-        self.pass_on()?;
+        self.write_line()?;
         self.out.flush()
     }
 }
@@ -113,10 +114,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_stream_is_harmless_however_it_is_cut() {
+    fn stream_is_escaped_for_any_piece_size() {
         let text = "{\"team\":\"a\u{202e}b\"}\n\u{9b}2Jé";
         for size in 1..text.len() {
-            let mut lines = Lines::to(Vec::new());
+            let mut lines = Lines::new(Vec::new());
             for piece in text.as_bytes().chunks(size) {
                 lines.write_all(piece).unwrap();
             }

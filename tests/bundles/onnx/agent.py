@@ -1,4 +1,4 @@
-"""Plays with a network that ONNX Runtime runs, once it has found that the sandbox keeps its promises."""
+"""Runs a neural network with ONNX Runtime, after it has checked the promises of the sandbox."""
 
 import importlib.metadata
 import os
@@ -11,7 +11,7 @@ from protocol import Agent, run
 
 
 def check_promises(session):
-    """Ends the agent, with the reason in its log, where the runtime is not as docs/sandbox.md tells."""
+    """Ends the agent, with the reason in its log, if the runtime differs from docs/sandbox.md."""
     options = session.get_session_options()
     counted = {
         "os.cpu_count": os.cpu_count(),
@@ -30,7 +30,7 @@ def check_promises(session):
 
 
 class Network(Agent):
-    """The pose that the episode began with, moved a little by what the network says of the puck."""
+    """Holds the initial pose, changed slightly by the network's output for the puck."""
 
     interpolation = 3
 

@@ -1,4 +1,4 @@
-"""Writes policy.onnx, a tiny network that all but holds the arm still: python3 make_policy.py (needs numpy and onnx).
+"""Writes policy.onnx, a tiny network that almost holds the arm still: python3 make_policy.py (needs numpy and onnx).
 
 Input: `state`, float32 [1, 13]: the puck's pose and velocity as observed (6), and the pose to hold, in radians (7).
 Output: `joint_pos`, float32 [1, 7], in radians: that pose, moved by at most 1.6e-4 rad.

@@ -1,4 +1,4 @@
-"""Holds still, once it has found the compiled package that its bundle brings."""
+"""Holds still, after it has checked that it uses the compiled package of its bundle."""
 
 import os
 import sys
@@ -12,7 +12,7 @@ if not os.path.realpath(_speedups.__file__).startswith(os.path.realpath("vendor"
 
 
 class Hold(Agent):
-    """The pose that the episode began with."""
+    """Holds the initial pose."""
 
     interpolation = 3
 

@@ -1,4 +1,4 @@
-//! How far each evaluation is, so that the last shard of each ends it without a score.
+//! The progress of each evaluation, so that its last shard can end it without a score.
 
 use std::{
     collections::HashMap,
@@ -7,22 +7,22 @@ use std::{
 use tokio::sync::Notify;
 use uuid::Uuid;
 
-/// All of them, by id.
+/// The progress of all evaluations, by id.
 #[derive(Debug)]
 pub(crate) struct Evaluations {
     shards: u32,
-    all: Mutex<HashMap<Uuid, Shards>>,
+    all: Mutex<HashMap<Uuid, Progress>>,
     changed: Notify,
 }
 
 #[derive(Debug, Default)]
-struct Shards {
+struct Progress {
     played: u32,
-    handed_in: u32,
+    results: u32,
 }
 
 impl Evaluations {
-    pub(crate) fn of_shards(shards: u32) -> Self {
+    pub(crate) fn new(shards: u32) -> Self {
         Self {
             shards,
             all: Mutex::default(),
@@ -30,39 +30,39 @@ impl Evaluations {
         }
     }
 
-    /// A shard was played. Is it the evaluation's last?
-    pub(crate) fn ends(&self, id: Uuid) -> bool {
+    /// Counts a shard as played. Is it the evaluation's last one?
+    pub(crate) fn record_played(&self, id: Uuid) -> bool {
         let mut all = self.all();
         let shards = all.entry(id).or_default();
         shards.played += 1;
         shards.played >= self.shards
     }
 
-    /// What came of a shard is in NATS, which delivers in this order.
-    pub(crate) fn handed_in(&self, id: Uuid) {
-        self.all().entry(id).or_default().handed_in += 1;
+    /// Counts a shard's result as stored in NATS, which delivers results in this order.
+    pub(crate) fn record_result(&self, id: Uuid) {
+        self.all().entry(id).or_default().results += 1;
         self.changed.notify_waiters();
     }
 
-    /// Waits for all but the last: an outcome that comes after that one would find the evaluation over.
-    pub(crate) async fn others_are_handed_in(&self, id: Uuid) {
+    /// Waits for the results of all other shards: after the last shard's fault the evaluation accepts no results.
+    pub(crate) async fn wait_for_other_results(&self, id: Uuid) {
         loop {
             let changed = self.changed.notified();
-            if self.has_others(id) {
+            if self.has_other_results(id) {
                 return;
             }
             changed.await;
         }
     }
 
-    fn has_others(&self, id: Uuid) -> bool {
+    fn has_other_results(&self, id: Uuid) -> bool {
         let all = self.all();
         all.get(&id)
-            .is_some_and(|shards| shards.handed_in + 1 >= self.shards)
+            .is_some_and(|shards| shards.results + 1 >= self.shards)
     }
 
-    /// Counts are whole whatever panicked beside them.
-    fn all(&self) -> MutexGuard<'_, HashMap<Uuid, Shards>> {
+    /// Ignores poisoning: the counts are consistent even after a panic.
+    fn all(&self) -> MutexGuard<'_, HashMap<Uuid, Progress>> {
         self.all.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }

@@ -1,33 +1,33 @@
-//! Numbers of one phase, as a table and as JSON.
+//! The measurements of one phase, as a table and as JSON.
 
-use crate::stub::{Tally, Trouble};
+use crate::stub::{Measurements, Retries};
 use serde_json::{Value, json};
 use std::{fmt::Write as _, time::Duration};
 
-/// Of so many workers, who slept for so long.
+/// A phase with a number of workers.
 pub(crate) struct Phase {
     pub(crate) workers: usize,
-    /// From the first request for work to the last outcome in NATS.
+    /// From the first request for a job to the last result stored in NATS.
     pub(crate) took: Duration,
-    pub(crate) tally: Tally,
+    pub(crate) measurements: Measurements,
 }
 
 impl Phase {
     pub(crate) fn shards(&self) -> usize {
-        self.tally.order_s.len()
+        self.measurements.job_s.len()
     }
 
     pub(crate) fn shards_per_s(&self) -> f64 {
         self.shards() as f64 / self.took.as_secs_f64()
     }
 
-    /// The part of the workers' time in which they "played".
+    /// The part of the workers' time in which they slept, which represents running agents.
     pub(crate) fn efficiency(&self) -> f64 {
-        self.tally.slept_s / (self.workers as f64 * self.took.as_secs_f64())
+        self.measurements.slept_s / (self.workers as f64 * self.took.as_secs_f64())
     }
 
     pub(crate) fn line(&self) -> String {
-        let [order, begin, files, hand_in] = self.series();
+        let [job, start, files, result] = self.series();
         format!(
             "| {} | {} | {:.1} | {:.2} | {:.4} | {} | {} | {} | {} |",
             self.workers,
@@ -35,18 +35,18 @@ impl Phase {
             self.took.as_secs_f64(),
             self.shards_per_s(),
             self.efficiency(),
-            ms(quantile(&order, 0.5)),
-            ms(quantile(&begin, 0.5)),
+            ms(quantile(&job, 0.5)),
+            ms(quantile(&start, 0.5)),
             ms(quantile(&files, 0.5)),
-            ms(quantile(&hand_in, 0.5)),
+            ms(quantile(&result, 0.5)),
         )
     }
 
     pub(crate) fn latencies(&self) -> String {
         let mut text = String::from("| ms | p50 | p95 | p99 | max |\n|---|---|---|---|---|\n");
         for (name, series) in SERIES.into_iter().zip(self.series()) {
-            let cells = QUANTILES.map(|(_, of)| ms(quantile(&series, of)));
-            // A string takes all that is written to it.
+            let cells = QUANTILES.map(|(_, share)| ms(quantile(&series, share)));
+            // Writing to a string does not fail.
             let _ = writeln!(text, "| {name} | {} |", cells.join(" | "));
         }
         text
@@ -55,36 +55,36 @@ impl Phase {
     pub(crate) fn json(&self) -> Value {
         let mut latencies = json!({});
         for (name, series) in SERIES.into_iter().zip(self.series()) {
-            for (of, share) in QUANTILES {
-                latencies[name][of] = json!(quantile(&series, share));
+            for (label, share) in QUANTILES {
+                latencies[name][label] = json!(quantile(&series, share));
             }
         }
-        let Trouble {
-            orders,
+        let Retries {
+            jobs,
             renewals,
             files,
-            outcomes,
+            results,
             lost,
-        } = &self.tally.trouble;
+        } = &self.measurements.retries;
         json!({
             "workers": self.workers,
             "shards": self.shards(),
             "took_s": self.took.as_secs_f64(),
             "shards_per_s": self.shards_per_s(),
-            "slept_s": self.tally.slept_s,
+            "slept_s": self.measurements.slept_s,
             "efficiency": self.efficiency(),
             "latencies_s": latencies,
-            "tried_again": { "orders": orders, "renewals": renewals, "files": files, "outcomes": outcomes, "lost": lost },
+            "retries": { "jobs": jobs, "renewals": renewals, "files": files, "results": results, "lost": lost },
         })
     }
 
     fn series(&self) -> [Vec<f64>; 4] {
-        let tally = &self.tally;
+        let measurements = &self.measurements;
         [
-            &tally.order_s,
-            &tally.begin_s,
-            &tally.files_s,
-            &tally.hand_in_s,
+            &measurements.job_s,
+            &measurements.start_s,
+            &measurements.files_s,
+            &measurements.result_s,
         ]
         .map(|series| {
             let mut sorted = series.clone();
@@ -95,14 +95,14 @@ impl Phase {
 }
 
 const SERIES: [&str; 4] = [
-    "free to order",
-    "order to begin",
+    "waiting for a job",
+    "starting it",
     "files stored",
-    "handed in",
+    "result sent",
 ];
 const QUANTILES: [(&str, f64); 4] = [("p50", 0.5), ("p95", 0.95), ("p99", 0.99), ("max", 1.0)];
 
-/// The smallest of sorted numbers that so large a share of them is not above.
+/// The smallest of the sorted numbers that is at least as large as this share of them.
 fn quantile(sorted: &[f64], share: f64) -> f64 {
     let rank = (share * sorted.len() as f64).ceil() as usize;
     let at = rank.saturating_sub(1);

@@ -1,18 +1,18 @@
-//! What one server carries when many machines work for it: `make crowd`.
+//! Measures how many remote workers one server can serve: `make crowd`.
 //!
-//! Starts a real nats-server and a real `faceoff serve` that plays nothing itself, queues evaluations of the default size, and has
-//! them "played" by workers in this process that speak with the server as `faceoff worker` does and sleep in place of
-//! playing ([`stub`]). So what is measured is what the server, NATS and SQLite need for a shard, and how long a free slot waits. First
-//! a few workers, to see how the time of one grows into that of many; then all of them.
+//! Starts a real nats-server and a real `faceoff serve` without slots of its own, and queues evaluations of the default
+//! size. Workers in this process ([`stub`]) use the protocol of `faceoff worker`, but sleep instead of running agents. So the
+//! measurement shows what the server, NATS and SQLite need for a shard, and how long a free slot waits. The first phases
+//! have a few workers, to see how the times grow with their number; the last phase has all of them.
 //!
-//! Recordings are bytes without meaning, which nobody could score. So the last shard of each evaluation says that the agent
-//! broke its limits: that ends the evaluation without a score. What scoring takes is the server's own slots' and is told by its
+//! Recordings are meaningless bytes, which cannot be scored. So the last shard of each evaluation reports a fault of the
+//! agent, which ends the evaluation without a score. The time for scoring is in the server's metric
 //! `faceoff_unit_duration_seconds{work="finalise"}`. For the same reason no episode is simulated again to check it.
 //!
-//! All run on the same CPUs; whoever reads the numbers sees what this process took of them. Nothing is asserted but that each
-//! evaluation came to its end: how fast a machine is, is the machine's.
+//! All processes share the CPUs; the report has the CPU time of this process, too. The only assertion is that each
+//! evaluation ends, since the times depend on the machine.
 
-#![expect(clippy::print_stdout, reason = "it reports what it measured")]
+#![expect(clippy::print_stdout, reason = "the program prints its measurements")]
 
 mod evaluations;
 mod figures;
@@ -22,7 +22,7 @@ mod usage;
 use anyhow::{Context as _, ensure};
 use evaluations::Evaluations;
 use faceoff_tests::{bundle, nats::Nats, program, repository, server::Server};
-use faceoff_wire::remote::Introduction;
+use faceoff_wire::remote::WorkerCapabilities;
 use figures::Phase;
 use serde_json::{Value, json};
 use std::{
@@ -35,27 +35,28 @@ use std::{
     thread,
     time::{Duration, Instant},
 };
-use stub::{Plan, Share, Stub, Tally};
+use stub::{Plan, Workload, Stub, Measurements};
 use tokio::{runtime::Runtime, task::JoinSet};
 use usage::{Threads, Usage};
 
-/// The defaults of a stage: a season's shards, and what a shard's outcomes weigh.
+/// The defaults of a stage, so that shards and their outcomes have the usual size.
 const EPISODES_PER_TASK: u32 = 1000;
 const EPISODES_PER_SHARD: u32 = 50;
 const TASKS: u32 = 3;
-/// Shards of an evaluation.
+/// Shards of one evaluation.
 const SHARDS: u32 = TASKS * EPISODES_PER_TASK.div_ceil(EPISODES_PER_SHARD);
-/// Teams; there are as many stages as it takes, since a stage has one cut a day.
+/// Teams. A stage has one cutoff a day, so further evaluations need further stages.
 const TEAMS: u32 = 8;
-/// The few workers, how many shards each plays, and for how long.
-const FEW: [usize; 5] = [1, 2, 4, 8, 16];
+/// Numbers of workers of the first phases.
+const FEW_WORKERS: [usize; 5] = [1, 2, 4, 8, 16];
+/// Shards of each worker in a first phase, and the time of each.
 const ROUNDS: u32 = 10;
-const FEWS_SLEEP: Duration = Duration::from_secs(2);
-/// Shards differ: with all of them alike, all workers would ask at once, for ever.
+const FEW_SLEEP: Duration = Duration::from_secs(2);
+/// Durations of shards vary. With equal durations all workers would always request jobs at the same time.
 const SPREAD: f64 = 0.5;
-/// How often is looked at what threads use.
-const LOOK: Duration = Duration::from_secs(1);
-/// What the database's threads are called, as far as the kernel keeps a name.
+/// How often the CPU time of threads is read.
+const SAMPLE_INTERVAL: Duration = Duration::from_secs(1);
+/// The name of the database's threads, as the kernel truncates it.
 const DATABASE: &str = "sqlx-sqlite";
 
 struct Settings {
@@ -95,25 +96,25 @@ fn main() -> anyhow::Result<()> {
     let scratch = tempfile::tempdir()?;
     let nats = Nats::start(&scratch.path().join("nats"));
     let server = Server::start(&scratch.path().join("data"), &configuration(&nats));
-    let of_few = FEW.iter().sum::<usize>() * ROUNDS as usize;
-    let of_few = u32::try_from(of_few)?;
-    let stages = (settings.shards + of_few).div_ceil(SHARDS * TEAMS);
-    let queued = Queued::make(&server, stages)?;
-    let of_many = stages * TEAMS * SHARDS - of_few;
+    let few_shards = FEW_WORKERS.iter().sum::<usize>() * ROUNDS as usize;
+    let few_shards = u32::try_from(few_shards)?;
+    let stages = (settings.shards + few_shards).div_ceil(SHARDS * TEAMS);
+    let evaluations_queued = QueuedEvaluations::create(&server, stages)?;
+    let many_shards = stages * TEAMS * SHARDS - few_shards;
     println!(
         "{} evaluations of {SHARDS} shards of {EPISODES_PER_SHARD} episodes are queued",
-        queued.evaluations.len()
+        evaluations_queued.evaluations.len()
     );
 
     let runtime = Runtime::new()?;
-    let evaluations = Arc::new(Evaluations::of_shards(SHARDS));
-    let (own, url) = (introduction(&server)?, nats.url());
+    let evaluations = Arc::new(Evaluations::new(SHARDS));
+    let (capabilities, url) = (worker_capabilities(&server)?, nats.url());
     let mut stubs = Vec::new();
-    for number in 0..settings.workers.max(FEW[FEW.len() - 1]) {
+    for number in 0..settings.workers.max(FEW_WORKERS[FEW_WORKERS.len() - 1]) {
         let connecting = Stub::connect(
             number,
             &url,
-            own.clone(),
+            capabilities.clone(),
             settings.recording_bytes,
             Arc::clone(&evaluations),
         );
@@ -122,24 +123,24 @@ fn main() -> anyhow::Result<()> {
     let resumed = server.post("/api/v1/queue/resume", &server.admin_token, &json!({}));
     ensure!(resumed.status().is_success(), "{}", resumed.status());
 
-    let few = few(&runtime, &mut stubs)?;
+    let few_phases = few_phases(&runtime, &mut stubs)?;
     let plan = Plan {
         sleep: settings.sleep,
         spread: SPREAD,
-        share: Share::Common(AtomicI64::new(of_many.into())),
+        workload: Workload::Shared(AtomicI64::new(many_shards.into())),
     };
     let processes = [server.process_id(), nats.process_id(), process::id()];
-    let many = Many::measure(
+    let many = FullPhase::measure(
         &runtime,
         (&mut stubs, settings.workers),
         plan,
         processes,
-        || queued.are_over(&server),
+        || evaluations_queued.wait_for_end(&server),
     )?;
-    report(&settings, &few, &many)
+    report(&settings, &few_phases, &many)
 }
 
-/// No slot of its own plays; all "machines" have the one address here, which is not what a rate is for.
+/// The server runs no evaluations in its own slots. Rate limits are off, since all workers have the same address.
 fn configuration(nats: &Nats) -> String {
     format!(
         r#"
@@ -163,25 +164,25 @@ resident_bytes = 0
     )
 }
 
-/// Evaluations that wait, and the paths at which they are seen.
-struct Queued {
+/// Queued evaluations, as paths in the API.
+struct QueuedEvaluations {
     evaluations: Vec<String>,
 }
 
-impl Queued {
-    fn make(server: &Server, stages: u32) -> anyhow::Result<Self> {
+impl QueuedEvaluations {
+    fn create(server: &Server, stages: u32) -> anyhow::Result<Self> {
         let admin = &server.admin_token;
-        let archive = bundle::packed(&repository().join("agents/hold"));
+        let archive = bundle::pack(&repository().join("agents/hold"));
         for number in 1..=TEAMS {
             let team = json!({ "name": format!("Team {number}") });
             let team = answer(server.post("/api/v1/teams", admin, &team))?;
-            let token = text(&team["token"])?;
+            let token = string(&team["token"])?;
             let submission = answer(server.upload(&token, archive.clone()))?;
-            let path = format!("/api/v1/submissions/{}", text(&submission["id"])?);
-            let tried = server.poll(&path, &token, |told| told["state"] != "validating");
-            ensure!(tried["state"] == "valid", "{tried:#}");
+            let path = format!("/api/v1/submissions/{}", string(&submission["id"])?);
+            let checked = server.poll(&path, &token, |view| view["state"] != "validating");
+            ensure!(checked["state"] == "valid", "{checked:#}");
         }
-        let pause = json!({ "reason": "Until all workers are there" });
+        let pause = json!({ "reason": "Until all workers are connected" });
         let paused = server.post("/api/v1/queue/pause", admin, &pause);
         ensure!(paused.status().is_success(), "{}", paused.status());
         let mut evaluations = Vec::new();
@@ -195,7 +196,7 @@ impl Queued {
             let stage = json!({ "stage": stage["id"] });
             let day = answer(server.post("/api/v1/days", admin, &stage))?;
             for evaluation in day["created"].as_array().context("a day's evaluations")? {
-                let id = text(&evaluation["id"])?;
+                let id = string(&evaluation["id"])?;
                 evaluations.push(format!("/api/v1/evaluations/{id}"));
             }
         }
@@ -203,13 +204,13 @@ impl Queued {
         Ok(Self { evaluations })
     }
 
-    /// Waits until the server has stored all that was handed in: an evaluation ends with its last shard.
-    fn are_over(&self, server: &Server) -> anyhow::Result<()> {
+    /// Waits until the server has stored all results: an evaluation ends with its last shard.
+    fn wait_for_end(&self, server: &Server) -> anyhow::Result<()> {
         for path in &self.evaluations {
-            let over = server.poll(path, &server.admin_token, |told| {
-                !["queued", "running"].contains(&told["state"].as_str().unwrap_or_default())
+            let ended = server.poll(path, &server.admin_token, |view| {
+                !["queued", "running"].contains(&view["state"].as_str().unwrap_or_default())
             });
-            ensure!(over["state"] == "agent_failed", "{over:#}");
+            ensure!(ended["state"] == "agent_failed", "{ended:#}");
         }
         Ok(())
     }
@@ -219,17 +220,17 @@ fn answer(response: reqwest::blocking::Response) -> anyhow::Result<Value> {
     Ok(response.error_for_status()?.json()?)
 }
 
-fn text(value: &Value) -> anyhow::Result<String> {
-    let text = value.as_str().context("the API told no text")?;
+fn string(value: &Value) -> anyhow::Result<String> {
+    let text = value.as_str().context("expected a string from the API")?;
     Ok(text.to_owned())
 }
 
-/// As a worker with the server's program and runtimes tells of itself.
-fn introduction(server: &Server) -> anyhow::Result<Introduction> {
+/// The capabilities that a worker with the server's program and runtimes reports.
+fn worker_capabilities(server: &Server) -> anyhow::Result<WorkerCapabilities> {
     let found = answer(server.get("/api/v1/runtimes", None))?;
     let mut hasher = blake3::Hasher::new();
     hasher.update_reader(fs::File::open(program("faceoff"))?)?;
-    // As text, so that what a worker need not say can be left out.
+    // From JSON, so that optional fields can be left out.
     Ok(serde_json::from_value(json!({
         "program": hasher.finalize().to_string(),
         "version": env!("CARGO_PKG_VERSION"),
@@ -238,50 +239,50 @@ fn introduction(server: &Server) -> anyhow::Result<Introduction> {
     }))?)
 }
 
-fn few(runtime: &Runtime, stubs: &mut Vec<Stub>) -> anyhow::Result<Vec<Phase>> {
-    let play = |workers| {
+fn few_phases(runtime: &Runtime, stubs: &mut Vec<Stub>) -> anyhow::Result<Vec<Phase>> {
+    let run_phase = |workers| {
         let plan = Plan {
-            sleep: FEWS_SLEEP,
+            sleep: FEW_SLEEP,
             spread: 0.0,
-            share: Share::Each(ROUNDS),
+            workload: Workload::PerWorker(ROUNDS),
         };
         runtime.block_on(phase(stubs, workers, plan))
     };
-    FEW.into_iter().map(play).collect()
+    FEW_WORKERS.into_iter().map(run_phase).collect()
 }
 
 async fn phase(stubs: &mut Vec<Stub>, workers: usize, plan: Plan) -> anyhow::Result<Phase> {
     let plan = Arc::new(plan);
-    let began = Instant::now();
+    let started = Instant::now();
     let mut working = JoinSet::new();
     for stub in stubs.drain(..workers) {
         working.spawn(stub.work(Arc::clone(&plan)));
     }
-    let mut tally = Tally::default();
+    let mut measurements = Measurements::default();
     while let Some(worked) = working.join_next().await {
         let (stub, own) = worked??;
         stubs.push(stub);
-        tally.add(own);
+        measurements.add(own);
     }
     Ok(Phase {
         workers,
-        took: began.elapsed(),
-        tally,
+        took: started.elapsed(),
+        measurements,
     })
 }
 
-/// All workers, and what was used meanwhile.
-struct Many {
+/// The phase with all workers, and the resources used by each process.
+struct FullPhase {
     phase: Phase,
-    /// From the first request for work until the server had stored all of it.
+    /// From the first request for a job until the server had stored all results.
     stored: Duration,
-    /// Of server, NATS and this process: before and after.
+    /// Usage of server, NATS and this process, before and after.
     used: [(Usage, Usage); 3],
     /// CPU seconds of the server's threads.
     threads: BTreeMap<String, f64>,
 }
 
-impl Many {
+impl FullPhase {
     fn measure(
         runtime: &Runtime,
         (stubs, workers): (&mut Vec<Stub>, usize),
@@ -291,44 +292,44 @@ impl Many {
     ) -> anyhow::Result<Self> {
         let [server, _, _] = processes;
         let mut threads = Threads::default();
-        threads.look(server)?;
+        threads.sample(server)?;
         let before = (threads.clone(), usages(processes)?);
-        let began = Instant::now();
+        let started = Instant::now();
         let phase = runtime.block_on(async {
-            let mut playing = pin!(phase(stubs, workers, plan));
-            let mut looks = tokio::time::interval(LOOK);
+            let mut running = pin!(phase(stubs, workers, plan));
+            let mut interval = tokio::time::interval(SAMPLE_INTERVAL);
             loop {
                 tokio::select! {
-                    played = &mut playing => break played,
-                    _ = looks.tick() => threads.look(server)?,
+                    phase = &mut running => break phase,
+                    _ = interval.tick() => threads.sample(server)?,
                 }
             }
         })?;
         stored()?;
-        let stored = began.elapsed();
-        threads.look(server)?;
+        let stored = started.elapsed();
+        threads.sample(server)?;
         let after = usages(processes)?;
-        let [of_server, of_nats, of_stubs] = before.1;
+        let [server_before, nats_before, stubs_before] = before.1;
         let [server_after, nats_after, stubs_after] = after;
         Ok(Self {
             phase,
             stored,
             used: [
-                (of_server, server_after),
-                (of_nats, nats_after),
-                (of_stubs, stubs_after),
+                (server_before, server_after),
+                (nats_before, nats_after),
+                (stubs_before, stubs_after),
             ],
             threads: threads.since(&before.0),
         })
     }
 
-    /// CPU seconds of the process at this place.
+    /// CPU seconds of the process with this index.
     fn cpu_s(&self, index: usize) -> f64 {
         let (before, after) = &self.used[index];
         after.cpu_s - before.cpu_s
     }
 
-    /// CPU seconds of the database's threads: statements and reading and writing pages. Waiting for the disk is none.
+    /// CPU seconds of the database's threads, for statements and pages. Waiting for the disk takes no CPU time.
     fn database_s(&self) -> f64 {
         let database = self.threads.iter();
         let database = database.filter(|(name, _)| name.starts_with(DATABASE));
@@ -343,15 +344,15 @@ fn usages(processes: [u32; 3]) -> anyhow::Result<[Usage; 3]> {
 
 const PROCESSES: [&str; 3] = ["server", "nats-server", "workers (this process)"];
 
-fn report(settings: &Settings, few: &[Phase], many: &Many) -> anyhow::Result<()> {
+fn report(settings: &Settings, few: &[Phase], many: &FullPhase) -> anyhow::Result<()> {
     let shards = many.phase.shards() as f64;
     let cpus = thread::available_parallelism()?;
     println!(
         "\nFew workers, {} s a shard, on {cpus} CPUs",
-        FEWS_SLEEP.as_secs()
+        FEW_SLEEP.as_secs()
     );
-    println!("medians in ms: of a free slot's wait, of what follows\n");
-    println!("| workers | shards | s | shards/s | efficiency | order | begin | files | hand in |");
+    println!("medians in ms: waiting for a job, starting it, storing files, sending the result\n");
+    println!("| workers | shards | s | shards/s | efficiency | job | start | files | result |");
     println!("|---|---|---|---|---|---|---|---|---|");
     for phase in few.iter().chain([&many.phase]) {
         println!("{}", phase.line());
@@ -401,7 +402,7 @@ fn report(settings: &Settings, few: &[Phase], many: &Many) -> anyhow::Result<()>
     let all = json!({
         "cpus": cpus.get(),
         "sleep_s": settings.sleep.as_secs_f64(),
-        "few_sleep_s": FEWS_SLEEP.as_secs_f64(),
+        "few_sleep_s": FEW_SLEEP.as_secs_f64(),
         "recording_bytes": settings.recording_bytes,
         "episodes_per_shard": EPISODES_PER_SHARD,
         "few": few,

@@ -1,4 +1,4 @@
-//! A worker with one slot that speaks with the server as `faceoff worker` does, word for word, and plays nothing: it sleeps.
+//! A worker with one slot that uses the protocol of `faceoff worker`, but sleeps instead of running agents.
 
 use crate::evaluations::Evaluations;
 use anyhow::{Context as _, ensure};
@@ -12,8 +12,8 @@ use faceoff_types::{
     Violations,
 };
 use faceoff_wire::{
-    remote::{Answer, Ask, Introduction, Outcome, RemoteOrder, RemoteOutcome},
-    work::{Assignment, Keeps, Lease, ShardSpec, WorkReport},
+    remote::{WorkerResponse, WorkerRequest, WorkerCapabilities, JobEnd, RemoteJob, ResultMessage},
+    job::{JobPayload, OutputFiles, Lease, ShardSpec, JobReport},
 };
 use futures::StreamExt as _;
 use reqwest::{StatusCode, header};
@@ -27,12 +27,12 @@ use std::{
 use uuid::Uuid;
 
 /// These are a worker's own (`remote/far_server.rs` and `remote/connection.rs` of `faceoff-worker`).
-const ANSWER: Duration = Duration::from_secs(5);
-const OPEN_FOR: Duration = Duration::from_secs(5);
-const REST: Duration = Duration::from_secs(2);
-const RENEWS_EVERY: Duration = Duration::from_millis(500);
+const RESPONSE_TIMEOUT: Duration = Duration::from_secs(5);
+const PULL_EXPIRY: Duration = Duration::from_secs(5);
+const RETRY_DELAY: Duration = Duration::from_secs(2);
+const RENEWAL_INTERVAL: Duration = Duration::from_millis(500);
 const SLOT: &str = "slot-0";
-/// The server's name where streams and subjects have it: the default.
+/// The server's name in streams and subjects: the default.
 const SERVER: &str = "faceoff";
 /// The files of a shard's recording, the largest first.
 const FILES: [&str; 6] = [
@@ -43,113 +43,114 @@ const FILES: [&str; 6] = [
     "report.json",
     "shard.json",
 ];
-/// What fails more often than this is broken, and not busy.
-const MOST_FAILURES: u32 = 100;
-/// Of each but the largest.
+/// After more failures than this the server counts as broken, not as busy.
+const MAX_FAILURES: u32 = 100;
+/// The size of each file but the largest.
 const SMALL_BYTES: usize = 1024;
 
 pub(crate) struct Stub {
     number: usize,
     name: String,
-    own: Introduction,
+    capabilities: WorkerCapabilities,
     client: Client,
     jetstream: jetstream::Context,
     http: reqwest::Client,
     recording: Bytes,
     evaluations: Arc<Evaluations>,
-    /// The bundle that it has, as a worker keeps the one that it used last.
+    /// The hash of the downloaded bundle: like a worker, it keeps the last one.
     bundle: String,
 }
 
-/// What one phase asks of each worker.
+/// The work of one phase.
 pub(crate) struct Plan {
-    /// How long a shard is "played".
+    /// The duration of a shard.
     pub(crate) sleep: Duration,
-    /// Each shard's own time differs from that by up to this part of it.
+    /// The largest relative deviation of a shard's duration.
     pub(crate) spread: f64,
-    pub(crate) share: Share,
+    pub(crate) workload: Workload,
 }
 
-/// Which shards a worker plays.
-pub(crate) enum Share {
-    Each(u32),
-    /// Whoever is free takes the next of so many.
-    Common(AtomicI64),
+/// The number of shards of a phase.
+pub(crate) enum Workload {
+    /// This number of shards for each worker.
+    PerWorker(u32),
+    /// The remaining shards of all workers together.
+    Shared(AtomicI64),
 }
 
-impl Share {
+impl Workload {
     fn has_more(&self, done: usize) -> bool {
         match self {
-            Self::Each(rounds) => u32::try_from(done).is_ok_and(|done| done < *rounds),
-            Self::Common(left) => left.fetch_sub(1, Ordering::Relaxed) > 0,
+            Self::PerWorker(rounds) => u32::try_from(done).is_ok_and(|done| done < *rounds),
+            Self::Shared(remaining) => remaining.fetch_sub(1, Ordering::Relaxed) > 0,
         }
     }
 }
 
-/// What a worker met, in seconds where it is a time: an entry for each shard.
+/// Measurements of a worker, in seconds, with an entry for each shard.
 #[derive(Default)]
-pub(crate) struct Tally {
-    /// From being free to an order.
-    pub(crate) order_s: Vec<f64>,
-    /// From an order to the answer that it may begin.
-    pub(crate) begin_s: Vec<f64>,
-    /// To store the recording's files.
+pub(crate) struct Measurements {
+    /// From being free to receiving a job.
+    pub(crate) job_s: Vec<f64>,
+    /// From receiving the job to the permission to start it.
+    pub(crate) start_s: Vec<f64>,
+    /// Storing the files of the recording.
     pub(crate) files_s: Vec<f64>,
-    /// To hand in what came of it: until NATS has stored it.
-    pub(crate) hand_in_s: Vec<f64>,
-    /// Of all shards together, asleep.
+    /// Sending the result, until NATS has stored it.
+    pub(crate) result_s: Vec<f64>,
+    /// The total sleeping time of all shards.
     pub(crate) slept_s: f64,
-    pub(crate) trouble: Trouble,
+    pub(crate) retries: Retries,
 }
 
-/// What a worker would have tried again, too.
+/// Requests that were repeated, as a worker repeats them.
 #[derive(Default)]
-pub(crate) struct Trouble {
-    /// Questions and requests for orders that failed or were refused.
-    pub(crate) orders: u32,
-    /// Renewals that were not answered with yes or no.
+pub(crate) struct Retries {
+    /// Requests for jobs that failed or were refused.
+    pub(crate) jobs: u32,
+    /// Lease renewals that were neither accepted nor refused.
     pub(crate) renewals: u32,
-    /// Files that the server had no time for.
+    /// Files that the busy server refused.
     pub(crate) files: u32,
-    /// Outcomes that NATS did not store at once.
-    pub(crate) outcomes: u32,
+    /// Results that NATS did not store at once.
+    pub(crate) results: u32,
     /// Leases that were lost.
     pub(crate) lost: u32,
 }
 
-impl Tally {
+impl Measurements {
     pub(crate) fn add(&mut self, other: Self) {
-        self.order_s.extend(other.order_s);
-        self.begin_s.extend(other.begin_s);
+        self.job_s.extend(other.job_s);
+        self.start_s.extend(other.start_s);
         self.files_s.extend(other.files_s);
-        self.hand_in_s.extend(other.hand_in_s);
+        self.result_s.extend(other.result_s);
         self.slept_s += other.slept_s;
-        self.trouble.orders += other.trouble.orders;
-        self.trouble.renewals += other.trouble.renewals;
-        self.trouble.files += other.trouble.files;
-        self.trouble.outcomes += other.trouble.outcomes;
-        self.trouble.lost += other.trouble.lost;
+        self.retries.jobs += other.retries.jobs;
+        self.retries.renewals += other.retries.renewals;
+        self.retries.files += other.retries.files;
+        self.retries.results += other.retries.results;
+        self.retries.lost += other.retries.lost;
     }
 }
 
-/// An order that it may work at.
-struct Begun {
+/// A job that the server has allowed this worker to start.
+struct StartedJob {
     lease: Lease,
     grant: String,
-    files: String,
+    files_url: String,
     part_of: Uuid,
     bundle: String,
     spec: ShardSpec,
     recording: String,
-    /// When the order came.
-    came: Instant,
+    /// When the job was received.
+    received_at: Instant,
 }
 
 impl Stub {
     pub(crate) async fn connect(
         number: usize,
         nats: &str,
-        own: Introduction,
+        capabilities: WorkerCapabilities,
         recording_bytes: usize,
         evaluations: Arc<Evaluations>,
     ) -> anyhow::Result<Self> {
@@ -157,22 +158,22 @@ impl Stub {
         let client = ConnectOptions::new()
             .name(&name)
             .custom_inbox_prefix(format!("_INBOX.{SERVER}.{name}"))
-            .request_timeout(Some(ANSWER))
+            .request_timeout(Some(RESPONSE_TIMEOUT))
             .connect(nats)
             .await
             .context("connecting to NATS")?;
-        // Nothing here speaks TLS.
-        let nobody = rustls::ClientConfig::builder()
+        // The program does not use TLS.
+        let no_tls = rustls::ClientConfig::builder()
             .with_root_certificates(rustls::RootCertStore::empty())
             .with_no_client_auth();
         Ok(Self {
             number,
             name,
-            own,
+            capabilities,
             jetstream: jetstream::new(client.clone()),
             client,
             http: reqwest::Client::builder()
-                .tls_backend_preconfigured(nobody)
+                .tls_backend_preconfigured(no_tls)
                 .build()?,
             recording: Bytes::from(vec![0; recording_bytes]),
             evaluations,
@@ -180,167 +181,167 @@ impl Stub {
         })
     }
 
-    /// Works as the plan asks, and comes back with what it met.
-    pub(crate) async fn work(mut self, plan: Arc<Plan>) -> anyhow::Result<(Self, Tally)> {
-        let mut tally = Tally::default();
-        while plan.share.has_more(tally.order_s.len()) {
-            // A lease that is lost is no shard: the server gives it to another, and this worker asks for the next.
-            while !self.shard(&plan, &mut tally).await? {
-                tally.trouble.lost += 1;
+    /// Runs the shards of a plan. Returns itself and its measurements.
+    pub(crate) async fn work(mut self, plan: Arc<Plan>) -> anyhow::Result<(Self, Measurements)> {
+        let mut measurements = Measurements::default();
+        while plan.workload.has_more(measurements.job_s.len()) {
+            // A shard whose lease is lost does not count: the server gives it to another worker.
+            while !self.run_shard(&plan, &mut measurements).await? {
+                measurements.retries.lost += 1;
             }
         }
-        Ok((self, tally))
+        Ok((self, measurements))
     }
 
-    /// Was one played and handed in?
-    async fn shard(&mut self, plan: &Plan, tally: &mut Tally) -> anyhow::Result<bool> {
+    /// Runs a shard and sends its result. Returns false if the lease was lost.
+    async fn run_shard(&mut self, plan: &Plan, measurements: &mut Measurements) -> anyhow::Result<bool> {
         let free = Instant::now();
-        let order = self.next(&mut tally.trouble).await?;
-        let begun = Instant::now();
-        self.fetch_bundle(&order).await?;
+        let job = self.next_job(&mut measurements.retries).await?;
+        let started = Instant::now();
+        self.fetch_bundle(&job).await?;
         let sleep = plan
             .sleep
-            .mul_f64(1.0 + plan.spread * self.draw(tally.order_s.len()));
+            .mul_f64(1.0 + plan.spread * self.random_offset(measurements.job_s.len()));
         let played = async {
             tokio::time::sleep(sleep).await;
             let slept = Instant::now();
-            let stored = self.store(&order).await?;
+            let stored = self.store_files(&job).await?;
             anyhow::Ok(stored.map(|failed| (slept.elapsed(), failed)))
         };
         let mut renewals = 0;
-        let kept = self.keep(&order, sleep, &mut renewals);
+        let lease_lost = self.renew_lease(&job, sleep, &mut renewals);
         let played = tokio::select! {
             played = played => played?,
-            () = kept => None,
+            () = lease_lost => None,
         };
-        tally.trouble.renewals += renewals;
+        measurements.retries.renewals += renewals;
         let Some((files, failed)) = played else {
             return Ok(false);
         };
-        let hands_in = Instant::now();
-        tally.trouble.outcomes += self.hand_in(&order).await?;
-        tally
-            .order_s
-            .push(order.came.duration_since(free).as_secs_f64());
-        tally
-            .begin_s
-            .push(begun.duration_since(order.came).as_secs_f64());
-        tally.files_s.push(files.as_secs_f64());
-        tally.hand_in_s.push(hands_in.elapsed().as_secs_f64());
-        tally.slept_s += sleep.as_secs_f64();
-        tally.trouble.files += failed;
+        let sending = Instant::now();
+        measurements.retries.results += self.send_result(&job).await?;
+        measurements
+            .job_s
+            .push(job.received_at.duration_since(free).as_secs_f64());
+        measurements
+            .start_s
+            .push(started.duration_since(job.received_at).as_secs_f64());
+        measurements.files_s.push(files.as_secs_f64());
+        measurements.result_s.push(sending.elapsed().as_secs_f64());
+        measurements.slept_s += sleep.as_secs_f64();
+        measurements.retries.files += failed;
         Ok(true)
     }
 
-    /// The next order that it may begin, however long that takes.
-    async fn next(&self, trouble: &mut Trouble) -> anyhow::Result<Begun> {
+    /// The next job that it may start, without a time limit.
+    async fn next_job(&self, retries: &mut Retries) -> anyhow::Result<StartedJob> {
         let mut failed = 0;
         loop {
-            match self.ask_for_work().await {
-                Ok(Some(begun)) => return Ok(begun),
-                // Nothing came while the request was open, or another has it.
+            match self.request_job().await {
+                Ok(Some(started)) => return Ok(started),
+                // No job came before the request expired, or another worker has it.
                 Ok(None) => {}
                 Err(error) => {
                     failed += 1;
-                    trouble.orders += 1;
-                    if failed == MOST_FAILURES {
-                        return Err(error.context("asking for work, again and again"));
+                    retries.jobs += 1;
+                    if failed == MAX_FAILURES {
+                        return Err(error.context("requesting a job failed too often"));
                     }
-                    tokio::time::sleep(REST).await;
+                    tokio::time::sleep(RETRY_DELAY).await;
                 }
             }
         }
     }
 
-    async fn ask_for_work(&self) -> anyhow::Result<Option<Begun>> {
-        match self.ask(&Ask::MayWork(self.own.clone())).await? {
-            Answer::Yes => {}
-            other => anyhow::bail!("the server gives no work: {other:?}"),
+    async fn request_job(&self) -> anyhow::Result<Option<StartedJob>> {
+        match self.request(&WorkerRequest::Register(self.capabilities.clone())).await? {
+            WorkerResponse::Accepted => {}
+            other => anyhow::bail!("the server refuses this worker: {other:?}"),
         }
         let stream = format!("{SERVER}-orders");
         let consumer = self.jetstream.get_consumer_from_stream("workers", stream);
         let consumer: PullConsumer = consumer
             .await
-            .map_err(|error| anyhow::anyhow!("asking for orders: {error}"))?;
-        let mut orders = consumer
+            .map_err(|error| anyhow::anyhow!("opening the consumer of jobs: {error}"))?;
+        let mut jobs = consumer
             .batch()
             .max_messages(1)
-            .expires(OPEN_FOR)
+            .expires(PULL_EXPIRY)
             .messages()
             .await
-            .context("asking for an order")?;
+            .context("requesting a job")?;
         let free = format!("{SERVER}.free.{}", self.name);
         self.client.publish(free, Bytes::new()).await?;
-        let Some(message) = orders.next().await else {
+        let Some(message) = jobs.next().await else {
             return Ok(None);
         };
-        let came = Instant::now();
-        let message = message.map_err(|error| anyhow::anyhow!("waiting for an order: {error}"))?;
+        let received_at = Instant::now();
+        let message = message.map_err(|error| anyhow::anyhow!("waiting for a job: {error}"))?;
         message
             .ack()
             .await
-            .map_err(|error| anyhow::anyhow!("acknowledging an order: {error}"))?;
-        let RemoteOrder {
-            order,
+            .map_err(|error| anyhow::anyhow!("acknowledging a job: {error}"))?;
+        let RemoteJob {
+            job,
             grant,
-            files,
+            files_url,
             ..
-        } = serde_json::from_slice(&message.payload).context("an order")?;
-        let mut lease = order.lease;
-        let begin = Ask::Begin {
+        } = serde_json::from_slice(&message.payload).context("parsing a job")?;
+        let mut lease = job.lease;
+        let start = WorkerRequest::StartJob {
             lease: lease.clone(),
             slot: SLOT.to_owned(),
         };
-        if self.ask(&begin).await? != Answer::Yes {
+        if self.request(&start).await? != WorkerResponse::Accepted {
             return Ok(None);
         }
         lease.slot = format!("remote/{}/{SLOT}", self.name);
-        let Assignment::Play {
+        let JobPayload::Shard {
             part_of,
             agent,
             spec,
-            keeps: Keeps::Recording(recording),
-        } = order.assignment
+            output: OutputFiles::Recording(recording),
+        } = job.payload
         else {
             anyhow::bail!(
-                "the season has nothing but evaluations: {}",
-                order.assignment
+                "expected a shard with a recording, got {}",
+                job.payload
             );
         };
-        Ok(Some(Begun {
+        Ok(Some(StartedJob {
             lease,
             grant,
-            files,
+            files_url,
             part_of,
             bundle: agent.bundle.blake3,
             spec,
             recording,
-            came,
+            received_at,
         }))
     }
 
-    async fn ask(&self, ask: &Ask) -> anyhow::Result<Answer> {
-        let question = serde_json::to_vec(ask)?;
+    async fn request(&self, request: &WorkerRequest) -> anyhow::Result<WorkerResponse> {
+        let payload = serde_json::to_vec(request)?;
         let subject = format!("{SERVER}.asks.{}", self.name);
-        let answer = self.client.request(subject, question.into());
-        let answer = answer.await.context("asking the server")?;
-        serde_json::from_slice(&answer.payload).context("the server's answer")
+        let response = self.client.request(subject, payload.into());
+        let response = response.await.context("sending a request to the server")?;
+        serde_json::from_slice(&response.payload).context("parsing the server's response")
     }
 
-    async fn fetch_bundle(&mut self, order: &Begun) -> anyhow::Result<()> {
-        if self.bundle != order.bundle {
-            let url = format!("{}/work/bundles/{}", order.files, order.bundle);
+    async fn fetch_bundle(&mut self, job: &StartedJob) -> anyhow::Result<()> {
+        if self.bundle != job.bundle {
+            let url = format!("{}/work/bundles/{}", job.files_url, job.bundle);
             let request = self.http.get(url);
-            let request = request.header(header::AUTHORIZATION, format!("Grant {}", order.grant));
-            let answer = request.send().await?.error_for_status()?;
-            let _archive = answer.bytes().await?;
-            self.bundle.clone_from(&order.bundle);
+            let request = request.header(header::AUTHORIZATION, format!("Grant {}", job.grant));
+            let response = request.send().await?.error_for_status()?;
+            let _archive = response.bytes().await?;
+            self.bundle.clone_from(&job.bundle);
         }
         Ok(())
     }
 
-    /// Stores a recording's files; how often that failed, or nothing if the order is no longer this worker's.
-    async fn store(&self, order: &Begun) -> anyhow::Result<Option<u32>> {
+    /// Stores the files of a recording. Returns the number of failures, or `None` if the worker does not hold the lease any more.
+    async fn store_files(&self, job: &StartedJob) -> anyhow::Result<Option<u32>> {
         let mut failed = 0;
         for (index, name) in FILES.into_iter().enumerate() {
             let body = match index {
@@ -348,80 +349,80 @@ impl Stub {
                 _ => Bytes::from_static(&[0; SMALL_BYTES]),
             };
             loop {
-                let request = self.http.put(format!("{}/work/files/{name}", order.files));
+                let request = self.http.put(format!("{}/work/files/{name}", job.files_url));
                 let request =
-                    request.header(header::AUTHORIZATION, format!("Grant {}", order.grant));
+                    request.header(header::AUTHORIZATION, format!("Grant {}", job.grant));
                 match request.body(body.clone()).send().await {
-                    Ok(answer) if answer.status() == StatusCode::FORBIDDEN => return Ok(None),
-                    Ok(answer) if !is_busy(answer.status()) => {
-                        answer.error_for_status().context("storing a file")?;
+                    Ok(response) if response.status() == StatusCode::FORBIDDEN => return Ok(None),
+                    Ok(response) if !is_busy(response.status()) => {
+                        response.error_for_status().context("storing a file")?;
                         break;
                     }
-                    Err(error) if failed == MOST_FAILURES => {
-                        return Err(error).context("storing a file, again and again");
+                    Err(error) if failed == MAX_FAILURES => {
+                        return Err(error).context("storing a file failed too often");
                     }
                     Ok(_) | Err(_) => failed += 1,
                 }
-                tokio::time::sleep(REST).await;
+                tokio::time::sleep(RETRY_DELAY).await;
             }
         }
         Ok(Some(failed))
     }
 
-    /// Renews as often as a worker does, and tells how far it is, until the lease is lost.
-    async fn keep(&self, order: &Begun, sleep: Duration, unanswered: &mut u32) {
-        let began = Instant::now();
-        let episodes = order.spec.episodes.len();
+    /// Renews the lease as often as a worker does, with the progress. Returns when the lease is lost.
+    async fn renew_lease(&self, job: &StartedJob, sleep: Duration, unanswered: &mut u32) {
+        let started = Instant::now();
+        let episodes = job.spec.episodes.len();
         loop {
-            tokio::time::sleep(RENEWS_EVERY).await;
-            let part = match sleep.is_zero() {
+            tokio::time::sleep(RENEWAL_INTERVAL).await;
+            let progress = match sleep.is_zero() {
                 true => 1.0,
-                false => began.elapsed().div_duration_f64(sleep).min(1.0),
+                false => started.elapsed().div_duration_f64(sleep).min(1.0),
             };
-            let renew = Ask::Renew {
-                lease: order.lease.clone(),
-                episodes_done: (part * episodes as f64) as u32,
+            let renew = WorkerRequest::RenewLease {
+                lease: job.lease.clone(),
+                episodes_done: (progress * episodes as f64) as u32,
                 trouble: None,
             };
-            match self.ask(&renew).await {
-                Ok(Answer::Yes) => {}
-                Ok(Answer::No { .. }) => return,
-                Ok(Answer::Unknown) | Err(_) => *unanswered += 1,
+            match self.request(&renew).await {
+                Ok(WorkerResponse::Accepted) => {}
+                Ok(WorkerResponse::Refused { .. }) => return,
+                Ok(WorkerResponse::Unknown) | Err(_) => *unanswered += 1,
             }
         }
     }
 
-    /// Hands in what came of an order; how often that failed.
-    async fn hand_in(&self, order: &Begun) -> anyhow::Result<u32> {
-        let ends = self.evaluations.ends(order.part_of);
-        if ends {
-            self.evaluations.others_are_handed_in(order.part_of).await;
+    /// Sends the result of a job. Returns the number of failed attempts.
+    async fn send_result(&self, job: &StartedJob) -> anyhow::Result<u32> {
+        let is_last = self.evaluations.record_played(job.part_of);
+        if is_last {
+            self.evaluations.wait_for_other_results(job.part_of).await;
         }
-        let report = WorkReport::Play {
-            outcomes: outcomes(&order.spec, ends),
+        let report = JobReport::Shard {
+            outcomes: outcomes(&job.spec, is_last),
             log: String::new(),
-            stopped_by_faults: ends,
-            recording: Some(order.recording.clone()),
+            stopped_by_faults: is_last,
+            recording: Some(job.recording.clone()),
         };
-        let outcome = RemoteOutcome {
-            lease: order.lease.clone(),
-            grant: order.grant.clone(),
-            outcome: Outcome::Done {
+        let result = ResultMessage {
+            lease: job.lease.clone(),
+            grant: job.grant.clone(),
+            end: JobEnd::Done {
                 report: Box::new(report),
             },
         };
         let mut headers = HeaderMap::new();
-        headers.insert("Nats-Msg-Id", outcome.id());
-        let payload = Bytes::from(serde_json::to_vec(&outcome)?);
-        let largest = self.client.max_payload();
+        headers.insert("Nats-Msg-Id", result.id());
+        let payload = Bytes::from(serde_json::to_vec(&result)?);
+        let max_bytes = self.client.max_payload();
         ensure!(
-            payload.len() <= largest,
-            "an outcome has {} bytes, and NATS takes {largest}",
+            payload.len() <= max_bytes,
+            "a result has {} bytes, but NATS accepts at most {max_bytes}",
             payload.len()
         );
         let subject = format!("{SERVER}.outcomes.{}", self.name);
-        let began = Instant::now();
-        let within = Duration::from_secs(order.lease.duration_s.into());
+        let started = Instant::now();
+        let time_limit = Duration::from_secs(job.lease.duration_s.into());
         let mut failed = 0;
         let sequence = loop {
             let sent = async {
@@ -434,28 +435,28 @@ impl Stub {
             };
             match sent.await {
                 Ok(stored) => break stored.sequence,
-                Err(error) if began.elapsed() >= within => {
-                    return Err(error).context("handing in what came of an order");
+                Err(error) if started.elapsed() >= time_limit => {
+                    return Err(error).context("sending the result of a job");
                 }
                 Err(_) => {
                     failed += 1;
-                    tokio::time::sleep(REST).await;
+                    tokio::time::sleep(RETRY_DELAY).await;
                 }
             }
         };
-        self.evaluations.handed_in(order.part_of);
-        let handed_in = Ask::HandedIn {
-            lease: order.lease.clone(),
-            episodes_done: order.spec.episodes.end - order.spec.episodes.start,
+        self.evaluations.record_result(job.part_of);
+        let pending = WorkerRequest::ResultPending {
+            lease: job.lease.clone(),
+            episodes_done: job.spec.episodes.end - job.spec.episodes.start,
             sequence,
         };
-        // That the server keeps the lease is of use, and no more.
-        let _ = self.ask(&handed_in).await;
+        // This only asks the server to keep the lease; a failure does no harm.
+        let _ = self.request(&pending).await;
         Ok(failed)
     }
 
-    /// Between -1 and 1, drawn for its shard of this number: the same in each run.
-    fn draw(&self, shard: usize) -> f64 {
+    /// A pseudo-random number between -1 and 1 for a shard, the same in each run.
+    fn random_offset(&self, shard: usize) -> f64 {
         let mut hasher = blake3::Hasher::new();
         hasher.update(&(self.number as u64).to_le_bytes());
         hasher.update(&(shard as u64).to_le_bytes());
@@ -469,15 +470,15 @@ fn is_busy(status: StatusCode) -> bool {
     status == StatusCode::TOO_MANY_REQUESTS || status == StatusCode::SERVICE_UNAVAILABLE
 }
 
-/// Of episodes in which nothing happened, or of an agent that broke a limit in the last of them.
-fn outcomes(spec: &ShardSpec, faulty: bool) -> Vec<EpisodeOutcome> {
+/// Outcomes of uneventful episodes, with a fault in the last one if `has_fault`.
+fn outcomes(spec: &ShardSpec, has_fault: bool) -> Vec<EpisodeOutcome> {
     let outcome = |episode| {
-        let fault = (faulty && episode + 1 == spec.episodes.end).then(|| AgentFault {
+        let fault = (has_fault && episode + 1 == spec.episodes.end).then(|| AgentFault {
             fault: AgentFaultKind::TimedOut {
                 phase: Phase::Reset,
                 limit_s: 1.0,
             },
-            contest: spec.task.into(),
+            agent_task: spec.task.into(),
             episode: Some(episode),
             step: None,
             line: None,

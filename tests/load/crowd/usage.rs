@@ -1,25 +1,25 @@
-//! What a process has used, as the kernel counts it.
+//! Resource usage of processes and threads, from /proc.
 
 use anyhow::Context as _;
 use std::{collections::BTreeMap, fs};
 
-/// Linux counts CPU time for programs in hundredths of a second (`USER_HZ`), whatever its own clock.
+/// Linux reports CPU time in hundredths of a second (`USER_HZ`), whatever its internal clock.
 const TICKS_PER_S: f64 = 100.0;
 
-/// Of one process, from its beginning on.
+/// The usage of a process since its start.
 #[derive(Debug, Clone)]
 pub(crate) struct Usage {
-    /// CPU seconds, user and system; of its children none.
+    /// CPU seconds, user and system, without its children.
     pub(crate) cpu_s: f64,
     /// Memory in use, bytes.
     pub(crate) resident_bytes: u64,
-    /// The most that was in use.
+    /// The highest memory use, bytes.
     pub(crate) peak_bytes: u64,
-    /// Bytes that it had the kernel write to disks.
+    /// Bytes that it wrote to disks.
     pub(crate) written_bytes: u64,
 }
 
-/// CPU seconds of a process's threads, by id and start: a thread that has ended keeps what was last seen of it.
+/// CPU seconds of a process's threads, by id and start. A thread that has ended keeps its last value.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Threads(BTreeMap<(u32, u64), (String, f64)>);
 
@@ -47,8 +47,8 @@ impl Usage {
 }
 
 impl Threads {
-    /// Looks at all that run.
-    pub(crate) fn look(&mut self, process: u32) -> anyhow::Result<()> {
+    /// Reads the values of all running threads.
+    pub(crate) fn sample(&mut self, process: u32) -> anyhow::Result<()> {
         let folder = format!("/proc/{process}/task");
         for entry in fs::read_dir(&folder).with_context(|| format!("reading {folder}"))? {
             let entry = entry?;
@@ -57,7 +57,7 @@ impl Threads {
                 .to_string_lossy()
                 .parse()
                 .context("a thread's id")?;
-            // One that has ended meanwhile is none.
+            // A thread that has ended meanwhile has no file.
             if let Ok(text) = fs::read_to_string(entry.path().join("stat")) {
                 let Stat {
                     name,
@@ -103,6 +103,6 @@ fn stat(text: &str) -> anyhow::Result<Stat> {
 fn number(text: &str, name: &str) -> anyhow::Result<u64> {
     let mut found = text.lines().filter_map(|line| line.strip_prefix(name));
     let value = found.next().and_then(|rest| rest.split_whitespace().next());
-    let value = value.with_context(|| format!("the kernel does not tell {name}"))?;
+    let value = value.with_context(|| format!("the kernel does not report {name}"))?;
     value.parse().with_context(|| format!("{name} {value}"))
 }

@@ -1,4 +1,4 @@
-//! Files by plain HTTP: each is a file of a folder, as the server's own are.
+//! A plain HTTP server that stores each file in a folder, as Faceoff's server does.
 
 use anyhow::{Context as _, ensure};
 use axum::{
@@ -17,9 +17,9 @@ use tokio::{
     net::TcpListener,
 };
 
-const PIECE_BYTES: usize = 64 << 10;
+const CHUNK_BYTES: usize = 64 << 10;
 
-/// Serves `folder`, in the background; returns where it listens.
+/// Serves a folder in the background. Returns the listening address.
 pub(crate) async fn serve(folder: PathBuf) -> anyhow::Result<SocketAddr> {
     let listener = TcpListener::bind(("127.0.0.1", 0)).await?;
     let address = listener.local_addr()?;
@@ -38,9 +38,9 @@ async fn store(
 ) -> StatusCode {
     let stored = async {
         let mut file = File::create(folder.join(name)).await?;
-        let mut pieces = body.into_data_stream();
-        while let Some(piece) = pieces.next().await {
-            file.write_all(&piece?).await?;
+        let mut chunks = body.into_data_stream();
+        while let Some(chunk) = chunks.next().await {
+            file.write_all(&chunk?).await?;
         }
         file.flush().await?;
         anyhow::Ok(())
@@ -60,37 +60,37 @@ async fn read(State(folder): State<Arc<PathBuf>>, Path(name): Path<String>) -> R
     let Ok((file, bytes)) = opened.await else {
         return StatusCode::NOT_FOUND.into_response();
     };
-    let pieces = futures::stream::try_unfold(file, |mut file| async {
-        let mut piece = vec![0; PIECE_BYTES];
-        let bytes = file.read(&mut piece).await?;
-        piece.truncate(bytes);
-        std::io::Result::Ok((bytes > 0).then(|| (Bytes::from(piece), file)))
+    let chunks = futures::stream::try_unfold(file, |mut file| async {
+        let mut chunk = vec![0; CHUNK_BYTES];
+        let bytes = file.read(&mut chunk).await?;
+        chunk.truncate(bytes);
+        std::io::Result::Ok((bytes > 0).then(|| (Bytes::from(chunk), file)))
     });
     let length = [(header::CONTENT_LENGTH, bytes.to_string())];
-    (length, Body::from_stream(pieces)).into_response()
+    (length, Body::from_stream(chunks)).into_response()
 }
 
-/// Whoever stores and reads them, over one connection that is kept.
-pub(crate) struct Files {
+/// A client that stores and reads files over one persistent connection.
+pub(crate) struct FileClient {
     client: reqwest::Client,
     url: String,
 }
 
-impl Files {
+impl FileClient {
     pub(crate) fn at(address: SocketAddr) -> anyhow::Result<Self> {
-        // None speaks TLS, so none asks for the machine's certificate authorities.
-        let nobody = rustls::ClientConfig::builder()
+        // The client does not use TLS, so it does not load the system's certificate authorities.
+        let no_tls = rustls::ClientConfig::builder()
             .with_root_certificates(rustls::RootCertStore::empty())
             .with_no_client_auth();
-        let client = reqwest::Client::builder().tls_backend_preconfigured(nobody);
+        let client = reqwest::Client::builder().tls_backend_preconfigured(no_tls);
         Ok(Self {
             client: client.build()?,
             url: format!("http://{address}"),
         })
     }
 
-    /// One question and its answer, without a file.
-    pub(crate) async fn ask(&self) -> anyhow::Result<()> {
+    /// One request without a file.
+    pub(crate) async fn ping(&self) -> anyhow::Result<()> {
         self.client
             .get(&self.url)
             .send()
@@ -100,15 +100,15 @@ impl Files {
     }
 
     pub(crate) async fn put(&self, name: &str, bytes: Bytes) -> anyhow::Result<()> {
-        let sent = self.client.put(format!("{}/{name}", self.url)).body(bytes);
-        let answer = sent.send().await?;
-        ensure!(answer.status().is_success(), "PUT: {}", answer.status());
+        let request = self.client.put(format!("{}/{name}", self.url)).body(bytes);
+        let response = request.send().await?;
+        ensure!(response.status().is_success(), "PUT: {}", response.status());
         Ok(())
     }
 
     pub(crate) async fn get(&self, name: &str) -> anyhow::Result<Bytes> {
-        let asked = self.client.get(format!("{}/{name}", self.url)).send();
-        let answer = asked.await?.error_for_status()?;
-        answer.bytes().await.context("GET")
+        let request = self.client.get(format!("{}/{name}", self.url)).send();
+        let response = request.await?.error_for_status()?;
+        response.bytes().await.context("GET")
     }
 }

@@ -1,5 +1,5 @@
-//! A link that is long and not narrow: what is sent arrives after a delay, and more may be sent meanwhile. The tests' `Relay` takes its
-//! next piece only once the last has arrived, which makes a link as narrow as it is long, for whoever sends much at once.
+//! A link with high latency but unlimited bandwidth: data arrives after a delay, and more can be sent meanwhile. The tests'
+//! `Relay` reads the next chunk only after the previous one has arrived, so it also limits the bandwidth.
 
 use std::{net::SocketAddr, sync::Arc, time::Duration};
 use tokio::{
@@ -12,22 +12,22 @@ use tokio::{
     time::Instant,
 };
 
-/// So much is under way at most, in either direction: as much as Linux keeps of what one connection has sent (`net.ipv4.tcp_wmem`).
-pub(crate) const UNDER_WAY_BYTES: u32 = 4 << 20;
-const PIECE_BYTES: usize = 64 << 10;
+/// The largest amount of data in flight in each direction: as much as Linux buffers of one connection (`net.ipv4.tcp_wmem`).
+pub(crate) const IN_FLIGHT_BYTES: u32 = 4 << 20;
+const CHUNK_BYTES: usize = 64 << 10;
 
-/// Passes on connections to `to`, in the background; returns where it listens.
-pub(crate) async fn to(to: SocketAddr, delay: Duration) -> anyhow::Result<SocketAddr> {
+/// Forwards connections to `target` in the background. Returns the listening address.
+pub(crate) async fn forward(target: SocketAddr, delay: Duration) -> anyhow::Result<SocketAddr> {
     let listener = TcpListener::bind(("127.0.0.1", 0)).await?;
     let address = listener.local_addr()?;
     tokio::spawn(async move {
         while let Ok((near, _)) = listener.accept().await {
-            let Ok(far) = TcpStream::connect(to).await else {
+            let Ok(far) = TcpStream::connect(target).await else {
                 continue;
             };
-            // A piece waits for its delay, and for nothing else.
+            // A chunk waits for its delay only.
             for end in [&near, &far] {
-                // Without it a measurement is slower, and not wrong.
+                // A failure makes measurements slower, but not wrong.
                 let _ = end.set_nodelay(true);
             }
             let ((near_in, near_out), (far_in, far_out)) = (near.into_split(), far.into_split());
@@ -38,45 +38,45 @@ pub(crate) async fn to(to: SocketAddr, delay: Duration) -> anyhow::Result<Socket
     Ok(address)
 }
 
-struct Piece {
+struct Chunk {
     due: Instant,
     bytes: Vec<u8>,
-    /// Of what may be under way.
-    _room: OwnedSemaphorePermit,
+    /// Its part of the data in flight.
+    _permit: OwnedSemaphorePermit,
 }
 
-/// Until one end is closed; then so is the other, once all has arrived.
+/// Forwards one direction until its source is closed. Closes the target once all data has arrived.
 async fn one_way(mut from: OwnedReadHalf, mut to: OwnedWriteHalf, delay: Duration) {
-    let room = Arc::new(Semaphore::new(UNDER_WAY_BYTES as usize));
-    // Bounded by the room that its pieces take.
-    let (send, mut sent) = mpsc::unbounded_channel::<Piece>();
+    let permits = Arc::new(Semaphore::new(IN_FLIGHT_BYTES as usize));
+    // Bounded by the permits of its chunks.
+    let (send, mut sent) = mpsc::unbounded_channel::<Chunk>();
     let reading = async move {
-        let mut piece = vec![0; PIECE_BYTES];
-        while let Ok(bytes @ 1..) = from.read(&mut piece).await {
-            let taken = u32::try_from(bytes).unwrap_or(UNDER_WAY_BYTES);
-            let Ok(room) = Arc::clone(&room).acquire_many_owned(taken).await else {
+        let mut chunk = vec![0; CHUNK_BYTES];
+        while let Ok(bytes @ 1..) = from.read(&mut chunk).await {
+            let count = u32::try_from(bytes).unwrap_or(IN_FLIGHT_BYTES);
+            let Ok(permit) = Arc::clone(&permits).acquire_many_owned(count).await else {
                 break;
             };
-            let piece = Piece {
+            let chunk = Chunk {
                 due: Instant::now() + delay,
-                bytes: piece[..bytes].to_vec(),
-                _room: room,
+                bytes: chunk[..bytes].to_vec(),
+                _permit: permit,
             };
-            if send.send(piece).is_err() {
+            if send.send(chunk).is_err() {
                 break;
             }
         }
     };
     let writing = async move {
-        while let Some(piece) = sent.recv().await {
+        while let Some(chunk) = sent.recv().await {
             if !delay.is_zero() {
-                tokio::time::sleep_until(piece.due).await;
+                tokio::time::sleep_until(chunk.due).await;
             }
-            if to.write_all(&piece.bytes).await.is_err() {
+            if to.write_all(&chunk.bytes).await.is_err() {
                 break;
             }
         }
-        // It may be closed already.
+        // The connection may be closed already.
         let _ = to.shutdown().await;
     };
     tokio::join!(reading, writing);

@@ -1,11 +1,11 @@
-//! What it would cost to pass files by JetStream's object store in place of HTTP: `make objects`.
+//! Compares file transfer by JetStream's object store with HTTP: `make objects`.
 //!
-//! A real nats-server and a plain HTTP server store the same bytes, sent over the same link, which a worker far away has: first
-//! without a delay, then with 200 ms from a question to its answer. async-nats' `ObjectStore::put` sends a chunk once the last has been
-//! acknowledged, so its time grows with the link's length times the file's size; HTTP's does not. Larger chunks are measured as well,
-//! since they are the way out that async-nats offers. Nothing is asserted but that what comes back is what was sent.
+//! A real nats-server and a plain HTTP server store the same bytes, sent over the same link: first without a delay, then with
+//! a round trip of 200 ms, as to a distant worker. async-nats' `ObjectStore::put` sends a chunk only after the previous one was
+//! acknowledged, so its time grows with latency times file size. That of HTTP does not. Larger chunks, which async-nats
+//! offers, are measured as well. The only assertion is that the bytes come back unchanged.
 
-#![expect(clippy::print_stdout, reason = "it reports what it measured")]
+#![expect(clippy::print_stdout, reason = "the program prints its measurements")]
 
 mod http;
 mod link;
@@ -18,7 +18,7 @@ use async_nats::jetstream::{
 };
 use axum::body::Bytes;
 use faceoff_tests::nats::Nats;
-use http::Files;
+use http::FileClient;
 use serde_json::{Value, json};
 use std::{
     fs,
@@ -28,16 +28,16 @@ use std::{
 };
 use tokio::{io::AsyncReadExt as _, runtime::Runtime, time::timeout};
 
-/// One way: from a question to its answer it is twice that.
+/// One-way delays: a round trip takes twice as long.
 const DELAYS: [Duration; 2] = [Duration::ZERO, Duration::from_millis(100)];
-/// A small recording, that of a large shard, and a bundle; each so many times.
+/// Sizes in MiB and rounds: a small recording, one of a large shard, and a bundle.
 const FILES: [(usize, usize); 3] = [(1, 3), (8, 3), (64, 1)];
-/// async-nats' own chunks, and the largest that a nats-server takes unless it is told otherwise, less their subject.
-const CHUNKS: [(&str, Option<usize>); 2] = [("own", None), ("large", Some(1_000_000))];
-/// What takes longer is given up, and all with it.
-const MOST: Duration = Duration::from_secs(900);
-/// Questions without a file, by which the link is measured.
-const QUESTIONS: usize = 5;
+/// The default chunk size of async-nats, and the largest that a nats-server accepts by default, less the subject.
+const CHUNKS: [(&str, Option<usize>); 2] = [("default", None), ("large", Some(1_000_000))];
+/// Time limit of one transfer; exceeding it ends the program.
+const TRANSFER_TIMEOUT: Duration = Duration::from_secs(900);
+/// Requests without a file, to measure the link.
+const PINGS: usize = 5;
 
 fn main() -> anyhow::Result<()> {
     let scratch = tempfile::tempdir()?;
@@ -48,22 +48,22 @@ fn main() -> anyhow::Result<()> {
 }
 
 async fn measure(nats: &Nats, folder: &Path) -> anyhow::Result<()> {
-    let served = http::serve(folder.to_owned()).await?;
-    let mut measured = Vec::new();
+    let http_server = http::serve(folder.to_owned()).await?;
+    let mut links = Vec::new();
     for delay in DELAYS {
-        measured.push(over(nats.address(), served, delay).await?);
+        links.push(measure_link(nats.address(), http_server, delay).await?);
     }
     println!(
         "{}",
-        json!({ "under_way_bytes": link::UNDER_WAY_BYTES, "links": measured })
+        json!({ "in_flight_bytes": link::IN_FLIGHT_BYTES, "links": links })
     );
     Ok(())
 }
 
-/// All files, over links with this delay.
-async fn over(nats: SocketAddr, served: SocketAddr, delay: Duration) -> anyhow::Result<Value> {
-    let files = Files::at(link::to(served, delay).await?)?;
-    let nats = link::to(nats, delay).await?;
+/// Measures all files over links with this delay.
+async fn measure_link(nats: SocketAddr, http_server: SocketAddr, delay: Duration) -> anyhow::Result<Value> {
+    let files = FileClient::at(link::forward(http_server, delay).await?)?;
+    let nats = link::forward(nats, delay).await?;
     let client = async_nats::connect(format!("nats://{nats}")).await?;
     let bucket = format!("delay-{}", delay.as_millis());
     let stream = format!("OBJ_{bucket}");
@@ -75,63 +75,63 @@ async fn over(nats: SocketAddr, served: SocketAddr, delay: Duration) -> anyhow::
     };
     let jetstream = jetstream::new(client);
     let store = jetstream.create_object_store(bucket).await?;
-    let (mut of_http, mut of_nats) = (Vec::new(), Vec::new());
-    files.ask().await?;
-    for _ in 0..QUESTIONS {
-        of_http.push(seconds(files.ask()).await?.1);
-        let asked = async { Ok(jetstream.get_stream(&stream).await?) };
-        of_nats.push(seconds(asked).await?.1);
+    let (mut http_pings, mut nats_pings) = (Vec::new(), Vec::new());
+    files.ping().await?;
+    for _ in 0..PINGS {
+        http_pings.push(seconds(files.ping()).await?.1);
+        let request = async { Ok(jetstream.get_stream(&stream).await?) };
+        nats_pings.push(seconds(request).await?.1);
     }
-    let (of_http, of_nats) = (median(of_http), median(of_nats));
+    let (http_pings, nats_pings) = (median(http_pings), median(nats_pings));
     println!(
-        "\nA link of {} ms there and back: an empty answer of HTTP takes {:.1} ms, one of NATS {:.1} ms\n",
+        "\nA link with a round trip of {} ms: an empty request takes {:.1} ms by HTTP, {:.1} ms by NATS\n",
         2 * delay.as_millis(),
-        1000.0 * of_http,
-        1000.0 * of_nats
+        1000.0 * http_pings,
+        1000.0 * nats_pings
     );
     println!(
-        "| MiB | chunks | of bytes | put by NATS, s | by HTTP, s | ratio | get by NATS, s | by HTTP, s | ratio |"
+        "| MiB | chunks | bytes per chunk | put by NATS, s | by HTTP, s | ratio | get by NATS, s | by HTTP, s | ratio |"
     );
     println!("|---|---|---|---|---|---|---|---|---|");
-    let mut lines = Vec::new();
+    let mut results = Vec::new();
     for (mib, rounds) in FILES {
         for (chunks, bytes) in CHUNKS {
-            let found = compare(&files, &store, mib, rounds, bytes).await;
-            let found = found.with_context(|| format!("{mib} MiB in {chunks} chunks"))?;
-            println!("{}", found.line(mib));
-            lines.push(found.json(mib, chunks));
+            let comparison = compare(&files, &store, mib, rounds, bytes).await;
+            let comparison = comparison.with_context(|| format!("{mib} MiB in {chunks} chunks"))?;
+            println!("{}", comparison.line(mib));
+            results.push(comparison.json(mib, chunks));
         }
     }
     Ok(json!({
         "delay_s": delay.as_secs_f64(),
-        "http_answer_s": of_http,
-        "nats_answer_s": of_nats,
-        "files": lines,
+        "http_answer_s": http_pings,
+        "nats_answer_s": nats_pings,
+        "files": results,
     }))
 }
 
-/// Seconds of one file, the medians of all rounds.
-struct Found {
+/// The measurements of one file size, medians of all rounds.
+struct Comparison {
     rounds: usize,
     chunks: usize,
-    put: Pair,
-    get: Pair,
+    put: Timing,
+    get: Timing,
 }
 
 #[derive(Clone, Copy)]
-struct Pair {
+struct Timing {
     nats_s: f64,
     http_s: f64,
     ratio: f64,
 }
 
-impl Pair {
+impl Timing {
     fn of(rounds: Vec<(f64, f64)>) -> Self {
-        let of = |one: fn(&(f64, f64)) -> f64| median(rounds.iter().map(one).collect());
+        let median_of = |value: fn(&(f64, f64)) -> f64| median(rounds.iter().map(value).collect());
         Self {
-            nats_s: of(|(nats, _)| *nats),
-            http_s: of(|(_, http)| *http),
-            ratio: of(|(nats, http)| nats / http),
+            nats_s: median_of(|(nats, _)| *nats),
+            http_s: median_of(|(_, http)| *http),
+            ratio: median_of(|(nats, http)| nats / http),
         }
     }
 
@@ -140,7 +140,7 @@ impl Pair {
     }
 }
 
-impl Found {
+impl Comparison {
     fn line(&self, mib: usize) -> String {
         let Self {
             chunks, put, get, ..
@@ -169,57 +169,57 @@ impl Found {
     }
 }
 
-/// The same bytes by both, in turns.
+/// Transfers the same bytes by NATS and HTTP in turn.
 async fn compare(
-    files: &Files,
+    files: &FileClient,
     store: &ObjectStore,
     mib: usize,
     rounds: usize,
     chunk_size: Option<usize>,
-) -> anyhow::Result<Found> {
+) -> anyhow::Result<Comparison> {
     let (mut puts, mut gets, mut chunks) = (Vec::new(), Vec::new(), 0);
     for round in 0..rounds {
         let name = format!("{mib}-{round}");
-        let bytes = drawn(mib << 20, &name);
+        let bytes = random_bytes(mib << 20, &name);
         let object = ObjectMetadata {
             name: name.clone(),
             chunk_size,
             ..ObjectMetadata::default()
         };
-        let putting = async { Ok(store.put(object, &mut &bytes[..]).await?) };
-        let (info, put_by_nats) = seconds(putting).await?;
+        let put = async { Ok(store.put(object, &mut &bytes[..]).await?) };
+        let (info, put_by_nats) = seconds(put).await?;
         chunks = info.chunks;
         let ((), put_by_http) = seconds(files.put(&name, bytes.clone())).await?;
         puts.push((put_by_nats, put_by_http));
-        let getting = async {
-            let mut got = Vec::with_capacity(bytes.len());
-            store.get(&name).await?.read_to_end(&mut got).await?;
-            Ok(got)
+        let get = async {
+            let mut received = Vec::with_capacity(bytes.len());
+            store.get(&name).await?.read_to_end(&mut received).await?;
+            Ok(received)
         };
-        let (got, got_by_nats) = seconds(getting).await?;
-        ensure!(got == bytes, "NATS gives back something else");
-        let (got, got_by_http) = seconds(files.get(&name)).await?;
-        ensure!(got == bytes, "HTTP gives back something else");
-        gets.push((got_by_nats, got_by_http));
-        // The next one is not to find it.
+        let (received, get_by_nats) = seconds(get).await?;
+        ensure!(received == bytes, "NATS returned other bytes");
+        let (received, get_by_http) = seconds(files.get(&name)).await?;
+        ensure!(received == bytes, "HTTP returned other bytes");
+        gets.push((get_by_nats, get_by_http));
+        // The next round must not find the object.
         store.delete(&name).await?;
     }
-    Ok(Found {
+    Ok(Comparison {
         rounds,
         chunks,
-        put: Pair::of(puts),
-        get: Pair::of(gets),
+        put: Timing::of(puts),
+        get: Timing::of(gets),
     })
 }
 
 async fn seconds<T>(work: impl Future<Output = anyhow::Result<T>>) -> anyhow::Result<(T, f64)> {
-    let began = Instant::now();
-    let done = timeout(MOST, work).await.context("it takes too long")??;
-    Ok((done, began.elapsed().as_secs_f64()))
+    let started = Instant::now();
+    let done = timeout(TRANSFER_TIMEOUT, work).await.context("the transfer exceeded its time limit")??;
+    Ok((done, started.elapsed().as_secs_f64()))
 }
 
-/// Bytes that nobody can make smaller, the same for the same name.
-fn drawn(bytes: usize, name: &str) -> Bytes {
+/// Incompressible bytes, the same for the same name.
+fn random_bytes(bytes: usize, name: &str) -> Bytes {
     let mut all = vec![0; bytes];
     let mut hasher = blake3::Hasher::new();
     hasher.update(name.as_bytes());
@@ -227,7 +227,7 @@ fn drawn(bytes: usize, name: &str) -> Bytes {
     Bytes::from(all)
 }
 
-fn median(mut of: Vec<f64>) -> f64 {
-    of.sort_by(f64::total_cmp);
-    of.get(of.len() / 2).copied().unwrap_or(f64::NAN)
+fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
 }

@@ -27,7 +27,7 @@ const episode = (): Uint8Array =>
   );
 
 describe("a motion clip", () => {
-  it("gives back what was written, to the scale", () => {
+  it("decodes values to the precision of their scale", () => {
     const motion = decodeMotion(episode());
     expect([...motion.puck.x].map((x) => x.toFixed(4))).toEqual([
       "0.3000",
@@ -44,25 +44,25 @@ describe("a motion clip", () => {
     expect(motion.columns.map((c) => c.name)).not.toContain("of_the_future");
   });
 
-  it.each([0, 1, 2])("reads differences of order %i, negative numbers and those beyond 32 bits", (order) => {
+  it.each([0, 1, 2])("decodes order %i, negative numbers and more than 32 bits", (order) => {
     const values = [0, -1, 1, 63, -64, 2 ** 34, -(2 ** 34), 5];
     const columns = still(8, (k) => values[k], () => 0); // prettier-ignore
     columns[0] = { ...columns[0], scale: 1, order };
     expect([...decodeMotion(encode({ samples: 8 }, columns)).puck.x]).toEqual(values);
   });
 
-  it("refuses every truncation with words", () => {
+  it("refuses all truncated clips", () => {
     const bytes = episode();
     for (let length = 0; length < bytes.length; length++) {
       expect(() => decodeMotion(bytes.slice(0, length)), `${length} bytes`).toThrow(ClipError);
     }
   });
 
-  it("refuses a byte too many", () => {
+  it("refuses an extra byte", () => {
     expect(() => decodeMotion(new Uint8Array([...episode(), 0]))).toThrow(/1 bytes after its last column/);
   });
 
-  it("never breaks by garbage in another way than by saying so", () => {
+  it("throws only ClipError for garbage", () => {
     const bytes = episode();
     let state = 1;
     const random = (below: number): number => {
@@ -80,33 +80,33 @@ describe("a motion clip", () => {
     }
   });
 
-  it("names a format that it does not know", () => {
+  it("names an unknown format", () => {
     expect(() => decodeMotion(encode({ samples: 1, format: "faceoff-clip/9" }, []))).toThrow(
       /"faceoff-clip\/9"/,
     );
   });
 
-  it("names the field at fault", () => {
+  it("names the invalid field", () => {
     const wrong = encode({ samples: 2, violations: [{ side: 7 }] }, still(2, () => 0, () => 0)); // prettier-ignore
     expect(() => decodeMotion(wrong)).toThrow(
       "header.violations[0].side must be a whole number from 0 to 1, but is 7",
     );
   });
 
-  it("refuses what is no clip", () => {
+  it("refuses other files", () => {
     expect(() => decodeMotion(new TextEncoder().encode("<!doctype html><p>Not found"))).toThrow(
-      /no clip at all/,
+      /is not a clip/,
     );
     expect(() => decodeMotion(assemble(new Uint8Array([0xff, 0xfe]), []))).toThrow(/not JSON/);
   });
 
-  it("does not draw a clip without puck or arm", () => {
+  it("refuses a clip without puck or arm", () => {
     expect(() => decodeMotion(encode({ samples: 1 }, []))).toThrow(/nothing to draw/);
   });
 });
 
 describe("an observed clip", () => {
-  it("has its columns at their samples", () => {
+  it("aligns columns with samples", () => {
     const bytes = encode({ kind: "observed", samples: 3, side: 1, late: [2], lost: [{ from: 1, to: 2 }] }, [
       { name: "computation_time", values: [0.004, 0.021], first: 1, scale: 1e-6, order: 0 },
     ]);
@@ -118,7 +118,7 @@ describe("an observed clip", () => {
     expect(observed.command).toBeNull();
   });
 
-  it("is not taken for a motion", () => {
-    expect(() => decodeObserved(episode())).toThrow(/kind "observed" was expected/);
+  it("refuses a motion clip", () => {
+    expect(() => decodeObserved(episode())).toThrow(/expected a clip of kind "observed"/);
   });
 });

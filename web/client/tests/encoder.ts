@@ -1,4 +1,4 @@
-/** Writes clips as the server does, for the tests. */
+/** Encodes clips for the tests in the format of the server. */
 
 export interface TestColumn {
   name: string;
@@ -66,7 +66,7 @@ export function assemble(header: Uint8Array, payload: number[]): Uint8Array<Arra
   return bytes;
 }
 
-/** The columns that a motion must have: the puck by functions of the sample, the arm still. */
+/** Required columns of a motion clip: the puck by functions of the sample, a still arm. */
 export function still(samples: number, x: (k: number) => number, y: (k: number) => number): TestColumn[] {
   const of = (name: string, value: (k: number) => number): TestColumn => ({
     name,

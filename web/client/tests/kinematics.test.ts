@@ -11,14 +11,14 @@ type Recorded = { q: number[] } & Record<`pos_${Body}` | `rot_${Body}`, number[]
 
 const origin = (frame: Frame): number[] => [...frame.slice(9)];
 
-function near(came: ArrayLike<number>, expected: number[], within: number): void {
+function near(actual: ArrayLike<number>, expected: number[], within: number): void {
   expected.forEach((value, i) => {
-    expect(Math.abs(came[i] - value)).toBeLessThan(within);
+    expect(Math.abs(actual[i] - value)).toBeLessThan(within);
   });
 }
 
 describe("forward kinematics", () => {
-  it("puts the end effector of the initial pose where the rules say, on both sides", () => {
+  it("places the end effector of the initial pose as in the rules, on both sides", () => {
     const own = new Kinematics(0);
     own.set(MODEL.initial_q_rad);
     near(origin(own.endEffector), [-1.51 + 0.65, 0, 0.1645 - 0.1], 1e-4);
@@ -27,10 +27,10 @@ describe("forward kinematics", () => {
     near(origin(opponent.endEffector), [1.51 - 0.65, 0, 0.0645], 1e-4);
   });
 
-  it("hangs the mallet straight down by the universal joint's angles", () => {
+  it("lets the mallet hang straight down by the angles of the universal joint", () => {
     const arm = new Kinematics(0);
     arm.set(MODEL.initial_q_rad);
-    const unwritten = [...arm.malletCentre];
+    const unrecorded = [...arm.malletCentre];
     // The controller's target (MODEL, "Universal joint"): the angle from x to x* about y. All turns of this pose
     // are about y, so that the second hinge stays at 0.
     const [x, y] = [0, 1].map((column) => [0, 3, 6].map((row) => arm.endEffector[row + column]));
@@ -40,7 +40,7 @@ describe("forward kinematics", () => {
     arm.set(MODEL.initial_q_rad, [Math.atan2(dot(y, cross), dot(x, level)), 0]);
     near([arm.mallet[2], arm.mallet[5], arm.mallet[8]], [0, 0, -1], 1e-9);
     near(arm.malletCentre, [-0.86, 0, 0.014], 1e-4);
-    near(arm.malletCentre, unwritten, 1e-9);
+    near(arm.malletCentre, unrecorded, 1e-9);
   });
 
   it("turns the hinge about y before the hinge about x", () => {
@@ -53,7 +53,7 @@ describe("forward kinematics", () => {
     near([arm.mallet[2], arm.mallet[5], arm.mallet[8]], [0, 3, 6].map((r) => ee[r] * z[0] + ee[r + 1] * z[1] + ee[r + 2] * z[2]), 1e-12); // prettier-ignore
   });
 
-  it("meets the reference simulator's recordings", () => {
+  it("matches recordings of the reference simulator", () => {
     const file = new URL("../../../tests/reference/kinematics.json.gz", import.meta.url);
     const { fk } = JSON.parse(gunzipSync(readFileSync(file)).toString()) as { fk: Recorded[] };
     expect(fk.length).toBeGreaterThanOrEqual(200);
@@ -69,7 +69,7 @@ describe("forward kinematics", () => {
     }
   });
 
-  it("finds no constraint broken in the initial pose", () => {
+  it("finds no violation in the initial pose", () => {
     const arm = new Kinematics(0);
     arm.set(MODEL.initial_q_rad);
     expect(jointPositionMargin(MODEL.initial_q_rad)).toBeCloseTo(0.95 * 2.0944 - 1.84363898, 9);

@@ -45,7 +45,7 @@ describe("interpolation", () => {
     }
   });
 
-  it("bounces at the recorded contact, not before it and not in a curve", () => {
+  it("bounces exactly at the recorded contact", () => {
     // Straight to y = 0.4 at 0.034 s, then straight back at three quarters of the speed.
     const hit = 0.034;
     const y = (t: number): number => (t < hit ? 0.4 + 2 * (t - hit) : 0.4 - 1.5 * (t - hit));
@@ -64,7 +64,7 @@ describe("interpolation", () => {
     }
   });
 
-  it("passes through every contact of an interval", () => {
+  it("passes through all contacts of an interval", () => {
     const contacts = [
       { t: 0.005, what: "rim", x: 0.1, y: 0.4 },
       { t: 0.012, what: "mallet", x: 0.2, y: 0.3 },
@@ -94,7 +94,7 @@ describe("interpolation", () => {
     expect(pose.x).toBeCloseTo(-0.5, 9);
   });
 
-  it("counts positions from the start of the game in a later chunk, and holds outside of it", () => {
+  it("counts positions from the start of the game and holds outside the chunk", () => {
     const motion = moving(3, (t) => [t, 0], () => [1, 0], { first: 500 }); // prettier-ignore
     const pose = newPose();
     const interpolation = new Interpolation(motion);
@@ -104,7 +104,7 @@ describe("interpolation", () => {
     expect(pose.x).toBeCloseTo(0.04, 6);
   });
 
-  it("leaves what nobody wrote of the universal joint unwritten", () => {
+  it("keeps unrecorded universal joint angles as NaN", () => {
     const pose = newPose();
     new Interpolation(moving(2, () => [0, 0], () => [0, 0])).at(0.5, pose); // prettier-ignore
     expect(pose.arms[0].universal[0]).toBeNaN();

@@ -1,17 +1,17 @@
 import { describe, expect, it } from "vitest";
 import { decodeMotion } from "../src/clip/motion";
 import { decodeObserved } from "../src/clip/observed";
-import { fixed, stepWords } from "../src/controls/words";
-import { wishOf, type KeyWishes } from "../src/controls/keys";
+import { fixed, stepText } from "../src/controls/format";
+import { actionFor, type KeyActions } from "../src/controls/keys";
 import { Clock } from "../src/replay/clock";
 import { columnName, csvOf } from "../src/replay/csv";
-import { endWords, eventsOf } from "../src/replay/events";
+import { endText, eventsOf } from "../src/replay/events";
 import { parseFragment, writeFragment } from "../src/replay/fragment";
 import { Score } from "../src/replay/score";
 import { Source } from "../src/replay/source";
 import { encode, still } from "./encoder";
 
-/** Frames that a test gives by hand. */
+/** A frame source that tests advance manually. */
 class Frames {
   private waiting: ((nowMs: number) => void)[] = [];
   request(tick: (nowMs: number) => void): void {
@@ -28,7 +28,7 @@ class Frames {
 }
 
 describe("the clock", () => {
-  it("plays at its speed, stops at the end and starts over from there", () => {
+  it("plays at its speed, stops at the end and restarts", () => {
     const frames = new Frames();
     const clock = new Clock(0.02, frames);
     clock.cover(10);
@@ -46,7 +46,7 @@ describe("the clock", () => {
     expect(clock.position).toBe(0);
   });
 
-  it("stands still while there is nothing to show", () => {
+  it("stops while data is missing", () => {
     const frames = new Frames();
     const clock = new Clock(0.02, frames);
     let open = false;
@@ -61,7 +61,7 @@ describe("the clock", () => {
     expect(clock.position).toBeCloseTo(1, 9);
   });
 
-  it("does not jump when the page was hidden for long", () => {
+  it("does not jump after the page was hidden", () => {
     const frames = new Frames();
     const clock = new Clock(0.02, frames);
     clock.cover(10_000);
@@ -71,7 +71,7 @@ describe("the clock", () => {
     expect(clock.position).toBeLessThan(15);
   });
 
-  it("steps to whole steps from between them, and not past the ends", () => {
+  it("moves by whole steps within the ends", () => {
     const clock = new Clock(0.02, new Frames());
     clock.cover(10);
     clock.seek(3.4);
@@ -87,15 +87,15 @@ describe("the clock", () => {
   });
 });
 
-describe("a link to a place", () => {
-  it("comes back as it was written", () => {
-    const place = { step: 37, camera: "side", flat: false, speed: 0.5 } as const;
-    expect(writeFragment(place)).toBe("#t=37&cam=side&speed=0.5");
-    expect(parseFragment(writeFragment(place))).toEqual({ step: 37, camera: "side", speed: 0.5 });
+describe("a link to a moment", () => {
+  it("is parsed as written", () => {
+    const target = { step: 37, camera: "side", flat: false, speed: 0.5 } as const;
+    expect(writeFragment(target)).toBe("#t=37&cam=side&speed=0.5");
+    expect(parseFragment(writeFragment(target))).toEqual({ step: 37, camera: "side", speed: 0.5 });
     expect(parseFragment("#t=37&flat=1")).toEqual({ step: 37, flat: true });
   });
 
-  it("passes over what it does not know", () => {
+  it("ignores unknown fields", () => {
     expect(parseFragment("#main")).toEqual({});
     expect(parseFragment("#t=-1&cam=moon&speed=3&x=%")).toEqual({});
   });
@@ -116,28 +116,28 @@ const motion = encode(
 );
 
 describe("events", () => {
-  it("are told in words, in the order of time, neighbouring late answers as one", () => {
+  it("are in order of time, with consecutive late answers merged", () => {
     const events = eventsOf(decodeMotion(motion), decodeObserved(observed));
     expect(events.map((event) => [event.position, event.text])).toEqual([
       [1, "end effector out of bounds, step 1, by 3.1 mm"],
       [1, "camera lost the puck for 3 steps"],
       [1, "2 answers late, up to 26 ms"],
-      [2.5, "puck meets the rim at (0.31, −0.46) m"],
+      [2.5, "puck hits the rim at (0.31, −0.46) m"],
       [3, "Success: at rest behind the line"],
     ]);
-    expect(events.at(-1)?.sign).toBe("✓");
+    expect(events.at(-1)?.symbol).toBe("✓");
   });
 
-  it("say how it ended, also where nobody wrote why", () => {
+  it("describe the end also without a reason", () => {
     const end = { end: "left_table", success: false, why: "", steps: 1 };
-    expect(endWords(decodeMotion(encode({ samples: 2, end }, still(2, () => 0, () => 0))))).toBe(
+    expect(endText(decodeMotion(encode({ samples: 2, end }, still(2, () => 0, () => 0))))).toBe(
       "No success: left table",
     ); // prettier-ignore
   });
 });
 
 describe("the score of a game", () => {
-  it("follows from the last rally before now, if no chunk between is missing", () => {
+  it("follows from the last rally if no chunk is missing", () => {
     const score = new Score();
     const goal = (sample: number, a: number, b: number) =>
       ({ sample, what: "goal", by: 0, score: [a, b] }) as const;
@@ -159,7 +159,7 @@ describe("a source", () => {
   const chunk = (first: number): Uint8Array<ArrayBuffer> =>
     encode({ contest: "game", first, samples: 501 }, still(501, () => 0, () => 0)); // prettier-ignore
 
-  it("fetches a chunk once, keeps a few, and shows the motion without what may not be seen", async () => {
+  it("fetches a chunk once, caches a few, and works without observations", async () => {
     const asked: string[] = [];
     const source = new Source({ motion: "/m/{chunk}", observed: "/o/{chunk}", samples: 5001 }, (address) => {
       const path = address as string;
@@ -170,27 +170,27 @@ describe("a source", () => {
     const [part, same] = await Promise.all([source.at(700), source.at(999.9)]);
     expect(part).toBe(same);
     expect(part.motion.first).toBe(500);
-    expect(part.unobserved).toMatch(/may not see it/);
+    expect(part.observationError).toMatch(/access denied/);
     expect(asked).toEqual(["/m/1", "/o/1"]);
     expect(source.indexOf(5000)).toBe(9);
     for (const position of [1000, 1500, 2000, 2500, 3000, 3500]) await source.at(position);
-    expect(source.here(700)).toBeNull();
-    expect(source.here(3999)?.motion.first).toBe(3500);
+    expect(source.loaded(700)).toBeNull();
+    expect(source.loaded(3999)?.motion.first).toBe(3500);
   });
 
-  it("says what the server said, and can be asked again", async () => {
+  it("reports the status and can retry", async () => {
     let status = 500;
     const source = new Source({ motion: "/m", observed: null, samples: null }, () =>
       Promise.resolve(status === 200 ? new Response(motion) : new Response(null, { status })),
     );
     await expect(source.at(0)).rejects.toThrow("the server answered with status 500");
     status = 404;
-    await expect(source.at(0)).rejects.toThrow("no recording of it");
+    await expect(source.at(0)).rejects.toThrow("no recording");
     status = 200;
     await expect(source.at(0)).resolves.toMatchObject({ index: 0 });
   });
 
-  it("gives its data as comma-separated values with units", async () => {
+  it("exports CSV with units", async () => {
     const source = new Source({ motion: "/m", observed: "/o", samples: null }, (address) =>
       Promise.resolve(new Response(address === "/m" ? motion : observed)),
     );
@@ -204,7 +204,7 @@ describe("a source", () => {
 
 describe("keys", () => {
   const nothing = (): void => undefined;
-  const wishes: KeyWishes = {
+  const actions: KeyActions = {
     toggle: nothing,
     step: nothing,
     event: nothing,
@@ -213,20 +213,20 @@ describe("keys", () => {
     help: nothing,
   };
 
-  it("leave to a control what it needs itself", () => {
-    expect(wishOf(" ", false, "picture", wishes)).toBe(wishes.toggle);
-    expect(wishOf(" ", false, "button", wishes)).toBeNull();
-    expect(wishOf("ArrowLeft", false, "slider", wishes)).toBeNull();
-    expect(wishOf("ArrowLeft", true, "slider", wishes)).not.toBeNull();
-    expect(wishOf("n", false, "other", wishes)).toBeNull();
-    expect(wishOf("Tab", false, "picture", wishes)).toBeNull();
+  it("are left to a control that needs them", () => {
+    expect(actionFor(" ", false, "picture", actions)).toBe(actions.toggle);
+    expect(actionFor(" ", false, "button", actions)).toBeNull();
+    expect(actionFor("ArrowLeft", false, "slider", actions)).toBeNull();
+    expect(actionFor("ArrowLeft", true, "slider", actions)).not.toBeNull();
+    expect(actionFor("n", false, "other", actions)).toBeNull();
+    expect(actionFor("Tab", false, "picture", actions)).toBeNull();
   });
 });
 
-describe("words", () => {
-  it("have a true minus, and none before nothing", () => {
+describe("number formats", () => {
+  it("use a true minus, and no sign for zero", () => {
     expect(fixed(-0.0004, 2)).toBe("0.00");
     expect(fixed(-1.5, 1)).toBe("−1.5");
-    expect(stepWords(37, 120, 0.02)).toBe("step 37 of 120, 0.74 s");
+    expect(stepText(37, 120, 0.02)).toBe("step 37 of 120, 0.74 s");
   });
 });

@@ -32,30 +32,30 @@ function part(share: number, header: Record<string, unknown> = {}): Part {
     index: 0,
     motion,
     observed: null,
-    unobserved: null,
+    observationError: null,
     interpolation,
     paths: pathsOf(motion, interpolation, null),
   };
 }
 
 describe("strips", () => {
-  it("tell margins and shares as the rules count them", () => {
+  it("show margins and shares as in the rules", () => {
     const series = seriesOf(part(0.5), 0);
-    expect(series.map((one) => [one.title, one.words(1)])).toEqual([
+    expect(series.map((one) => [one.title, one.valueText(1)])).toEqual([
       ["End effector height: margin", "20.0 mm"],
       ["Edge of the table: margin", "66 mm"],
       ["Elbow and wrist height: margin", expect.stringMatching(/^\d+ mm$/)],
-      ["Joint positions: least margin", "0.146 rad"],
-      ["Joint velocities: least margin", "0.59 rad/s"],
+      ["Joint positions: smallest margin", "0.146 rad"],
+      ["Joint velocities: smallest margin", "0.59 rad/s"],
       ["Joint speeds, share of limit", "joint 4: 50 %"],
     ]);
   });
 
-  it("say so in words where a limit is passed, and show what was recorded as broken", () => {
+  it("mark values beyond the limit and list recorded violations", () => {
     const violations = [{ side: 0, group: "joint_vel", from: 0, to: 2, worst: 0.1 }];
     const velocity = seriesOf(part(1, { violations }), 0)[4];
-    expect(velocity.words(0)).toBe("−0.07 rad/s ▲ beyond");
-    expect(velocity.broken).toHaveLength(1);
+    expect(velocity.valueText(0)).toBe("−0.07 rad/s ▲ beyond");
+    expect(velocity.violations).toHaveLength(1);
     const [low, high] = rangeOf(velocity);
     expect(low).toBeLessThan(0);
     expect(high).toBe(0);
@@ -70,13 +70,13 @@ describe("paths", () => {
     expect(between(puck, -Infinity, Infinity)).toEqual([0, 8]);
   });
 
-  it("are interrupted where a rally was over", () => {
+  it("are interrupted at the end of a rally", () => {
     const game = part(0, { contest: "game", breaks: [{ sample: 0, what: "goal", by: 0, score: [1, 0] }] });
     expect([...game.paths.puck.gap]).toEqual([1, 1, 1, 1, 0, 0, 0, 0, 0]);
   });
 });
 
-it("the rims leave the goal open and are as wide as the model says", () => {
+it("rims leave the goal open and have the width of the model", () => {
   const outline = rimOutline();
   expect(Math.min(...outline.map(([, y]) => y))).toBeCloseTo(0.125, 9);
   expect(Math.max(...outline.map(([x]) => x))).toBeCloseTo(1.064, 9);

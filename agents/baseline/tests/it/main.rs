@@ -1,4 +1,4 @@
-//! The baseline in the simulator under all perturbations, with fixed seeds: as strong as it is meant to be.
+//! The baseline in the simulator under all perturbations, with fixed seeds: its strength is in the intended range.
 
 #[path = "../../../striker/tests/support/mod.rs"]
 mod support;

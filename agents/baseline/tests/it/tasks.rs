@@ -1,5 +1,4 @@
-//! The three tasks. What it scores over many episodes is in the README; here it shall be neither far
-//! stronger nor far weaker.
+//! The three tasks: few episodes must roughly agree with the success rates in the README.
 
 use baseline::Baseline;
 use faceoff_sim::{Episode, Interpolation, PerturbationSettings, Plant};
@@ -11,12 +10,12 @@ use crate::support::env::env;
 const EPISODES: u32 = 30;
 
 /// Successes in the first episodes of a season.
-fn successes(task: Task, asked: striker::Task) -> u32 {
+fn count_successes(task: Task, agent_task: striker::Task) -> u32 {
     let season = Seed::from_number(101);
     let settings = PerturbationSettings::default();
     let factors = Profile::Evaluation.factors();
     let plant = Plant::under(factors, &settings, season.model_mismatch());
-    let mut agent = Baseline::new(asked, &env(2, 0));
+    let mut agent = Baseline::new(agent_task, &env(2, 0));
     let mut successes = 0;
     for index in 0..EPISODES {
         let seed = season.episode(task, index);
@@ -37,19 +36,19 @@ fn successes(task: Task, asked: striker::Task) -> u32 {
 }
 
 #[test]
-fn scores_at_times() {
-    let successes = successes(Task::Hit, striker::Task::Hit);
+fn hit_succeeds_sometimes() {
+    let successes = count_successes(Task::Hit, striker::Task::Hit);
     assert!((1..=10).contains(&successes), "{successes} of {EPISODES}");
 }
 
 #[test]
-fn stops_a_puck_in_four_or_so() {
-    let successes = successes(Task::Defend, striker::Task::Defend);
+fn defend_stops_about_a_quarter() {
+    let successes = count_successes(Task::Defend, striker::Task::Defend);
     assert!((3..=15).contains(&successes), "{successes} of {EPISODES}");
 }
 
 #[test]
-fn frees_most_pucks() {
-    let successes = successes(Task::Prepare, striker::Task::Prepare);
+fn prepare_frees_most_pucks() {
+    let successes = count_successes(Task::Prepare, striker::Task::Prepare);
     assert!((13..=25).contains(&successes), "{successes} of {EPISODES}");
 }

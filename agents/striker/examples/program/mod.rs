@@ -1,4 +1,4 @@
-//! A bundle's program, spoken with over pipes.
+//! A bundle's program as a policy, over pipes.
 
 use std::io::{BufRead, BufReader, Write};
 use std::path::Path;
@@ -9,7 +9,7 @@ use faceoff_sim::env_info_for;
 use serde_json::{Value, json};
 use striker::{Action, Policy, WrongLength};
 
-/// A running agent, in the middle of a session.
+/// A running agent program after `hello`.
 pub struct Program {
     child: Child,
     input: ChildStdin,
@@ -30,25 +30,25 @@ impl Program {
             .iter()
             .filter_map(toml::Value::as_str)
             .collect();
-        let (program, arguments) = command.split_first().context("command: not empty")?;
-        let mut child = Command::new(program)
+        let (executable, arguments) = command.split_first().context("command: not empty")?;
+        let mut child = Command::new(executable)
             .args(arguments)
             .current_dir(folder)
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
             .spawn()
-            .with_context(|| format!("start {program}"))?;
+            .with_context(|| format!("start {executable}"))?;
         let input = child.stdin.take().context("piped")?;
         let output = BufReader::new(child.stdout.take().context("piped")?);
-        let mut started = Self {
+        let mut program = Self {
             child,
             input,
             output,
             rally: 0,
             step: 0,
         };
-        started.ask(&hello(own));
-        Ok(started)
+        program.ask(&hello(own));
+        Ok(program)
     }
 
     fn ask(&mut self, question: &Value) -> Value {
@@ -82,8 +82,8 @@ impl Policy for Program {
 
 impl Drop for Program {
     fn drop(&mut self) {
-        // It has nothing to lose; that it has ended already is no error here.
-        let _ended = self.child.kill();
+        // The program has no state to save, and may have ended already.
+        let _killed = self.child.kill();
         let _reaped = self.child.wait();
     }
 }

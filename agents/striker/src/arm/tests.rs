@@ -1,5 +1,5 @@
 use super::*;
-use crate::redundancy::weighted;
+use crate::redundancy::weighted_least_squares;
 use crate::testing::env;
 
 /// The joint angles at which every episode starts.
@@ -16,9 +16,9 @@ fn pose(arm: &Arm) -> crate::Pose {
 }
 
 #[test]
-fn references_follow_a_circle_at_constant_height_within_the_speed_limits() {
+fn references_follow_circle_at_constant_height_within_limits() {
     let mut arm = arm();
-    // Starts at rest at (0.65, 0) and reaches a third of a metre to all sides.
+    // The circle starts at rest at (0.65, 0) and extends a third of a metre in all directions.
     let at = |time: f64| {
         let growth = 0.5 - 0.5 * (std::f64::consts::PI * (time / 2.0).min(1.0)).cos();
         let phase = 2.0 * time;
@@ -44,7 +44,7 @@ fn references_follow_a_circle_at_constant_height_within_the_speed_limits() {
         );
         assert!(
             (tip.xy() - position).norm() < 1e-3,
-            "off the way at step {k}"
+            "off the path at step {k}"
         );
         assert!(arm.dq.component_div(&arm.speed_max).amax() <= 1.0 + 1e-9);
         assert!(pose(&arm).elbow_z > 0.25 && pose(&arm).wrist_z > 0.25);
@@ -52,7 +52,7 @@ fn references_follow_a_circle_at_constant_height_within_the_speed_limits() {
 }
 
 #[test]
-fn motions_beyond_the_speed_limits_are_slowed_down_not_bent() {
+fn motions_above_speed_limits_are_slowed_not_bent() {
     let mut arm = arm();
     let start = pose(&arm).tip;
     for _ in 0..5 {
@@ -73,7 +73,7 @@ fn motions_beyond_the_speed_limits_are_slowed_down_not_bent() {
 }
 
 #[test]
-fn strike_postures_hold_the_mallet_where_they_should() {
+fn strike_postures_place_mallet_at_target() {
     let arm = arm();
     for side in [Side::Left, Side::Right] {
         for x in [0.62, 0.8, 1.0, 1.2, 1.3] {
@@ -95,12 +95,12 @@ fn strike_postures_hold_the_mallet_where_they_should() {
 }
 
 #[test]
-fn the_least_peak_beats_least_squares_and_moves_the_tip_as_asked() {
+fn least_peak_beats_least_squares_at_same_tip_velocity() {
     let arm = arm();
     let pose = forward(&arm.strike_posture(Vec2::new(0.9, 0.1), Side::Right));
     let velocity = Vector3::new(1.0, -0.1, 0.0);
     let peak = |speeds: &Joints| speeds.component_div(&arm.speed_max).amax();
-    let square = weighted(
+    let square = weighted_least_squares(
         &pose.jacobian,
         &velocity,
         &arm.speed_max.component_mul(&arm.speed_max),
@@ -113,9 +113,9 @@ fn the_least_peak_beats_least_squares_and_moves_the_tip_as_asked() {
 }
 
 #[test]
-fn a_hanging_arm_is_corrected() {
+fn sagging_arm_is_corrected() {
     let mut arm = arm();
-    // A plant that hangs by a constant angle in two joints.
+    // A plant that sags by a constant angle in two joints.
     let sag = Joints::from([0.0, 0.006, 0.0, -0.004, 0.0, 0.0, 0.0]);
     for _ in 0..150 {
         let commanded = Joints::from(arm.action()[0]);

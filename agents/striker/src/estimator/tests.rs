@@ -6,7 +6,7 @@ const FAR: MalletState = MalletState {
     vel: Vec2::new(0.0, 0.0),
 };
 
-/// Repeatable noise: standard deviation about one.
+/// Reproducible noise with a standard deviation of about one.
 struct Noise(u64);
 
 impl Noise {
@@ -23,7 +23,7 @@ impl Noise {
     }
 }
 
-fn seen(puck: &Puck, noise: &mut Noise) -> PuckObservation {
+fn observation(puck: &Puck, noise: &mut Noise) -> PuckObservation {
     PuckObservation {
         pose: [
             puck.pos.x + 1e-3 * noise.next(),
@@ -39,7 +39,7 @@ fn seen(puck: &Puck, noise: &mut Noise) -> PuckObservation {
 }
 
 #[test]
-fn velocity_becomes_much_better_than_what_is_seen() {
+fn velocity_estimate_is_better_than_observations() {
     let field = Field::new(&env());
     let mut noise = Noise(7);
     let mut filter = Estimator::new(&field, 0.02);
@@ -50,7 +50,7 @@ fn velocity_becomes_much_better_than_what_is_seen() {
     };
     let mut worst: f64 = 0.0;
     for k in 0..40 {
-        let estimate = filter.observe(&seen(&puck, &mut noise), FAR);
+        let estimate = filter.observe(&observation(&puck, &mut noise), FAR);
         if k > 12 {
             worst = worst.max((estimate.vel - puck.vel).norm());
             assert!((estimate.pos - puck.pos).norm() < 4e-3);
@@ -61,7 +61,7 @@ fn velocity_becomes_much_better_than_what_is_seen() {
 }
 
 #[test]
-fn a_lost_puck_moves_on_and_bounces() {
+fn lost_puck_moves_on_and_bounces() {
     let field = Field::new(&env());
     let mut noise = Noise(3);
     let mut filter = Estimator::new(&field, 0.02);
@@ -71,12 +71,12 @@ fn a_lost_puck_moves_on_and_bounces() {
         spin: 0.0,
     };
     for _ in 0..9 {
-        filter.observe(&seen(&puck, &mut noise), FAR);
+        filter.observe(&observation(&puck, &mut noise), FAR);
         puck.advance(&field, 0.02);
     }
     let frozen = PuckObservation {
         velocity: [0.0; 3],
-        ..seen(&puck, &mut noise)
+        ..observation(&puck, &mut noise)
     };
     filter.observe(
         &PuckObservation {
@@ -93,12 +93,12 @@ fn a_lost_puck_moves_on_and_bounces() {
     assert!(puck.vel.y < 0.0, "the case includes a bounce");
     assert!(
         (estimate.pos - puck.pos).norm() < 0.05,
-        "{estimate:?}, in truth {puck:?}"
+        "estimate {estimate:?}, true {puck:?}"
     );
 }
 
 #[test]
-fn a_struck_puck_is_believed_within_a_few_steps() {
+fn struck_puck_is_tracked_within_five_steps() {
     let field = Field::new(&env());
     let mut noise = Noise(11);
     let mut filter = Estimator::new(&field, 0.02);
@@ -108,16 +108,16 @@ fn a_struck_puck_is_believed_within_a_few_steps() {
         spin: 0.0,
     };
     for _ in 0..30 {
-        filter.observe(&seen(&puck, &mut noise), FAR);
+        filter.observe(&observation(&puck, &mut noise), FAR);
     }
     puck.vel = Vec2::new(2.0, 0.5);
     let mut estimate = puck;
     for _ in 0..5 {
         puck.advance(&field, 0.02);
-        estimate = filter.observe(&seen(&puck, &mut noise), FAR);
+        estimate = filter.observe(&observation(&puck, &mut noise), FAR);
     }
     assert!(
         (estimate.vel - puck.vel).norm() < 0.2,
-        "{estimate:?}, in truth {puck:?}"
+        "estimate {estimate:?}, true {puck:?}"
     );
 }

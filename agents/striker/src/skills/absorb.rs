@@ -1,38 +1,38 @@
-//! Meeting a moving puck so that it stops.
+//! Intercepts a moving puck so that it stops.
 //!
-//! A mallet that retreats along the puck's path at a certain share of its speed lets it bounce off
-//! with hardly any speed at all. A fast puck is met where the mallet can be in time with the least
-//! effort; a slow one is overtaken, around it if need be, and met as soon as possible.
+//! After contact with a mallet that retreats along the puck's path at a certain share of its speed,
+//! the puck is nearly at rest. A fast puck is intercepted with the least effort; a slow one is
+//! overtaken, with a detour if necessary, and intercepted as early as possible.
 
 use crate::arm::Posture;
 use crate::field::Vec2;
 use crate::motion::{Pace, Target};
 use crate::puck::{DRAG, MALLET_RESTITUTION, Puck};
-use crate::scene::{Order, Scene, around};
+use crate::scene::{MalletCommand, Scene, waypoint};
 
-/// Pucks are best met with their centre between these.
-const MEET_X: (f64, f64) = (-0.68, -0.4);
-/// Where a puck shall come to rest that had to be met close to the goal.
+/// Preferred x of the puck's centre at interception.
+const INTERCEPT_X: (f64, f64) = (-0.68, -0.4);
+/// Where a puck intercepted close to the goal shall come to rest.
 const REST_X: f64 = -0.5;
-/// Latest contact that is considered for a fast puck, seconds from now.
+/// Latest contact considered for a fast puck, seconds from now.
 const FAST_HORIZON: f64 = 1.6;
-/// The same for a slow one.
+/// Latest contact considered for a slow puck, seconds from now.
 const SLOW_HORIZON: f64 = 3.0;
-/// Above this speed a puck is fast, m/s.
+/// A puck above this speed is fast, m/s.
 const FAST: f64 = 0.6;
-/// Slower pucks have stopped, m/s.
+/// A puck below this speed has stopped, m/s.
 const STILL: f64 = 0.05;
-/// The meeting is no longer corrected this long before it, seconds.
+/// The interception is no longer corrected this long before contact, seconds.
 const LAST_CORRECTION: f64 = 0.05;
-/// A touch that is nearer than this is cushioned, seconds.
+/// A contact expected within this time is cushioned, seconds.
 const CUSHION_TIME: f64 = 0.07;
-/// A planned contact stays if it differs from the cushioned one by less, m/s.
-const AS_PLANNED: f64 = 0.2;
-/// A running plan is given up only for one that is cheaper by this much.
-const LOYALTY: f64 = 2.0;
+/// A planned contact is kept if its velocity differs from the cushioned one by less, m/s.
+const PLAN_TOLERANCE: f64 = 0.2;
+/// A plan is replaced only by one that is cheaper by this much.
+const SWITCH_MARGIN: f64 = 2.0;
 
 #[derive(Debug, Clone, Copy)]
-struct Meeting {
+struct Interception {
     /// Seconds since the episode's start.
     time: f64,
     mallet: Vec2,
@@ -42,110 +42,110 @@ struct Meeting {
 
 #[derive(Debug, Clone)]
 pub struct Absorb {
-    meeting: Option<Meeting>,
-    /// Distance from the middle line that the puck must keep until it is met.
-    keep_off_middle: f64,
+    interception: Option<Interception>,
+    /// Minimum distance of the puck from the middle line at interception.
+    min_middle_distance: f64,
 }
 
 impl Absorb {
-    /// Nothing planned yet. Contacts nearer to the middle line than `keep_off_middle` are too late.
-    pub fn new(keep_off_middle: f64) -> Self {
+    /// No plan yet. Contacts nearer to the middle line than `min_middle_distance` are too late.
+    pub fn new(min_middle_distance: f64) -> Self {
         Self {
-            meeting: None,
-            keep_off_middle,
+            interception: None,
+            min_middle_distance,
         }
     }
 
-    /// Forgets a plan that is not in its last moments.
+    /// Drops the plan unless its contact is imminent; returns whether it was dropped.
     pub fn cancel(&mut self, scene: &Scene<'_>) -> bool {
         if self
-            .meeting
+            .interception
             .is_some_and(|m| (m.time - scene.time).abs() <= 0.05)
         {
             return false;
         }
-        self.meeting = None;
+        self.interception = None;
         true
     }
 
-    /// The order for this control step; none if the puck cannot be met.
-    pub fn decide(&mut self, scene: &Scene<'_>) -> Option<Order> {
-        if let Some(m) = self.meeting {
+    /// The command for this control step; `None` if the puck cannot be intercepted.
+    pub fn decide(&mut self, scene: &Scene<'_>) -> Option<MalletCommand> {
+        if let Some(m) = self.interception {
             let left = m.time - scene.time;
             if left <= 0.5 * scene.dt {
-                // Through the contact and a little longer along with the puck, then stop.
+                // Continue through the contact and a little longer with the puck, then stop.
                 if left > -0.04 {
-                    return Some(Order::coast(scene, m.velocity, Posture::Free));
+                    return Some(MalletCommand::coast(scene, m.velocity, Posture::Free));
                 }
-                self.meeting = None;
-                return Some(Order::brake(scene));
+                self.interception = None;
+                return Some(MalletCommand::brake(scene));
             }
         }
         let last = self
-            .meeting
+            .interception
             .filter(|m| m.time - scene.time < LAST_CORRECTION);
         if let Some(velocity) = cushion(scene)
-            && last.is_none_or(|m| (m.velocity - velocity).norm() > AS_PLANNED)
+            && last.is_none_or(|m| (m.velocity - velocity).norm() > PLAN_TOLERANCE)
         {
-            self.meeting = None;
-            return Some(Order::coast(scene, velocity, Posture::Free));
+            self.interception = None;
+            return Some(MalletCommand::coast(scene, velocity, Posture::Free));
         }
         if let Some(m) = last {
-            return Some(go(scene, &m));
+            return Some(move_to(scene, &m));
         }
         if scene.puck.vel.norm() < FAST {
-            self.catch_slow(scene)
+            self.intercept_slow(scene)
         } else {
-            self.meet_fast(scene)
+            self.intercept_fast(scene)
         }
     }
 
-    fn meet_fast(&mut self, scene: &Scene<'_>) -> Option<Order> {
+    fn intercept_fast(&mut self, scene: &Scene<'_>) -> Option<MalletCommand> {
         let kept = self
-            .meeting
-            .and_then(|m| priced(scene, m.time - scene.time));
-        let best = best_meeting(scene);
-        self.meeting = match (kept, best) {
-            (Some((_, cost)), Some((b, least))) if least < cost - LOYALTY => Some(b),
+            .interception
+            .and_then(|m| interception_with_cost(scene, m.time - scene.time));
+        let best = best_interception(scene);
+        self.interception = match (kept, best) {
+            (Some((_, cost)), Some((b, least))) if least < cost - SWITCH_MARGIN => Some(b),
             (Some((k, _)), _) => Some(k),
             (None, b) => b.map(|(b, _)| b),
         };
-        self.meeting.map(|m| go(scene, &m))
+        self.interception.map(|m| move_to(scene, &m))
     }
 
-    fn catch_slow(&mut self, scene: &Scene<'_>) -> Option<Order> {
+    fn intercept_slow(&mut self, scene: &Scene<'_>) -> Option<MalletCommand> {
         let clearance = scene.field.contact() + 0.012;
         let possible = |left: f64| {
-            let (meeting, puck) = meeting(scene, left)?;
-            let early_enough = puck.pos.y.abs() > self.keep_off_middle;
-            let way = around(scene, meeting.mallet, clearance);
-            let detour = if way == meeting.mallet { 0.0 } else { 0.4 };
+            let (plan, puck) = interception(scene, left)?;
+            let early_enough = puck.pos.y.abs() > self.min_middle_distance;
+            let way = waypoint(scene, plan.mallet, clearance);
+            let detour = if way == plan.mallet { 0.0 } else { 0.4 };
             let needed = Target::stop(&scene.mallet, way, Pace::QUICK).time + detour;
-            (early_enough && needed <= left).then_some(meeting)
+            (early_enough && needed <= left).then_some(plan)
         };
         let kept = self
-            .meeting
+            .interception
             .map(|m| m.time - scene.time)
             .filter(|left| *left > scene.dt);
-        // Close to the contact the plan stays; before, the earliest possible contact is best.
-        self.meeting = match kept {
-            Some(left) if left < 0.3 => meeting(scene, left).map(|(m, _)| m),
+        // Close to the contact the plan is kept; before that, the earliest possible contact is best.
+        self.interception = match kept {
+            Some(left) if left < 0.3 => interception(scene, left).map(|(m, _)| m),
             _ => (0..)
                 .map(|k| 0.1 + 0.04 * f64::from(k))
                 .take_while(|left| *left < SLOW_HORIZON)
                 .find_map(possible),
         };
-        let m = self.meeting?;
-        let way = around(scene, m.mallet, clearance);
+        let m = self.interception?;
+        let way = waypoint(scene, m.mallet, clearance);
         Some(if way == m.mallet {
-            go(scene, &m)
+            move_to(scene, &m)
         } else {
-            Order::stop(scene, way, Pace::QUICK)
+            MalletCommand::stop(scene, way, Pace::QUICK)
         })
     }
 }
 
-/// The velocity that softens a touch which is about to happen, planned or not.
+/// The mallet velocity that softens an imminent contact, planned or not.
 fn cushion(scene: &Scene<'_>) -> Option<Vec2> {
     let offset = scene.mallet.pos - scene.puck.pos;
     let distance = offset.norm();
@@ -158,7 +158,7 @@ fn cushion(scene: &Scene<'_>) -> Option<Vec2> {
 }
 
 /// The speed of the mallet along the puck's motion at contact: (1 + e) w = e v stops the puck, a
-/// slower mallet sends one that came far back a little forward again.
+/// slower mallet sends a puck far back a little forward again.
 fn retreat(speed: f64, along: Vec2, puck: Vec2) -> f64 {
     let back = if along.x < -0.5 {
         (DRAG * (REST_X - puck.x)).clamp(0.0, 0.25)
@@ -168,10 +168,10 @@ fn retreat(speed: f64, along: Vec2, puck: Vec2) -> f64 {
     (MALLET_RESTITUTION * speed - back) / (1.0 + MALLET_RESTITUTION)
 }
 
-/// On the way to a meeting.
-fn go(scene: &Scene<'_>, m: &Meeting) -> Order {
+/// The command for a motion to an interception.
+fn move_to(scene: &Scene<'_>, m: &Interception) -> MalletCommand {
     let time = (m.time - scene.time).max(scene.dt);
-    Order::new(
+    MalletCommand::new(
         Target {
             pos: m.mallet,
             vel: m.velocity,
@@ -181,11 +181,11 @@ fn go(scene: &Scene<'_>, m: &Meeting) -> Order {
     )
 }
 
-fn best_meeting(scene: &Scene<'_>) -> Option<(Meeting, f64)> {
-    let mut best: Option<(Meeting, f64)> = None;
+fn best_interception(scene: &Scene<'_>) -> Option<(Interception, f64)> {
+    let mut best: Option<(Interception, f64)> = None;
     let mut left = 2.0 * scene.dt;
     while left < FAST_HORIZON {
-        if let Some((m, cost)) = priced(scene, left)
+        if let Some((m, cost)) = interception_with_cost(scene, left)
             && best.is_none_or(|(_, c)| cost < c)
         {
             best = Some((m, cost));
@@ -195,8 +195,8 @@ fn best_meeting(scene: &Scene<'_>) -> Option<(Meeting, f64)> {
     best
 }
 
-/// Meeting the puck in `left` seconds; none if it is not there to be met.
-fn meeting(scene: &Scene<'_>, left: f64) -> Option<(Meeting, Puck)> {
+/// The interception in `left` seconds; `None` if it is impossible.
+fn interception(scene: &Scene<'_>, left: f64) -> Option<(Interception, Puck)> {
     let field = scene.field;
     let mut puck = scene.puck;
     if !puck.advance(field, left) {
@@ -213,7 +213,7 @@ fn meeting(scene: &Scene<'_>, left: f64) -> Option<(Meeting, Puck)> {
     }
     let velocity = retreat(speed, along, puck.pos) * along;
     Some((
-        Meeting {
+        Interception {
             time: scene.time + left,
             mallet,
             velocity,
@@ -222,9 +222,9 @@ fn meeting(scene: &Scene<'_>, left: f64) -> Option<(Meeting, Puck)> {
     ))
 }
 
-/// The meeting with a fast puck, and what it costs.
-fn priced(scene: &Scene<'_>, left: f64) -> Option<(Meeting, f64)> {
-    let (m, puck) = meeting(scene, left)?;
+/// The interception of a fast puck, and its cost.
+fn interception_with_cost(scene: &Scene<'_>, left: f64) -> Option<(Interception, f64)> {
+    let (m, puck) = interception(scene, left)?;
     if puck.vel.x > -0.3 * puck.vel.norm() {
         return None;
     }
@@ -233,8 +233,8 @@ fn priced(scene: &Scene<'_>, left: f64) -> Option<(Meeting, f64)> {
         vel: m.velocity,
         time: left,
     };
-    let effort = scene.mallet.cost(&target, scene.field);
-    let outside = (puck.pos.x - MEET_X.1).max(MEET_X.0 - puck.pos.x).max(0.0);
+    let effort = scene.mallet.effort(&target, scene.field);
+    let outside = (puck.pos.x - INTERCEPT_X.1).max(INTERCEPT_X.0 - puck.pos.x).max(0.0);
     let cost = 20.0 * outside
         + 0.3 * effort.acceleration
         + 20.0 * (effort.speed - 1.2).max(0.0)

@@ -1,19 +1,19 @@
-//! Aiming a strike.
+//! Aiming of strikes.
 
 use crate::field::Vec2;
 use crate::puck::Puck;
 
-/// The normal (mallet to puck) along which a mallet of speed `speed` sends the puck towards
-/// `direction`, and the puck just after.
+/// The contact normal (mallet to puck) along which a mallet of speed `speed` sends the puck towards
+/// `direction`, and the puck just after the strike.
 pub fn strike_towards(puck: &Puck, direction: Vec2, speed: f64, contact: f64) -> (Vec2, Puck) {
-    let wanted = direction.y.atan2(direction.x);
-    let mut angle = wanted;
+    let desired = direction.y.atan2(direction.x);
+    let mut angle = desired;
     let mut struck = *puck;
     for _ in 0..6 {
         let normal = Vec2::new(angle.cos(), angle.sin());
         struck = *puck;
         struck.strike(puck.pos - contact * normal, speed * normal);
-        let miss = wrap(wanted - struck.vel.y.atan2(struck.vel.x));
+        let miss = wrap(desired - struck.vel.y.atan2(struck.vel.x));
         angle += 0.8 * miss.clamp(-0.4, 0.4);
     }
     (Vec2::new(angle.cos(), angle.sin()), struck)

@@ -1,15 +1,15 @@
-//! Taking the energy out of an incoming puck.
+//! Stops an incoming puck.
 //!
-//! The puck is met so that it stops ([`Absorb`]). Where it would come to rest well by itself, the
-//! mallet keeps out of its way.
+//! The puck is intercepted so that it stops ([`Absorb`]). If it will come to rest in the zone without
+//! a contact, the mallet keeps clear of it.
 
 use super::absorb::Absorb;
 use crate::field::{Field, Vec2};
 use crate::motion::Pace;
 use crate::puck::{DRAG, Puck};
-use crate::scene::{Order, Scene};
+use crate::scene::{MalletCommand, Scene};
 
-/// The zone in which a puck may come to rest, with a margin.
+/// The zone along x in which a puck may come to rest, with a margin.
 const SAFE_X: (f64, f64) = (-0.74, -0.27);
 /// Speed at which a puck counts as stopped, m/s.
 const STOPPED: f64 = 0.1;
@@ -26,36 +26,36 @@ impl Defend {
         }
     }
 
-    /// The order for this control step.
-    pub fn decide(&mut self, scene: &Scene<'_>) -> Order {
-        if rests_well(scene.field, scene.puck) && self.absorb.cancel(scene) {
-            return give_way(scene);
+    /// The command for this control step.
+    pub fn decide(&mut self, scene: &Scene<'_>) -> MalletCommand {
+        if will_rest_in_zone(scene.field, scene.puck) && self.absorb.cancel(scene) {
+            return keep_clear(scene);
         }
         self.absorb.decide(scene).unwrap_or_else(|| guard(scene))
     }
 }
 
-/// Stand between puck and goal.
-fn guard(scene: &Scene<'_>) -> Order {
+/// Waits between puck and goal.
+fn guard(scene: &Scene<'_>) -> MalletCommand {
     let goal = Vec2::new(-scene.field.half_length, 0.0);
     let to_puck = scene.puck.pos - goal;
     let pos = goal + to_puck * (0.22 / to_puck.norm().max(0.22));
-    Order::stop(scene, pos, Pace::CALM)
+    MalletCommand::stop(scene, pos, Pace::CALM)
 }
 
-/// Stay clear of a puck that needs no help.
-fn give_way(scene: &Scene<'_>) -> Order {
+/// Keeps clear of a puck that will stop in the zone.
+fn keep_clear(scene: &Scene<'_>) -> MalletCommand {
     let away = scene.mallet.pos - (scene.puck.pos + 0.3 * scene.puck.vel);
     let distance = away.norm();
     if distance > 0.16 {
-        return Order::brake(scene);
+        return MalletCommand::brake(scene);
     }
     let pos = scene.mallet.pos + away * ((0.2 - distance) / distance.max(1e-3));
-    Order::stop(scene, pos, Pace::CALM)
+    MalletCommand::stop(scene, pos, Pace::CALM)
 }
 
-/// Will the puck, left alone, stop in the zone?
-fn rests_well(field: &Field, mut puck: Puck) -> bool {
+/// Whether the puck will stop in the zone without a contact.
+fn will_rest_in_zone(field: &Field, mut puck: Puck) -> bool {
     let speed = puck.vel.norm();
     if puck.pos.x > 0.0 || speed > 0.8 {
         return false;

@@ -1,9 +1,9 @@
-//! Striking the puck at the opponent's goal.
+//! Strikes the puck at the opponent's goal.
 //!
-//! Contact times over the next seconds are compared by the chance of a goal: a faster shot is
-//! disturbed less by the air flow, a nearer one has less far to go, and the opponent must be
-//! elsewhere when it arrives. The mallet waits behind the predicted contact and then accelerates
-//! along the line of the shot so that it arrives at full speed at the chosen time.
+//! Contact times over the next seconds are compared by the chance of a goal: the air flow disturbs a
+//! faster shot less, a shorter way is better, and the opponent must not be in the way. The mallet
+//! waits behind the predicted contact and then accelerates along the line of the shot so that it
+//! arrives at full speed at the chosen time.
 
 mod plan;
 mod shot;
@@ -13,23 +13,23 @@ use crate::arm::Posture;
 use crate::field::Vec2;
 use crate::keeper::Keeper;
 use crate::motion::{Pace, Target};
-use crate::scene::{Order, Scene, around, lean};
-use plan::{Plan, WORTH_A_NUDGE, WORTH_A_NUDGE_IN_GAME, again, best_nudge, best_plan, refresh};
+use crate::scene::{MalletCommand, Scene, waypoint, lean_side};
+use plan::{Plan, NUDGE_THRESHOLD, NUDGE_THRESHOLD_IN_GAME, replan, best_nudge, best_plan, refresh};
 
-/// A running plan is given up only for one that is better by this much.
-const LOYALTY: f64 = 0.06;
-/// Nudges per episode.
+/// A plan is replaced only by one whose chance of a goal is higher by this much.
+const SWITCH_MARGIN: f64 = 0.06;
+/// Maximum number of nudges per episode.
 const NUDGES_MAX: u32 = 1;
 /// Largest acceleration of a strike, m/s².
 const STRIKE_ACCELERATION: f64 = 45.0;
-/// The same for a nudge, m/s².
+/// Largest acceleration of a nudge, m/s².
 const NUDGE_ACCELERATION: f64 = 14.0;
 /// The contact is no longer corrected this long before it, seconds.
 const LAST_CORRECTION: f64 = 0.05;
-/// A puck slower than this that cannot be struck will not come into reach by itself, m/s.
+/// A puck out of reach and slower than this will stay out of reach, m/s.
 const STILL: f64 = 0.08;
 
-/// Where and when the mallet comes to rest after a strike.
+/// Position and time at which the mallet comes to rest after a strike.
 #[derive(Debug, Clone, Copy)]
 struct Stop {
     pos: Vec2,
@@ -40,9 +40,9 @@ impl Stop {
     fn plan(scene: &Scene<'_>) -> Self {
         let motion = scene.mallet;
         let speed = motion.vel.norm().max(1e-3);
-        let wish = motion.pos + 0.5 * (0.08 + 0.14 * speed) * motion.vel;
-        let pos = scene.field.clamp_mallet(wish);
-        // A quintic to rest is even if it covers half of speed × time.
+        let desired = motion.pos + 0.5 * (0.08 + 0.14 * speed) * motion.vel;
+        let pos = scene.field.clamp_mallet(desired);
+        // A quintic to rest decelerates evenly if it covers half of speed × time.
         let time = (2.0 * (pos - motion.pos).norm() / speed).max(0.1);
         Self {
             pos,
@@ -55,7 +55,7 @@ impl Stop {
 enum Phase {
     Seek(Option<Plan>),
     Swing(Plan),
-    /// `through`: until when at full speed; `rest`: how long to wait after stopping.
+    /// `through`: end of the phase at full speed; `rest`: waiting time after stopping, seconds.
     Follow {
         through: f64,
         stop: Option<Stop>,
@@ -66,7 +66,7 @@ enum Phase {
 #[derive(Debug, Clone)]
 pub struct Hit {
     phase: Phase,
-    /// Frees a puck that cannot be struck where it lies.
+    /// Frees a puck that cannot be struck at its position.
     rescue: Option<Prepare>,
     nudges: u32,
 }
@@ -80,13 +80,13 @@ impl Hit {
         }
     }
 
-    /// True while a strike must not be interrupted.
-    pub fn committed(&self) -> bool {
+    /// Whether a strike is running that must not be interrupted.
+    pub fn is_committed(&self) -> bool {
         matches!(self.phase, Phase::Swing(_) | Phase::Follow { .. })
     }
 
-    /// The order for this control step.
-    pub fn decide(&mut self, scene: &Scene<'_>) -> Order {
+    /// The command for this control step.
+    pub fn decide(&mut self, scene: &Scene<'_>) -> MalletCommand {
         match self.phase {
             Phase::Seek(old) => self.seek(scene, old),
             Phase::Swing(plan) => self.swing(scene, plan),
@@ -98,21 +98,21 @@ impl Hit {
         }
     }
 
-    fn seek(&mut self, scene: &Scene<'_>, old: Option<Plan>) -> Order {
-        if let Some(rescue) = self.rescue.as_mut().filter(|r| r.committed()) {
+    fn seek(&mut self, scene: &Scene<'_>, old: Option<Plan>) -> MalletCommand {
+        if let Some(rescue) = self.rescue.as_mut().filter(|r| r.is_committed()) {
             return rescue.decide(scene);
         }
         let kept = old.and_then(|p| refresh(scene, &p));
         let mut best = best_plan(scene);
-        let worth = match scene.keeper {
-            Keeper::Rival(_) => WORTH_A_NUDGE_IN_GAME,
-            Keeper::Nobody | Keeper::Pendulum(_) => WORTH_A_NUDGE,
+        let threshold = match scene.keeper {
+            Keeper::Rival(_) => NUDGE_THRESHOLD_IN_GAME,
+            Keeper::Unseen | Keeper::Pendulum(_) => NUDGE_THRESHOLD,
         };
-        if self.nudges < NUDGES_MAX && best.is_some_and(|b| b.chance < worth) {
+        if self.nudges < NUDGES_MAX && best.is_some_and(|b| b.chance < threshold) {
             best = best_nudge(scene).or(best);
         }
         let plan = match (kept, best) {
-            (Some(k), Some(b)) if b.chance > k.chance + LOYALTY => Some(b),
+            (Some(k), Some(b)) if b.chance > k.chance + SWITCH_MARGIN => Some(b),
             (Some(k), _) => Some(k),
             (None, b) => b,
         };
@@ -126,9 +126,9 @@ impl Hit {
                 scene.field.mallet_x_min() + 0.03,
                 scene.puck.pos.y.clamp(-0.12, 0.12),
             );
-            return Order::stop(
+            return MalletCommand::stop(
                 scene,
-                around(scene, behind, scene.field.contact() + 0.015),
+                waypoint(scene, behind, scene.field.contact() + 0.015),
                 Pace::CALM,
             );
         };
@@ -139,20 +139,20 @@ impl Hit {
             self.phase = Phase::Swing(plan);
             return self.swing(scene, plan);
         }
-        let goal = around(scene, start, scene.field.contact() + 0.015);
-        let mut order = Order::stop(scene, goal, Pace::CALM);
-        order.posture = Posture::Ready(plan.side);
-        // Be there in time, not earlier than is comfortable.
+        let goal = waypoint(scene, start, scene.field.contact() + 0.015);
+        let mut command = MalletCommand::stop(scene, goal, Pace::CALM);
+        command.posture = Posture::Ready(plan.side);
+        // Arrive in time, without haste.
         if goal == start {
-            order.target.time = order.target.time.min((left - run_up).max(0.1));
+            command.target.time = command.target.time.min((left - run_up).max(0.1));
         }
-        order
+        command
     }
 
-    fn swing(&mut self, scene: &Scene<'_>, plan: Plan) -> Order {
+    fn swing(&mut self, scene: &Scene<'_>, plan: Plan) -> MalletCommand {
         let left = plan.contact_time - scene.time;
         if left <= 0.6 * scene.dt {
-            // A nudged puck is followed at once, a shot puck is gone.
+            // A nudged puck is followed at once; after a shot there is no hurry.
             let rest = if plan.nudge { 0.0 } else { 0.2 };
             self.nudges += u32::from(plan.nudge);
             self.phase = Phase::Follow {
@@ -162,14 +162,14 @@ impl Hit {
             };
             return self.follow(scene, scene.time + 0.03, None, rest);
         }
-        // In the last moments corrections would be jerks, and a touch already shows in the estimate.
+        // Just before the contact a correction would be a jerk, and a contact already changes the estimate.
         let plan = if left > LAST_CORRECTION {
-            again(scene, &plan, left, Some(plan.speed)).unwrap_or(plan)
+            replan(scene, &plan, left, Some(plan.speed)).unwrap_or(plan)
         } else {
             plan
         };
         self.phase = Phase::Swing(plan);
-        Order {
+        MalletCommand {
             target: Target {
                 pos: plan.mallet,
                 vel: plan.speed * plan.normal,
@@ -184,12 +184,12 @@ impl Hit {
         }
     }
 
-    /// Through the contact at full speed, then to a stop on a path that is fixed once, so that the
+    /// Continues through the contact at full speed, then stops on a fixed path, so that the
     /// deceleration is even.
-    fn follow(&mut self, scene: &Scene<'_>, through: f64, stop: Option<Stop>, rest: f64) -> Order {
-        let posture = Posture::Strike(lean(scene.mallet.pos));
+    fn follow(&mut self, scene: &Scene<'_>, through: f64, stop: Option<Stop>, rest: f64) -> MalletCommand {
+        let posture = Posture::Strike(lean_side(scene.mallet.pos));
         if scene.time < through {
-            return Order::coast(scene, scene.mallet.vel, posture);
+            return MalletCommand::coast(scene, scene.mallet.vel, posture);
         }
         let stop = stop.unwrap_or_else(|| Stop::plan(scene));
         let left = stop.time - scene.time;
@@ -203,15 +203,15 @@ impl Hit {
             }
         };
         if left < scene.dt {
-            return Order::stop(scene, scene.mallet.pos, Pace::CALM);
+            return MalletCommand::stop(scene, scene.mallet.pos, Pace::CALM);
         }
-        Order::new(
+        MalletCommand::new(
             Target {
                 pos: stop.pos,
                 vel: Vec2::zeros(),
                 time: left,
             },
-            Posture::Ready(lean(stop.pos)),
+            Posture::Ready(lean_side(stop.pos)),
         )
     }
 }

@@ -1,9 +1,9 @@
-//! Herding a puck from the rim to where it can be shot.
+//! Moves a puck from the rim to an area from which it can be shot.
 //!
-//! The mallet cannot get between puck and rim, so the puck must come off the rim by a bounce. Many
-//! strikes are tried against the puck model, the promising ones again with variations of what is
-//! uncertain, and the one that most often ends in the goal area is carried out. The search is spread
-//! over control steps to keep each of them short.
+//! The mallet does not fit between puck and rim, so the puck must leave the rim by a bounce. Many
+//! strikes are simulated with the puck model, the promising ones with variations of uncertain
+//! parameters, and the most robust one is carried out. The search is spread over control steps to
+//! keep each of them short.
 
 mod strike;
 
@@ -11,18 +11,18 @@ use super::absorb::Absorb;
 use crate::arm::Posture;
 use crate::field::Vec2;
 use crate::motion::{Pace, Target};
-use crate::scene::{Order, Scene, around};
-use strike::{BRAKE, NORMALS, Strike, prepared, run_up, slide_out, try_normal};
+use crate::scene::{MalletCommand, Scene, waypoint};
+use strike::{BRAKE, NORMALS, Strike, is_prepared, run_up, slide_value, try_normal};
 
 /// Puck speed below which a strike may be planned, m/s.
 const CALM_PUCK: f64 = 0.1;
-/// A rolling puck whose prospects are worse than this is stopped.
-const SPOILT: f64 = 0.2;
-/// How far ahead strikes are planned: about the time to get there, seconds.
+/// A rolling puck with a lower expected value than this is stopped.
+const MIN_PROSPECT: f64 = 0.2;
+/// Planning lead of strikes, about the time of the approach, seconds.
 const LEAD: f64 = 0.9;
-/// A puck that is this far from where it was expected asks for a new plan, metres.
+/// A puck this far from its expected position requires a new plan, metres.
 const MISPLACED: f64 = 0.03;
-/// Contact normals that are tried per control step.
+/// Contact normals evaluated per control step.
 const PER_STEP: usize = 2;
 
 #[derive(Debug, Clone, Copy)]
@@ -36,7 +36,7 @@ enum Phase {
 #[derive(Debug, Clone)]
 pub struct Prepare {
     phase: Phase,
-    /// Stops a puck that rolls where it should not.
+    /// Stops a puck that rolls in a bad direction.
     absorb: Absorb,
 }
 
@@ -51,13 +51,13 @@ impl Prepare {
         }
     }
 
-    /// True while a strike must not be interrupted.
-    pub fn committed(&self) -> bool {
+    /// Whether a strike is running that must not be interrupted.
+    pub fn is_committed(&self) -> bool {
         matches!(self.phase, Phase::Run { .. } | Phase::Retreat { .. })
     }
 
-    /// The order for this control step.
-    pub fn decide(&mut self, scene: &Scene<'_>) -> Order {
+    /// The command for this control step.
+    pub fn decide(&mut self, scene: &Scene<'_>) -> MalletCommand {
         match self.phase {
             Phase::Search { next, best } => self.search(scene, next, best),
             Phase::Approach { strike, puck } => self.approach(scene, strike, puck),
@@ -74,19 +74,19 @@ impl Prepare {
         }
     }
 
-    fn search(&mut self, scene: &Scene<'_>, next: usize, mut best: Option<Strike>) -> Order {
+    fn search(&mut self, scene: &Scene<'_>, next: usize, mut best: Option<Strike>) -> MalletCommand {
         let puck = &scene.puck;
         let moving = puck.vel.norm() > CALM_PUCK || scene.puck_speed_deviation.norm() > 0.05;
-        if moving || prepared(puck) {
+        if moving || is_prepared(puck) {
             self.phase = Phase::Search {
                 next: 0,
                 best: None,
             };
             if moving
-                && slide_out(scene.field, *puck) < SPOILT
-                && let Some(order) = self.absorb.decide(scene)
+                && slide_value(scene.field, *puck) < MIN_PROSPECT
+                && let Some(command) = self.absorb.decide(scene)
             {
-                return order;
+                return command;
             }
             return if self.absorb.cancel(scene) {
                 retreat(scene)
@@ -116,7 +116,7 @@ impl Prepare {
         retreat(scene)
     }
 
-    fn approach(&mut self, scene: &Scene<'_>, strike: Strike, planned: Vec2) -> Order {
+    fn approach(&mut self, scene: &Scene<'_>, strike: Strike, planned: Vec2) -> MalletCommand {
         let field = scene.field;
         let mut expected = scene.puck;
         expected.advance(field, 0.5 * LEAD);
@@ -134,7 +134,7 @@ impl Prepare {
         );
         let contact = there.pos - field.contact() * strike.normal;
         let start = field.clamp_mallet(contact - run_up(&strike.velocity));
-        let way = around(scene, start, field.contact() + 0.012);
+        let way = waypoint(scene, start, field.contact() + 0.012);
         let distance = (scene.mallet.pos - start).norm();
         if way == start && distance < 0.004 && scene.mallet.vel.norm() < 0.05 {
             let time = 2.0 * (contact - start).norm() / strike.velocity.norm();
@@ -143,8 +143,8 @@ impl Prepare {
                 contact: scene.time + time.max(2.0 * scene.dt),
             };
         }
-        // Fast at a distance, with care beside the puck.
-        Order::stop(
+        // Fast at a distance, slow beside the puck.
+        MalletCommand::stop(
             scene,
             way,
             if distance > 0.15 {
@@ -155,7 +155,7 @@ impl Prepare {
         )
     }
 
-    fn run(&mut self, scene: &Scene<'_>, strike: Strike, contact: f64) -> Order {
+    fn run(&mut self, scene: &Scene<'_>, strike: Strike, contact: f64) -> MalletCommand {
         let left = contact - scene.time;
         if left <= 0.5 * scene.dt {
             // Brake at once; the puck leaves faster than the mallet.
@@ -168,7 +168,7 @@ impl Prepare {
             }
             let rest = (time + left).max(scene.dt);
             let pos = scene.mallet.pos + 0.5 * rest * scene.mallet.vel;
-            return Order::new(
+            return MalletCommand::new(
                 Target {
                     pos,
                     vel: Vec2::zeros(),
@@ -180,7 +180,7 @@ impl Prepare {
         let mut there = scene.puck;
         there.advance(scene.field, left);
         let pos = there.pos - scene.field.contact() * strike.normal;
-        Order::new(
+        MalletCommand::new(
             Target {
                 pos,
                 vel: strike.velocity,
@@ -191,13 +191,13 @@ impl Prepare {
     }
 }
 
-/// Out of the puck's way: towards the other side of the middle, in front of the goal.
-fn retreat(scene: &Scene<'_>) -> Order {
+/// Keeps clear of the puck: to the other half along y, in front of the goal.
+fn retreat(scene: &Scene<'_>) -> MalletCommand {
     let y = if scene.puck.pos.y > 0.0 { -0.12 } else { 0.12 };
     let pos = Vec2::new(-0.8, y);
-    Order::stop(
+    MalletCommand::stop(
         scene,
-        around(scene, pos, scene.field.contact() + 0.03),
+        waypoint(scene, pos, scene.field.contact() + 0.03),
         Pace::QUICK,
     )
 }

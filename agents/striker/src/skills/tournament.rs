@@ -1,12 +1,12 @@
-//! The whole game: defend against what comes, free the puck from the rim, shoot.
+//! The skill for whole games: defends, frees the puck from the rim, and shoots.
 
 use super::{Defend, Hit, Prepare};
 use crate::field::Vec2;
 use crate::motion::Pace;
-use crate::scene::{Order, Scene};
+use crate::scene::{MalletCommand, Scene};
 
-/// A puck that stayed this long is shot away from where it is not shot otherwise, seconds.
-const URGENT: f64 = 6.0;
+/// After this time on the own half, the puck is shot from positions that are avoided otherwise, seconds.
+const URGENT_AFTER: f64 = 6.0;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Mode {
@@ -16,13 +16,13 @@ enum Mode {
     Hit,
 }
 
-/// The skill's memory: the three tasks' skills and which one plays.
+/// The skills of the three tasks, and the active mode.
 #[derive(Debug, Clone)]
 pub struct Tournament {
     mode: Mode,
-    since: f64,
-    /// When the puck came to our side; a foul is 15 s later.
-    ours_since: f64,
+    mode_since: f64,
+    /// Time at which the puck came to the own half; a foul follows after 15 s.
+    own_half_since: f64,
     hit: Hit,
     defend: Defend,
     prepare: Prepare,
@@ -32,28 +32,28 @@ impl Tournament {
     pub fn new() -> Self {
         Self {
             mode: Mode::Wait,
-            since: 0.0,
-            ours_since: 0.0,
+            mode_since: 0.0,
+            own_half_since: 0.0,
             hit: Hit::new(),
             defend: Defend::new(),
             prepare: Prepare::new(),
         }
     }
 
-    /// The order for this control step.
-    pub fn decide(&mut self, scene: &Scene<'_>) -> Order {
+    /// The command for this control step.
+    pub fn decide(&mut self, scene: &Scene<'_>) -> MalletCommand {
         if scene.puck.pos.x > 0.0 {
-            self.ours_since = scene.time;
+            self.own_half_since = scene.time;
         }
-        let busy = match self.mode {
-            Mode::Hit => self.hit.committed(),
-            Mode::Prepare => self.prepare.committed(),
+        let is_busy = match self.mode {
+            Mode::Hit => self.hit.is_committed(),
+            Mode::Prepare => self.prepare.is_committed(),
             Mode::Wait | Mode::Defend => false,
         };
-        let wanted = if busy { self.mode } else { self.choose(scene) };
-        if wanted != self.mode {
-            self.mode = wanted;
-            self.since = scene.time;
+        let next_mode = if is_busy { self.mode } else { self.choose(scene) };
+        if next_mode != self.mode {
+            self.mode = next_mode;
+            self.mode_since = scene.time;
             self.hit = Hit::new();
             self.defend = Defend::new();
             self.prepare = Prepare::new();
@@ -64,7 +64,7 @@ impl Tournament {
             Mode::Prepare => self.prepare.decide(scene),
             Mode::Wait => {
                 let y = (0.3 * scene.puck.pos.y).clamp(-0.1, 0.1);
-                Order::stop(scene, Vec2::new(-0.83, y), Pace::CALM)
+                MalletCommand::stop(scene, Vec2::new(-0.83, y), Pace::CALM)
             }
         }
     }
@@ -78,8 +78,8 @@ impl Tournament {
         if incoming || (self.mode == Mode::Defend && puck.vel.norm() > 0.5) {
             return Mode::Defend;
         }
-        // Near a rim there is no room for a mallet behind the puck.
-        let urgent = scene.time - self.ours_since > URGENT;
+        // Near a rim the mallet does not fit behind the puck.
+        let urgent = scene.time - self.own_half_since > URGENT_AFTER;
         let margin = match (self.mode, urgent) {
             (Mode::Prepare, false) => 0.4,
             (Mode::Prepare, true) => 0.45,
@@ -89,8 +89,8 @@ impl Tournament {
         if puck.pos.y.abs() > margin || puck.pos.x < -0.86 {
             return Mode::Prepare;
         }
-        // A strike that could not be placed for long: move the puck elsewhere instead of fouling.
-        if self.mode == Mode::Hit && scene.time - self.since > 6.0 {
+        // No strike was possible for a long time: move the puck to avoid a foul.
+        if self.mode == Mode::Hit && scene.time - self.mode_since > 6.0 {
             return Mode::Prepare;
         }
         Mode::Hit

@@ -1,4 +1,4 @@
-//! The agent as the evaluator meets it: over the protocol, and in whole simulated episodes.
+//! The agent over the protocol, and in whole simulated episodes.
 
 mod episodes;
 mod games;

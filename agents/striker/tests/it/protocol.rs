@@ -1,4 +1,4 @@
-//! The real program over real pipes.
+//! The agent's program over pipes.
 
 use std::io::{BufRead, BufReader, Write};
 use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
@@ -28,12 +28,12 @@ impl Session {
         }
     }
 
-    fn tell(&mut self, message: &Value) {
+    fn send(&mut self, message: &Value) {
         writeln!(self.input, "{message}").expect("the program reads");
     }
 
     fn ask(&mut self, message: &Value) -> Value {
-        self.tell(message);
+        self.send(message);
         let mut line = String::new();
         self.output
             .read_line(&mut line)
@@ -75,7 +75,7 @@ fn observation(length: usize) -> Vec<f64> {
 }
 
 #[test]
-fn a_session_runs_from_hello_to_bye() {
+fn session_runs_from_hello_to_bye() {
     for (task, length) in [
         ("hit", 23),
         ("defend", 20),
@@ -100,19 +100,19 @@ fn a_session_runs_from_hello_to_bye() {
                 assert_eq!(action.iter().map(Vec::len).collect::<Vec<_>>(), [7, 7]);
                 assert!(action.iter().flatten().all(|x| x.is_finite()));
             }
-            session.tell(&json!({"type": "end", "episode": episode, "steps": 30}));
+            session.send(&json!({"type": "end", "episode": episode, "steps": 30}));
         }
-        session.tell(&json!({"type": "bye"}));
+        session.send(&json!({"type": "bye"}));
         assert!(session.child.wait().expect("the program ends").success());
     }
 }
 
 #[test]
-fn nonsense_ends_the_program_with_a_reason_on_standard_error() {
+fn invalid_message_ends_program_with_reason_on_stderr() {
     let mut session = Session::start();
-    session.tell(&json!({"type": "dance"}));
+    session.send(&json!({"type": "dance"}));
     drop(session.input);
     let output = session.child.wait_with_output().expect("the program ends");
     assert!(!output.status.success());
-    assert!(String::from_utf8_lossy(&output.stderr).contains("understand the message"));
+    assert!(String::from_utf8_lossy(&output.stderr).contains("expected a message of the protocol"));
 }

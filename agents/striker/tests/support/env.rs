@@ -1,9 +1,9 @@
-//! The environment that agents are told, made from the simulator's.
+//! The `env` of `hello`, made from the simulator's constants.
 
 use faceoff_sim::env_info_for;
 use striker::{BaseFrame, Env, RadiusInfo, RobotInfo, TableInfo};
 
-/// As `hello` tells it to the agent of robot `own` (0 or 1) among `robots`.
+/// The `env` for the agent of robot `own` (0 or 1) of `robots`.
 pub fn env(robots: u32, own: usize) -> Env {
     let info = env_info_for(robots, own);
     Env {

@@ -1,4 +1,4 @@
-//! A game in process, without pipes, clocks and sandbox.
+//! Games in this process, without pipes, clocks and sandbox.
 
 use faceoff_sim::{Command, Game, GameSetup, GameStep, Interpolation, RallyEnd};
 use faceoff_sim::{PerturbationSettings, Plant};
@@ -7,16 +7,16 @@ use striker::{Env, Policy, Task};
 
 use super::env::env;
 
-/// Who moves a robot.
+/// Control of a robot.
 pub enum Player {
-    /// Keeps the pose in which a rally finds it, as `agents/hold` does.
+    /// Keeps the first pose of a rally, as `agents/hold` does.
     Hold(Option<[f64; 14]>),
     /// An agent in this process.
     Agent(Box<dyn Policy>),
 }
 
 impl Player {
-    /// An agent as that of robot `own` (0 or 1).
+    /// An agent for robot `own` (0 or 1).
     pub fn agent<P: Policy + 'static>(make: impl Fn(Task, &Env) -> P, own: usize) -> Self {
         Self::Agent(Box::new(make(Task::Tournament, &env(2, own))))
     }
@@ -41,14 +41,15 @@ impl Player {
     }
 }
 
-/// What a game came to. Robot 1's first.
+/// Result of a game. In pairs robot 1 comes first.
 #[derive(Debug, Default, PartialEq, Eq)]
 pub struct Tally {
     pub score: [u32; 2],
     pub goals: [u32; 2],
     pub fouls: [u32; 2],
-    /// Rallies that ended in the middle of the table or beside it.
+    /// Rallies that ended with a stuck puck.
     pub stuck: u32,
+    /// Rallies that ended with the puck off the table.
     pub left: u32,
     /// Penalty points over all windows, without computation time.
     pub points: [u32; 2],
@@ -59,10 +60,10 @@ pub struct Tally {
 impl Tally {
     fn window(&mut self, violations: &[Violations; 2]) {
         for (robot, v) in violations.iter().enumerate() {
-            let broken = [v.ee, v.link, v.joint_pos, v.joint_vel];
-            for (k, (is_broken, points)) in broken.into_iter().zip([3, 3, 2, 1]).enumerate() {
-                self.windows[robot][k] += u32::from(is_broken);
-                self.points[robot] += u32::from(is_broken) * points;
+            let violated = [v.ee, v.link, v.joint_pos, v.joint_vel];
+            for (k, (is_violated, points)) in violated.into_iter().zip([3, 3, 2, 1]).enumerate() {
+                self.windows[robot][k] += u32::from(is_violated);
+                self.points[robot] += u32::from(is_violated) * points;
             }
         }
     }
@@ -81,7 +82,7 @@ pub fn game(profile: Profile, seed: u64) -> Game {
     })
 }
 
-/// Plays `steps` control steps; `watch` sees each of them.
+/// Plays `steps` control steps; `watch` is called after each of them.
 pub fn play(
     game: &mut Game,
     players: &mut [Player; 2],

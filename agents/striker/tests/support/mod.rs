@@ -1,4 +1,4 @@
-//! What tests and development tools share.
+//! Shared code of tests and development tools.
 
 pub mod env;
 pub mod game;

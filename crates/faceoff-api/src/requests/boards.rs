@@ -1,94 +1,94 @@
-//! About boards.
+//! Queries of boards and of their history.
 
-use faceoff_types::{DivisionName, StageId, Standings, Task};
+use faceoff_types::{DivisionName, StageId, CountingResult, Task};
 use jiff::civil::Date;
 use serde::{Deserialize, Serialize};
 use utoipa::{IntoParams, ToSchema};
 
-/// Which board.
+/// Selects a board.
 #[derive(Debug, Clone, Default, Serialize, Deserialize, IntoParams)]
 #[serde(deny_unknown_fields)]
 #[into_params(parameter_in = Query)]
 pub struct BoardQuery {
-    /// Whose; without it that of the stage that is open, or of the nearest.
+    /// The board's stage. Default: the open stage, or the one nearest in time.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub stage: Option<StageId>,
-    /// By which of the stage's rules; without it by the newest with results. No board mixes two.
+    /// Revision of the stage's rules. Default: the newest revision with results. A board never mixes two revisions.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub revision: Option<u32>,
-    /// Of the teams of one of the season's divisions alone, ranked among themselves; without it of all teams.
+    /// Rank only the teams of this division, among themselves. Default: all teams.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub division: Option<DivisionName>,
-    /// As it stood by the results of the days up to this one, a day that has some; without it by all.
+    /// Use only results up to this day, which must have results. Default: all days.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub day: Option<Date>,
-    /// Which result of a team its row is, whatever the stage's standings say.
+    /// Which of a team's evaluations its row shows. Default: the stage's `standings`.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[param(inline)]
     pub by: Option<BoardBy>,
-    /// The organiser: with what was finished since the boards were frozen.
+    /// Include evaluations that finished after the boards were frozen. For organisers only.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     #[param(required = false)]
     pub live: bool,
-    /// As what it is sent; without it as the header `Accept` says, and JSON if that says nothing.
+    /// Format of the response. Default: the one that the header `Accept` prefers, else JSON.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[param(inline)]
     pub format: Option<BoardFormat>,
 }
 
-/// Which result of a team its row on a board is.
+/// Which of a team's evaluations a board row shows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum BoardBy {
-    /// The one that stands highest by the board's order.
+    /// The one that ranks highest on the board.
     Best,
     /// The newest.
     Latest,
 }
 
 impl BoardBy {
-    /// The standings that these rows are made by.
-    pub const fn standings(self) -> Standings {
+    /// The stage setting that selects the same evaluations.
+    pub const fn counting_result(self) -> CountingResult {
         match self {
-            Self::Best => Standings::Best,
-            Self::Latest => Standings::Latest,
+            Self::Best => CountingResult::Best,
+            Self::Latest => CountingResult::Latest,
         }
     }
 }
 
-/// As what a board is sent.
+/// Format of a board response.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum BoardFormat {
-    /// As everything else.
+    /// JSON.
     Json,
-    /// A table for spreadsheets, with a line of names.
+    /// CSV with a header line.
     Csv,
 }
 
-/// Which board a page shows, and in which order.
+/// Query of a board page: the board, and how it is sorted.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct BoardPageQuery {
-    /// As of [`BoardQuery`].
+    /// See [`BoardQuery::stage`].
     pub stage: Option<StageId>,
-    /// As of [`BoardQuery`].
+    /// See [`BoardQuery::revision`].
     pub revision: Option<u32>,
-    /// As of [`BoardQuery`].
+    /// See [`BoardQuery::division`].
     pub division: Option<DivisionName>,
-    /// As of [`BoardQuery`].
+    /// See [`BoardQuery::day`].
     pub day: Option<Date>,
-    /// As of [`BoardQuery`].
+    /// See [`BoardQuery::by`].
     pub by: Option<BoardBy>,
-    /// As of [`BoardQuery`].
+    /// See [`BoardQuery::live`].
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub live: bool,
-    /// By which column; without it in board order, tier by tier.
+    /// The column that sorts the rows. Default: board order, tier by tier.
     pub sort: Option<BoardSort>,
 }
 
 impl BoardPageQuery {
-    /// The board itself.
+    /// The board that the page shows.
     pub fn board(&self) -> BoardQuery {
         BoardQuery {
             stage: self.stage,
@@ -102,24 +102,24 @@ impl BoardPageQuery {
     }
 }
 
-/// A column that a board is sorted by; the better first, or with a `-` before its name the worse.
+/// The column that sorts a board, the best value first. In a query `-` before the column's name reverses the order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(try_from = "String", into = "String")]
 pub struct BoardSort {
-    /// Which.
+    /// The column that sorts the rows.
     pub column: BoardColumn,
-    /// The other way round.
+    /// The worst value comes first.
     pub is_reversed: bool,
 }
 
 /// A column of a board.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum BoardColumn {
-    /// Board order: tiers, and inside of them the score.
+    /// Board order: by tier, then by score.
     Place,
-    /// By name.
+    /// The team's name.
     Team,
-    /// The overall score, or on a task's board the success rate.
+    /// The overall score; on a task's board the success rate.
     Score,
     /// A task's success rate.
     Task(Task),
@@ -128,7 +128,7 @@ pub enum BoardColumn {
 }
 
 impl BoardColumn {
-    /// As a query names it.
+    /// The column's name in a query.
     pub const fn as_str(self) -> &'static str {
         match self {
             Self::Place => "place",
@@ -139,7 +139,7 @@ impl BoardColumn {
         }
     }
 
-    /// All of them.
+    /// All columns, in the order in which a page shows them.
     pub const ALL: [Self; 7] = [
         Self::Place,
         Self::Team,
@@ -171,7 +171,7 @@ impl TryFrom<String> for BoardSort {
             .find(|column| column.as_str() == name);
         let unknown = || {
             let names = BoardColumn::ALL.map(BoardColumn::as_str).join(", ");
-            format!("sort is one of {names}, with a - before it for the other way round")
+            format!("expected sort to be one of {names}, with a - before it to reverse the order")
         };
         column
             .map(|column| Self {
@@ -182,41 +182,41 @@ impl TryFrom<String> for BoardSort {
     }
 }
 
-/// Of which stage a team's page tells.
+/// Query of a team's page.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct TeamPageQuery {
-    /// Without it of the one that is open, or of the nearest.
+    /// The stage whose results the page shows. Default: the open stage, or the one nearest in time.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub stage: Option<StageId>,
 }
 
-/// What all teams have played, day by day.
+/// Selects the history of a board: the results of all teams, day by day.
 #[derive(Debug, Clone, Default, Serialize, Deserialize, IntoParams)]
 #[serde(deny_unknown_fields)]
 #[into_params(parameter_in = Query)]
 pub struct HistoryQuery {
-    /// Of which stage; without it that of the stage that is open, or of the nearest.
+    /// The stage. Default: the open stage, or the one nearest in time.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub stage: Option<StageId>,
-    /// By which of the stage's rules; without it by the newest with results.
+    /// Revision of the stage's rules. Default: the newest revision with results.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub revision: Option<u32>,
-    /// Of the teams of one of the season's divisions alone, ranked among themselves; without it of all teams.
+    /// Rank only the teams of this division, among themselves. Default: all teams.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub division: Option<DivisionName>,
-    /// Ranked by this task alone; without it by all together.
+    /// Rank by this task. Default: by all tasks together.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub task: Option<Task>,
-    /// By which result of a team it was ranked, whatever the stage's standings say.
+    /// Which of a team's evaluations ranks it. Default: the stage's `standings`.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[param(inline)]
     pub by: Option<BoardBy>,
-    /// The organiser: with what was finished since the boards were frozen.
+    /// Include evaluations that finished after the boards were frozen. For organisers only.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     #[param(required = false)]
     pub live: bool,
-    /// As what it is sent, as for a board.
+    /// Format of the response. Default: the one that the header `Accept` prefers, else JSON.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[param(inline)]
     pub format: Option<BoardFormat>,

@@ -1,10 +1,10 @@
-//! About an evaluation's episodes.
+//! Filter of an evaluation's episodes.
 
 use faceoff_replay::{EpisodeLine, Group};
 use faceoff_types::{EpisodeEnd, Task};
 use serde::{Deserialize, Serialize};
 
-/// Which episodes of an evaluation a page shows. What a form leaves empty does not choose.
+/// The episodes of an evaluation that a page shows. An empty form field selects all.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct EpisodesQuery {
@@ -14,10 +14,10 @@ pub struct EpisodesQuery {
     /// `success` or `failure`.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub went: String,
-    /// `any`, `ee`, `link`, `joint_pos`, `joint_vel` or `late`.
+    /// The limit that the episode exceeds: `any`, `ee`, `link`, `joint_pos`, `joint_vel` or `late`.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub broke: String,
-    /// How it ended.
+    /// How the episode ended.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub end: String,
     /// The page, from 1.
@@ -25,37 +25,37 @@ pub struct EpisodesQuery {
     pub page: Option<u32>,
 }
 
-/// What was asked for, understood.
+/// A parsed [`EpisodesQuery`]: an episode must match all conditions that are given.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub struct Chosen {
-    /// Episodes of this task alone.
+pub struct EpisodeFilter {
+    /// The episode's task.
     pub task: Option<Task>,
-    /// Solved ones, or those that were not.
+    /// Whether the episode succeeded.
     pub success: Option<bool>,
-    /// Those with this violation.
-    pub broke: Option<Broke>,
-    /// Those that ended like this.
+    /// The limit that the episode exceeds.
+    pub broke: Option<BrokenLimit>,
+    /// How the episode ended.
     pub end: Option<EpisodeEnd>,
 }
 
-/// What went wrong in an episode.
+/// A limit that an episode exceeds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Broke {
-    /// Any constraint.
+pub enum BrokenLimit {
+    /// At least one constraint.
     Any,
-    /// One of them.
+    /// A constraint of this group.
     One(Group),
-    /// An answer took more than a control step.
+    /// The time for an answer, one control step.
     Late,
 }
 
 impl EpisodesQuery {
-    /// What it chooses.
+    /// The conditions in parsed form.
     ///
     /// # Errors
-    /// The field that nobody understands.
-    pub fn chosen(&self) -> Result<Chosen, &'static str> {
-        fn given<'a, T: Deserialize<'a>>(
+    /// The name of the first invalid field.
+    pub fn filter(&self) -> Result<EpisodeFilter, &'static str> {
+        fn parse_field<'a, T: Deserialize<'a>>(
             text: &'a str,
             field: &'static str,
         ) -> Result<Option<T>, &'static str> {
@@ -66,8 +66,8 @@ impl EpisodesQuery {
                 serde::de::IntoDeserializer::into_deserializer(text);
             T::deserialize(word).map(Some).map_err(|_| field)
         }
-        Ok(Chosen {
-            task: given(&self.task, "task")?,
+        Ok(EpisodeFilter {
+            task: parse_field(&self.task, "task")?,
             success: match self.went.as_str() {
                 "" => None,
                 "success" => Some(true),
@@ -76,22 +76,22 @@ impl EpisodesQuery {
             },
             broke: match self.broke.as_str() {
                 "" => None,
-                "any" => Some(Broke::Any),
-                "late" => Some(Broke::Late),
-                one => given(one, "broke")?.map(Broke::One),
+                "any" => Some(BrokenLimit::Any),
+                "late" => Some(BrokenLimit::Late),
+                one => parse_field(one, "broke")?.map(BrokenLimit::One),
             },
-            end: given(&self.end, "end")?,
+            end: parse_field(&self.end, "end")?,
         })
     }
 }
 
-impl Chosen {
-    /// Is it one of these?
-    pub fn takes(self, line: &EpisodeLine) -> bool {
+impl EpisodeFilter {
+    /// Whether the episode matches all conditions.
+    pub fn matches(self, line: &EpisodeLine) -> bool {
         let broke = |broke| match broke {
-            Broke::Any => !line.broken.is_empty(),
-            Broke::One(group) => line.broken.iter().any(|broken| broken.group == group),
-            Broke::Late => line.late > 0,
+            BrokenLimit::Any => !line.broken.is_empty(),
+            BrokenLimit::One(group) => line.broken.iter().any(|broken| broken.group == group),
+            BrokenLimit::Late => line.late > 0,
         };
         self.task.is_none_or(|task| task == line.task)
             && self.success.is_none_or(|success| success == line.success)

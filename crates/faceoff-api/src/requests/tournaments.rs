@@ -1,127 +1,128 @@
-//! About tournaments and their games.
+//! Requests about tournaments and their games.
 
 use super::{
-    field_by_field::FieldByField,
-    left_out::{given, given_or_null},
+    merge_patch::MergePatch,
+    double_option::{deserialize_some, serialize_option},
 };
 use faceoff_types::{
-    LeftAs, RoundNumber, SubmissionId, TeamName, TournamentRules, TournamentSettings,
+    DepartureKind, RoundNumber, SubmissionId, TeamName, TournamentRules, TournamentSettings,
 };
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 use utoipa::{IntoParams, ToSchema};
 
-// The macro reads no parameters of a type that it is told.
-type RulesByField = FieldByField<TournamentRules>;
-type SettingsByField = FieldByField<TournamentSettings>;
+// Aliases: the macro does not parse type arguments in `value_type`.
+type RulesPatch = MergePatch<TournamentRules>;
+type SettingsPatch = MergePatch<TournamentSettings>;
 
-/// A tournament to open.
+/// A tournament to create.
 #[derive(Debug, Clone, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct NewTournament {
-    /// 1 to 40 letters, digits, spaces and . _ -
+    /// 1 to 40 characters: letters, digits, spaces and . _ -
     pub name: String,
-    /// Id or name of the stage on whose board its teams stand; left out, the stage that is open, or the nearest.
+    /// Id or name of the stage whose board qualifies the teams. Default: the open stage, or the one nearest in time.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub stage: Option<String>,
-    /// What results depend on; what of it is left out is as the challenge had it.
+    /// What results depend on. Fields that are left out have the values of the original challenge.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schema(value_type = Option<RulesByField>)]
+    #[schema(value_type = Option<RulesPatch>)]
     pub rules: Option<Map<String, Value>>,
-    /// What they do not depend on; likewise.
+    /// What results do not depend on. Fields that are left out have their default values.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schema(value_type = Option<SettingsByField>)]
+    #[schema(value_type = Option<SettingsPatch>)]
     pub settings: Option<Map<String, Value>>,
-    /// Its teams; left out, those that the stage's board has as deployable or improvable.
+    /// The entrants. Default: the teams that the stage's board shows as deployable or improvable.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub teams: Option<Vec<TeamName>>,
 }
 
-/// What of a tournament is to be another; what is left out stays as it is.
+/// Changes of a tournament. Fields that are left out stay as they are.
 #[derive(Debug, Clone, Default, Serialize, Deserialize, ToSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct TournamentChange {
-    /// 1 to 40 letters, digits, spaces and . _ -
+    /// 1 to 40 characters: letters, digits, spaces and . _ -
     #[serde(skip_serializing_if = "Option::is_none")]
     pub name: Option<String>,
-    /// Field by field, before the first round; null takes one away that need not be there.
+    /// A JSON merge patch of the rules, before the first round only. null restores the default of an optional field.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(value_type = Option<RulesByField>)]
+    #[schema(value_type = Option<RulesPatch>)]
     pub rules: Option<Map<String, Value>>,
-    /// Field by field.
+    /// A JSON merge patch of the settings.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(value_type = Option<SettingsByField>)]
+    #[schema(value_type = Option<SettingsPatch>)]
     pub settings: Option<Map<String, Value>>,
-    /// A valid submission, of any team, against which teams may test theirs; null: none.
+    /// A valid submission of any team that serves as the opponent of test games; null: none.
     #[serde(
         skip_serializing_if = "Option::is_none",
-        deserialize_with = "given",
-        serialize_with = "given_or_null"
+        deserialize_with = "deserialize_some",
+        serialize_with = "serialize_option"
     )]
     #[schema(value_type = Option<SubmissionId>)]
     pub baseline: Option<Option<SubmissionId>>,
 }
 
-/// Teams to enter.
+/// Teams to enter into a tournament.
 #[derive(Debug, Clone, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct NewEntrants {
-    /// Their names; at least one.
+    /// Names of the teams; at least one.
     pub teams: Vec<TeamName>,
 }
 
-/// A team that leaves for good.
+/// Withdraws or disqualifies a team from a tournament, for good.
 #[derive(Debug, Clone, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct NewDeparture {
-    /// Its name.
+    /// The team's name.
     pub team: TeamName,
-    /// How.
-    pub r#as: LeftAs,
-    /// The first round whose games with it do not count, of a disqualified team; left out, the one that is under way, or
-    /// the next.
+    /// Whether the team withdraws or is disqualified.
+    pub r#as: DepartureKind,
+    /// For a disqualified team: the first round whose games against it do not count. Default: the running round, or the
+    /// next one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schema(value_type = Option<u32>, minimum = 1, maximum = 100)]
     pub from_round: Option<RoundNumber>,
-    /// Everybody may read it; 1 to 500 characters.
+    /// Public. 1 to 500 characters.
     pub reason: String,
-    /// The team's name. Without it nothing is done, and the answer says what would be.
+    /// The team's name. Without it the request changes nothing and the response describes the effects.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub confirm: Option<String>,
 }
 
-/// Games against the baseline.
+/// Test games against the tournament's baseline.
 #[derive(Debug, Clone, Default, Serialize, Deserialize, ToSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct NewTestGames {
-    /// Whose, if an organiser asks; left out, everybody's who is in the tournament. A team asks for its own alone.
+    /// From an organiser: names of the teams that get a test game. Default: all entrants. A team gets one for itself
+    /// only.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub teams: Option<Vec<TeamName>>,
 }
 
-/// A game that does not count.
+/// A friendly game, which does not count.
 #[derive(Debug, Clone, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct NewFriendlyGame {
-    /// The other team's name.
+    /// The opponent's name.
     pub opponent: TeamName,
 }
 
-/// How often a schedule is to be played again.
+/// Replays of a tournament's schedule.
 #[derive(Debug, Clone, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct NewReplays {
-    /// So many times more.
+    /// Number of further replays.
     #[schema(minimum = 1, maximum = 1000)]
     pub times: u32,
 }
 
-/// Which of a tournament's games.
+/// Filter of a tournament's games.
 #[derive(Debug, Clone, Copy, Default, Serialize, Deserialize, IntoParams)]
 #[serde(default, deny_unknown_fields)]
 #[into_params(parameter_in = Query)]
 pub struct GamesQuery {
-    /// Of one round alone.
+    /// Return only games of this round.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[param(value_type = Option<u32>, minimum = 1, maximum = 100)]
     pub round: Option<RoundNumber>,

@@ -1,45 +1,45 @@
-//! About webhooks.
+//! Requests about webhooks.
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-/// A webhook to make.
+/// A webhook to create.
 #[derive(Debug, Clone, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct NewWebhook {
-    /// What it is for: 1 to 80 characters.
+    /// What the webhook is used for. 1 to 80 characters.
     pub name: String,
-    /// Where it is: an address on the Internet that begins with `https://`.
+    /// Public Internet address that receives the deliveries; begins with `https://`.
     #[schema(example = "https://example.org/faceoff")]
     pub url: String,
-    /// What it is told of: topics (`board`, `queue`, …), subjects (`stage:ID`, …) and names of events (`day_released`), 50
-    /// at most; left out or empty, everything that its owner may know of.
+    /// Filters; an event is delivered if it matches one of them: topics (`board`, `queue`, …), subjects (`stage:ID`, …)
+    /// and event kinds (`day_released`). At most 50. Default: all events that the owner may see.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub about: Vec<String>,
 }
 
-/// What is to be otherwise of a webhook; what is left out stays.
+/// Changes of a webhook. Fields that are left out stay as they are.
 #[derive(Debug, Clone, Default, Serialize, Deserialize, ToSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct WebhookChanges {
-    /// What it is for.
+    /// What the webhook is used for. 1 to 80 characters.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub name: Option<String>,
-    /// Where it is.
+    /// Public Internet address that receives the deliveries; begins with `https://`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub url: Option<String>,
-    /// What it is told of.
+    /// Filters of the delivered events; at most 50. An empty list: all events that the owner may see.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub about: Option<Vec<String>>,
-    /// Tells one that is dead again, of what happens from now on.
+    /// Reactivates a dead webhook. It receives events from now on; missed ones are not sent.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub state: Option<Revived>,
+    pub state: Option<WebhookRevival>,
 }
 
-/// How a webhook that is dead is to stand.
+/// The only state that a request can set.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
-pub enum Revived {
-    /// It is told of what happens.
+pub enum WebhookRevival {
+    /// The webhook receives events.
     Alive,
 }

@@ -1,4 +1,4 @@
-//! What each perturbation costs an agent.
+//! Ablations: what each perturbation costs an agent.
 
 use crate::views::evaluation::Progress;
 use faceoff_scoring::ProfileEffect;
@@ -8,41 +8,41 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use utoipa::ToSchema;
 
-/// An ablation of a submission: its agent under each perturbation alone.
+/// An ablation: a submission evaluated under each perturbation alone.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct AblationView {
-    /// The submission that plays.
+    /// The evaluated submission.
     pub submission: SubmissionId,
-    /// Episodes of each task in each profile.
+    /// Episodes per task in each profile.
     pub episodes_per_task: u32,
-    /// When it was ordered.
+    /// When the ablation was requested.
     pub created_at: Timestamp,
-    /// What has become of it.
+    /// Its state, with the results.
     #[serde(flatten)]
     pub status: AblationStatus,
 }
 
-/// What has become of an ablation.
+/// State of an ablation.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(tag = "state", rename_all = "snake_case")]
 pub enum AblationStatus {
-    /// It waits behind what counts, or is being played.
+    /// Waiting behind evaluations that count, or running.
     Open {
         /// Over all profiles and tasks.
         progress: Progress,
     },
-    /// All profiles are played.
+    /// All profiles are evaluated.
     Finished {
         /// When the last episode was stored.
         finished_at: Timestamp,
         /// By task: one entry per profile, `ideal` first.
         tasks: BTreeMap<Task, Vec<ProfileEffect>>,
     },
-    /// It ended without a result.
+    /// Ended without a result.
     Failed {
-        /// When the run that failed was stored.
+        /// When the failed run was stored.
         finished_at: Timestamp,
-        /// Whose fault it was, and which.
+        /// The fault, and whether the agent or the platform caused it.
         reason: String,
     },
 }

@@ -5,46 +5,46 @@ use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-/// What the organisers tell everybody.
+/// An announcement of the organisers.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct AnnouncementView {
-    /// Names it.
+    /// Id of the announcement.
     pub id: AnnouncementId,
-    /// When.
+    /// When it was published.
     pub at: Timestamp,
-    /// One line.
+    /// One line of plain text.
     pub title: String,
-    /// Plain text.
+    /// Plain text of one or more lines.
     pub text: String,
 }
 
-/// What a team asks the organisers, and what they answer.
+/// A team's question to the organisers, with their answer.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct QuestionView {
-    /// Names it.
+    /// Id of the question.
     pub id: QuestionId,
-    /// Who asks; absent for everybody but that team and the organisers.
+    /// The asking team; visible only to the team and to organisers.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub team: Option<TeamId>,
-    /// When.
+    /// When it was asked.
     pub at: Timestamp,
-    /// Plain text.
+    /// Plain text of one or more lines.
     pub text: String,
-    /// Plain text; null: not yet.
+    /// Plain text; null until answered.
     pub answer: Option<String>,
-    /// When.
+    /// When it was answered; null until then.
     pub answered_at: Option<Timestamp>,
-    /// May everybody read it?
+    /// Whether question and answer are public.
     pub public: bool,
 }
 
-/// What taking part means, as people accept it.
+/// A version of the terms of participation.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct TermsView {
-    /// From 1; the newest is what counts.
+    /// From 1. The newest version applies.
     pub version: u32,
-    /// When it was published.
+    /// When this version was published.
     pub since: Timestamp,
-    /// Plain text.
+    /// Plain text of one or more lines.
     pub text: String,
 }

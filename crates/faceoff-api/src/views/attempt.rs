@@ -1,39 +1,39 @@
-//! A time that a slot began a game: kept apart from what the game came to.
+//! Attempts at a game: each start on a slot, apart from the game's result.
 
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-/// A time that a slot began a game, whatever came of it.
+/// An attempt at a game: one start on a slot, whatever its outcome.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
-pub struct AttemptView {
+pub struct GameAttemptView {
     /// From 1.
     pub number: u32,
-    /// The slot.
+    /// The slot that ran it.
     pub worker: String,
-    /// When it began.
+    /// When it started.
     pub begun_at: Timestamp,
-    /// When it ended; null: it is under way.
+    /// When it ended; null while it is running.
     pub ended_at: Option<Timestamp>,
-    /// What came of it; null: it is under way.
-    pub end: Option<AttemptEndView>,
-    /// What went wrong, or why it was voided; absent if there is nothing to tell.
+    /// Its outcome; null while it is running.
+    pub end: Option<AttemptOutcomeView>,
+    /// What went wrong, or why the result was voided; absent otherwise.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub reason: Option<String>,
 }
 
-/// What came of an attempt.
+/// Outcome of an attempt.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
-pub enum AttemptEndView {
-    /// A result, which counts unless it was voided.
+pub enum AttemptOutcomeView {
+    /// A result. It counts unless it is voided.
     Played,
-    /// A fault of ours.
+    /// A platform fault.
     Broken,
-    /// The slot was asked to end, or found no room; it does not count against the game.
+    /// The slot was shut down or lacked disk space. The attempt does not count towards the game's limit of attempts.
     GivenBack,
-    /// The slot died.
+    /// The slot's process ended, or its lease expired.
     Lost,
-    /// The game was called off meanwhile.
+    /// The game was cancelled while it was running.
     CalledOff,
 }

@@ -1,4 +1,4 @@
-//! Reference agents on a board: shown to be measured against, and ranked apart.
+//! Baselines on a board: reference agents of the organisers, shown unranked.
 
 use crate::views::task::TaskView;
 use faceoff_types::{EvaluationId, Profile, Seed, Task, TeamId, TeamName, Tier};
@@ -7,45 +7,46 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use utoipa::ToSchema;
 
-/// A baseline on a board: as any row, without a rank of its own.
+/// A baseline on a board: a row without a rank of its own.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct BaselineRow {
-    /// The rank that it would take, if it were ranked alone among the teams.
+    /// The rank that it would have among the teams, without the other baselines.
     pub would_rank: u32,
-    /// True.
+    /// Always true.
     pub baseline: bool,
-    /// The overall one, or the task's.
+    /// The overall tier; on a task's board the task's tier.
     pub tier: Tier,
-    /// Probability that other episodes of the same kind would give another tier; null where the row is a mean.
+    /// Probability that other episodes of the same kind would give another tier, 0 to 1; null for a mean of several
+    /// days.
     pub tier_change_probability: Option<f64>,
-    /// Its name.
+    /// The baseline's name.
     pub team: TeamName,
-    /// Stays when names change.
+    /// Id of the baseline's team; stays the same when the name changes.
     pub team_id: TeamId,
-    /// The agent's own name.
+    /// Name of the agent, from its bundle.
     pub agent: Option<String>,
-    /// What the row shows; of a mean, the newest of its evaluations.
+    /// The evaluation that the row shows; for a mean, the newest one.
     pub evaluation: EvaluationId,
-    /// All that the row is made of, the earlier day first.
+    /// All evaluations that count for the row, in order of their days.
     pub evaluations: Vec<EvaluationId>,
-    /// The date, in the stage's zone, whose episodes it played.
+    /// The evaluation day, a date in the stage's time zone.
     pub day: Date,
-    /// It is a turn beside the day's own, and why; absent otherwise.
+    /// If it is an extra evaluation: the reason for it; absent otherwise.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub extra_turn: Option<String>,
-    /// When its score was published.
+    /// When the score was stored.
     pub finished_at: Timestamp,
-    /// The rules that it was scored by.
+    /// The ruleset of the score.
     pub ruleset: String,
-    /// The perturbations.
+    /// Perturbation profile of the simulator.
     pub profile: Profile,
     /// Overall score in percent.
     pub score: f64,
-    /// Overall penalty points: the maximum over the tasks. Of a mean: of a day.
+    /// Overall penalty points: the maximum over the tasks. For a mean: per day.
     pub penalty_points: f64,
-    /// When all of its day came out; null until then.
+    /// When the day was released; null before.
     pub released_at: Option<Timestamp>,
-    /// The seed of its day's evaluations; null as in other rows.
+    /// The seed of the day's evaluations; null until the day is released, and for a mean of several days.
     pub seed: Option<Seed>,
     /// Results by task: hit, defend, prepare.
     pub tasks: BTreeMap<Task, TaskView>,

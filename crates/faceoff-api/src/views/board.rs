@@ -1,11 +1,11 @@
-//! Who stands where, and how sure that is.
+//! Boards: ranks of the teams, and their statistical uncertainty.
 
 use crate::views::{
-    baseline::BaselineRow, finalised::FinalisedView, ruling::RulingView, task::TaskView,
+    baseline::BaselineRow, sign_off::SignOffView, ruling::RulingView, task::TaskView,
     team::TeamView,
 };
 use faceoff_types::{
-    DivisionName, EvaluationId, PerturbationSettings, Profile, Seed, StageId, StageName, Standings,
+    DivisionName, EvaluationId, PerturbationSettings, Profile, Seed, StageId, StageName, CountingResult,
     Task, TaskWeights, TeamId, TeamName, Tier, TierBounds,
 };
 use jiff::{Timestamp, civil::Date};
@@ -13,115 +13,113 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use utoipa::ToSchema;
 
-/// A board: of each team what the stage's standings say, of its evaluations that are finished under one revision of
-/// the stage's rules, in board order.
+/// A board: one row per team with finished evaluations under one revision of a stage's rules, in board order. The
+/// stage's `standings` select the evaluations that count.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct BoardView {
-    /// Whose it is.
+    /// The board's stage.
     pub stage: StageId,
-    /// As the organiser named it.
+    /// Name of the stage.
     pub stage_name: StageName,
-    /// By which of the stage's rules the rows were played; no board mixes two.
+    /// Revision of the stage's rules; a board never mixes two.
     pub revision: u32,
-    /// Since when those were the stage's.
+    /// When this revision took effect.
     pub since: Timestamp,
-    /// The simulator and the scoring that the scores refer to.
+    /// The simulator and scoring version of the scores.
     #[schema(example = "airhockey-2023.3")]
     pub ruleset: String,
-    /// What each task's success rate weighs in the overall score.
+    /// Weight of each task's success rate in the overall score.
     pub weights: TaskWeights,
-    /// Penalty points per episode up to which an agent is in a tier.
+    /// Highest penalty points per episode of each tier.
     pub tier_bounds: TierBounds,
-    /// Magnitudes of the perturbations that the profile switches on; absent where they are the ruleset's.
+    /// Magnitudes of the perturbations that the profile switches on; absent if they have the ruleset's values.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub perturbations: Option<Box<PerturbationSettings>>,
-    /// What rows are made of in the end.
-    pub standings: Standings,
-    /// What they are made of at the moment: before a final day, of the newest evaluations, which do not count then; or as
-    /// it was asked for.
-    pub rows_by: Standings,
-    /// The board as it stood by the results of the days up to this one; absent where all count.
+    /// Which of a team's evaluations count in the end.
+    pub standings: CountingResult,
+    /// Which of a team's evaluations the rows show: those that count, those that the query asks for, or, before a final
+    /// day, the newest ones.
+    pub rows_by: CountingResult,
+    /// The rows use only results up to this day; absent if all days count.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub day: Option<Date>,
-    /// The stage is blind: without the organiser's token there are no rows until the organiser opens it.
+    /// The stage is blind: only organisers see rows until the stage is revealed.
     pub blind: bool,
-    /// The result may still change: it is not signed off.
+    /// The result is not signed off and may still change.
     pub provisional: bool,
-    /// It is signed off, if it is.
-    pub finalised: Option<FinalisedView>,
-    /// The task, or null for the overall board.
+    /// When and by whom the result was signed off; null before.
+    pub finalised: Option<SignOffView>,
+    /// The task; null for the overall board.
     pub task: Option<Task>,
-    /// Whose teams are ranked, among themselves alone; absent where all teams are.
+    /// Only teams of this division are ranked, among themselves; absent if all teams are.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub division: Option<DivisionName>,
-    /// The level at which teams are told apart: rows of one rank group stand in the same tier and
-    /// cannot be told from the group's first row.
+    /// Significance level of the rank groups: rows of one group have the same tier and are statistically tied with the
+    /// group's first row.
     #[schema(example = 0.05)]
     pub significance: f64,
-    /// Bootstrap resamples behind each `tier_change_probability`.
+    /// Number of bootstrap resamples behind each `tier_change_probability`.
     #[schema(example = 2000)]
     pub tier_change_resamples: u32,
-    /// The board shows what it showed then: since when, and why; absent otherwise.
+    /// If the boards are frozen: since when, and why; absent otherwise.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub frozen: Option<RulingView>,
-    /// Teams that are on no board, and why.
+    /// Teams that are left out because they are disqualified.
     pub disqualified: Vec<TeamView>,
-    /// Deployable teams first, then improvable, then non-deployable; inside a tier the higher score,
-    /// then the fewer penalty points, then the earlier submission.
+    /// Tiers in the order deployable, improvable, non-deployable; within a tier by higher score, then by fewer penalty
+    /// points, then by earlier submission.
     pub rows: Vec<BoardRow>,
-    /// Reference agents of the organisers', in board order, which take no rank from anybody; on the boards of all
-    /// divisions.
+    /// Reference agents of the organisers in board order, without ranks. Boards of all divisions show them.
     #[serde(default)]
     pub baselines: Vec<BaselineRow>,
 }
 
-/// One team on a board.
+/// A team's row on a board.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct BoardRow {
-    /// Place on this board, from 1.
+    /// Rank on this board, from 1.
     pub rank: u32,
-    /// Teams of one group cannot be told from the group's first; from 1 down the board.
+    /// Number of the group of statistically tied teams, from 1 down the board.
     pub rank_group: u32,
-    /// The overall one, or the task's.
+    /// The overall tier; on a task's board the task's tier.
     pub tier: Tier,
-    /// Probability that other episodes of the same kind would give another tier; null where the row is a mean of
-    /// several days, of which it is not computed.
+    /// Probability that other episodes of the same kind would give another tier, 0 to 1; null for a mean of several
+    /// days.
     pub tier_change_probability: Option<f64>,
-    /// The team's name.
+    /// Name of the team.
     pub team: TeamName,
-    /// Stays when names change.
+    /// Id of the team; stays the same when the name changes.
     pub team_id: TeamId,
-    /// The division that the team is in now; absent if it is in none.
+    /// The team's current division; absent without one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub division: Option<DivisionName>,
-    /// The agent's own name.
+    /// Name of the agent, from its bundle.
     pub agent: Option<String>,
-    /// What the row shows; of a mean, the newest of its evaluations.
+    /// The evaluation that the row shows; for a mean, the newest one.
     pub evaluation: EvaluationId,
-    /// All that the row is made of, the earlier day first: one, unless it is a mean.
+    /// All evaluations that count for the row, in order of their days: several for a mean, else one.
     pub evaluations: Vec<EvaluationId>,
-    /// The date, in the stage's zone, whose episodes it played.
+    /// The evaluation day, a date in the stage's time zone.
     pub day: Date,
-    /// It is a turn beside the day's own, and why; absent otherwise. Given after the day's release it played other
-    /// episodes than the other rows of the day.
+    /// If it is an extra evaluation: the reason for it; absent otherwise. One that was granted after the day's release
+    /// ran on other episodes than the day's other rows.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub extra_turn: Option<String>,
-    /// When its score was published.
+    /// When the score was stored.
     pub finished_at: Timestamp,
-    /// The rules that it was scored by.
+    /// The ruleset of the score.
     pub ruleset: String,
-    /// The perturbations.
+    /// Perturbation profile of the simulator.
     pub profile: Profile,
     /// Overall score in percent.
     pub score: f64,
-    /// Overall penalty points: the maximum over the tasks. Of a mean: of a day.
+    /// Overall penalty points: the maximum over the tasks. For a mean: per day.
     pub penalty_points: f64,
-    /// When the day's last evaluation had ended, and all of the day came out; null until then. Of a mean: null until
-    /// that is so of all its days.
+    /// When the day was released, after its last evaluation; null before. For a mean: null until all days are released.
     pub released_at: Option<Timestamp>,
-    /// The seed of the day's evaluations; null until the day is released, and where the row is a mean of several days.
+    /// The seed of the day's evaluations; null until the day is released, and for a mean of several days.
     pub seed: Option<Seed>,
-    /// Results by task: hit, defend, prepare. Of a mean, episodes, successes, violations and steps are sums over the
-    /// days, rates and points are means of a day, and of the computation times `p99` and `max` are the worst day's.
+    /// Results by task: hit, defend, prepare. For a mean: episodes, successes, violations and steps are sums over the
+    /// days; rates and points are means per day; the computation times `p99` and `max` are those of the worst day.
     pub tasks: BTreeMap<Task, TaskView>,
 }

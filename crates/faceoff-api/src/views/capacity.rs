@@ -1,60 +1,59 @@
-//! Whether a day fits: what its teams play against the slots and the time that there are.
+//! Capacity forecast: whether the evaluations of a day fit into the slots and the time available.
 
 use faceoff_types::{StageId, StageName};
 use jiff::{Timestamp, civil::Date};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-/// How the days of a stage fit into the time that they have: those that are under way, the earliest cut first, and
-/// then the next one, as its teams are now.
+/// Capacity forecast of a stage's days: the running days in order of their cutoffs, then the next day with the
+/// currently active submissions.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct CapacityView {
-    /// Whose days.
+    /// The stage.
     pub stage: StageId,
-    /// As the organiser named it.
+    /// Name of the stage.
     pub stage_name: StageName,
-    /// Units of work that are done at the same time.
+    /// Jobs that run in parallel.
     pub slots: u32,
-    /// Each day for itself: what is before it in the queue is in none of its hours.
+    /// Each day on its own; work of other days in the queue is not included.
     pub days: Vec<DayLoad>,
 }
 
-/// What of a day is to be played, and until when.
+/// Remaining work of an evaluation day, and the time for it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct DayLoad {
-    /// Its date in the stage's zone.
+    /// The evaluation day, a date in the stage's time zone.
     pub day: Date,
-    /// Has it had its cut?
+    /// Whether the day's cutoff has passed.
     pub is_under_way: bool,
-    /// Teams that have something left to play; of a day to come, those that have a submission active now.
+    /// Teams with episodes left; for a future day, teams with an active submission.
     pub teams: u32,
-    /// Episodes of all of them.
+    /// Episodes left, over all teams.
     pub episodes: u32,
-    /// Hours that these take on all slots, by what such episodes took in the last seven days; null where nothing
-    /// was measured.
+    /// Expected hours on all slots, from durations of the last seven days; null without measurements.
     pub expected_hours: Option<f64>,
-    /// The same, if every agent uses up all of its time budgets.
+    /// Hours on all slots if every agent uses up its time limits.
     pub worst_case_hours: f64,
-    /// When what is left is ended; null: however long it takes.
+    /// When evaluations that are not finished are ended; null: no deadline.
     pub deadline_at: Option<Timestamp>,
-    /// From now, or from its cut, until then.
+    /// Hours from now, or from the day's cutoff, to the deadline; null: no deadline.
     pub hours_until_deadline: Option<f64>,
-    /// Does it fit?
+    /// Whether the day fits.
     pub fit: Fit,
-    /// All that in words, with what can be done.
+    /// The forecast in words, with advice.
     pub summary: String,
 }
 
-/// Does a day fit into its time?
+/// Whether a day's evaluations finish before its deadline.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Fit {
-    /// Whatever its agents do.
+    /// Yes, even if every agent uses up its time limits.
     Surely,
-    /// By what such episodes took of late, not by the budgets.
+    /// Yes, by the measured durations; not if every agent uses up its time limits.
     Probably,
-    /// Nothing was measured, and by the budgets it may not.
+    /// Nothing was measured, and not if every agent uses up its time limits.
     Unknown,
-    /// Not even by what such episodes took of late.
+    /// No, not even by the measured durations.
     Not,
 }

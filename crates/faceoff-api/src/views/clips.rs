@@ -1,5 +1,5 @@
-//! What replays of an evaluation's episodes are drawn from. The motion, and how each episode went, are there for everybody once the
-//! day is released; what the agent was told and commanded, its times and its faults for whoever gets the dataset.
+//! Episodes of an evaluation and their computation times. Motion and outcome are public once the day is released.
+//! Observations, actions, computation times and faults need access to the dataset.
 
 use faceoff_replay::EpisodeLine;
 use faceoff_types::Task;
@@ -7,23 +7,23 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use utoipa::ToSchema;
 
-/// How the episodes of an evaluation went, in order of task and number.
+/// The episodes of an evaluation, in order of task and number.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct EpisodesView {
-    /// The episodes.
+    /// One entry per episode.
     pub episodes: Vec<EpisodeLine>,
-    /// By task, for whoever gets the dataset: how many control steps were answered in which time, shortest first.
+    /// Histogram of computation times by task, shortest first; absent without access to the dataset.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub computation_times: BTreeMap<Task, Vec<TimeBinView>>,
 }
 
-/// Control steps by the time that the agent took for its answer.
+/// A bin of the histogram of computation times.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct TimeBinView {
-    /// At least, s.
+    /// Lower bound in seconds, inclusive.
     pub from_s: f64,
-    /// Less than, s.
+    /// Upper bound in seconds, exclusive.
     pub to_s: f64,
-    /// How many.
+    /// Number of control steps.
     pub steps: u64,
 }

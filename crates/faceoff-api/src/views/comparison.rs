@@ -1,6 +1,6 @@
-//! Whether one of two agents is better, by the episodes that both played.
+//! Paired comparison of two evaluations on the same episodes.
 
-use faceoff_scoring::{OverallComparison, TaskComparison, WhoSolved};
+use faceoff_scoring::{OverallComparison, TaskComparison, SolvedEpisodes};
 use faceoff_types::{EvaluationId, Profile, Task, TeamName};
 use jiff::civil::Date;
 use serde::{Deserialize, Serialize};
@@ -14,26 +14,26 @@ pub struct ComparisonView {
     pub a: ComparedView,
     /// The second evaluation.
     pub b: ComparedView,
-    /// The date, in their stage's zone, whose episodes both played.
+    /// The evaluation day of both, a date in the stage's time zone.
     pub day: Date,
-    /// The rules that both were scored by.
+    /// The ruleset of both scores.
     pub ruleset: String,
-    /// The perturbations that both met.
+    /// Perturbation profile of both.
     pub profile: Profile,
     /// By task: hit, defend, prepare.
     pub tasks: BTreeMap<Task, TaskComparison>,
-    /// Of the overall scores.
+    /// Comparison of the overall scores.
     pub overall: OverallComparison,
-    /// By task which episodes were solved by whom; absent unless it is asked for.
+    /// By task, which agents solved which episodes; only if the query asks for it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub episodes: Option<BTreeMap<Task, WhoSolved>>,
+    pub episodes: Option<BTreeMap<Task, SolvedEpisodes>>,
 }
 
 /// One side of a comparison.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct ComparedView {
-    /// A finished one.
+    /// The finished evaluation.
     pub evaluation: EvaluationId,
-    /// Whose agent played.
+    /// Name of its team.
     pub team: TeamName,
 }

@@ -1,58 +1,58 @@
-//! The day's cut: what it brought about, and when the next one is.
+//! An evaluation day after its cutoff, and the next cutoff.
 
-use crate::views::{evaluation::EvaluationView, not_taken::NotTakenTeam, team::TeamView};
+use crate::views::{evaluation::EvaluationView, exclusion::ExcludedTeam, team::TeamView};
 use faceoff_types::{StageId, StageName, Zone};
 use jiff::{Timestamp, civil::Date};
 use serde::{Deserialize, Serialize};
 use std::fmt;
 use utoipa::ToSchema;
 
-/// What starting the day did, as the organiser sees it.
+/// An evaluation day, as organisers see it.
 #[derive(Debug, Clone, Serialize, Deserialize, ToSchema)]
 pub struct DayView {
-    /// Whose day.
+    /// The day's stage.
     pub stage: StageId,
-    /// Its date in the stage's zone.
+    /// The evaluation day, a date in the stage's time zone.
     pub day: Date,
-    /// One evaluation for each team that had a submission active.
+    /// The day's evaluations: one for each team that had an active submission at the cutoff.
     pub created: Vec<EvaluationView>,
-    /// Teams that have no valid submission; what they upload now plays another day.
+    /// Teams without a valid submission at the cutoff. What they upload later is evaluated on another day.
     pub without_submission: Vec<TeamView>,
-    /// Teams that have one whose runtime the stage does not take, and why; absent without one.
+    /// Teams whose active submission the stage excludes, and why; absent if there are none.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub not_taken: Vec<NotTakenTeam>,
+    pub not_taken: Vec<ExcludedTeam>,
 }
 
-/// When the next day starts, with what each team has active then.
+/// The next cutoff: the active submission of each team is evaluated.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
-pub struct NextCut {
-    /// Of which stage.
+pub struct NextCutoff {
+    /// The day's stage.
     pub stage: StageId,
-    /// As the organiser named it.
+    /// Name of the stage.
     pub stage_name: StageName,
-    /// Its date in the stage's zone; the earliest, where the organiser starts it.
+    /// The evaluation day, a date in the stage's time zone; the earliest one if an organiser starts it.
     pub day: Date,
-    /// By the schedule; null where the organiser starts the day.
+    /// The scheduled time; null if an organiser starts the day.
     pub at: Option<Timestamp>,
-    /// Where the day is a date.
+    /// Time zone of the stage.
     pub zone: Zone,
 }
 
-impl fmt::Display for NextCut {
+impl fmt::Display for NextCutoff {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self.at {
             Some(at) => {
-                let there = at.to_zoned(self.zone.time_zone());
+                let local = at.to_zoned(self.zone.time_zone());
                 write!(
                     f,
                     "{} {}",
-                    there.strftime("%Y-%m-%d at %H:%M:%S"),
+                    local.strftime("%Y-%m-%d at %H:%M:%S"),
                     self.zone
                 )
             }
             None => write!(
                 f,
-                "{} ({}) or later, when the organiser starts the day",
+                "{} ({}) at the earliest, started by an organiser",
                 self.day, self.zone
             ),
         }

@@ -1,4 +1,4 @@
-//! An evaluation on its way to a score or a failure.
+//! Evaluations and their progress.
 
 pub use crate::views::evaluation_status::{EvaluationStatus, FaultView, ResultView};
 use crate::views::{queue::QueueView, ruling::RulingView};
@@ -7,71 +7,70 @@ use jiff::{Timestamp, civil::Date};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-/// One run of a submission over the tasks.
+/// An evaluation: one run of a submission over all tasks.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct EvaluationView {
-    /// Names the evaluation in paths.
+    /// Id of the evaluation.
     pub id: EvaluationId,
-    /// The submission that plays.
+    /// The evaluated submission.
     pub submission: SubmissionId,
-    /// The submission's team.
+    /// Id of the submission's team.
     pub team: TeamId,
-    /// As the board shows it.
+    /// Name of the team.
     pub team_name: TeamName,
-    /// Whose day it plays.
+    /// The stage of its day.
     pub stage: StageId,
-    /// By which of the stage's rules.
+    /// Revision of the stage's rules.
     pub revision: u32,
-    /// The date, in the stage's zone, whose episodes it plays.
+    /// The evaluation day, a date in the stage's time zone.
     pub day: Date,
-    /// When the day's last evaluation had ended, and all of the day came out; null until then.
+    /// When the day was released, after its last evaluation; null before.
     pub released_at: Option<Timestamp>,
-    /// What is not played by then is ended, until the day is released; null: however long it takes.
+    /// When an unfinished evaluation is ended, unless the day is released before; null: no deadline.
     pub deadline_at: Option<Timestamp>,
-    /// The evaluation that it plays again, one that was cancelled, voided or failed by our fault; absent
-    /// otherwise.
+    /// The evaluation that it repeats, which was cancelled, voided or failed by a platform fault; absent otherwise.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rerun_of: Option<EvaluationId>,
-    /// It is a turn beside the day's own, and why; absent otherwise. Given after the day's release it plays other
-    /// episodes than the day's.
+    /// If it is an extra evaluation: the reason for it; absent otherwise. One that was granted after the day's release
+    /// runs on other episodes than the day's.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub extra_turn: Option<String>,
-    /// It does not count, if it was voided; absent otherwise.
+    /// If it was voided and does not count: when, and why; absent otherwise.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub voided: Option<RulingView>,
-    /// Its stage is blind: its result is hidden until the organiser opens that; absent otherwise.
+    /// True if the result is hidden until the organisers reveal the blind stage; absent otherwise.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub blind: bool,
-    /// Everybody sees it and its dataset, without a token.
+    /// Whether the evaluation and its dataset are public, readable without a token.
     pub public: bool,
-    /// Its dataset was removed, if it was: when, and by which retention; absent otherwise.
+    /// If its dataset was removed: when, and by which retention rule; absent otherwise.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub dataset_removed: Option<RulingView>,
-    /// The perturbations.
+    /// Perturbation profile of the simulator.
     pub profile: Profile,
-    /// In the order of play.
+    /// Tasks in the order in which they run.
     pub tasks: Vec<Task>,
     /// Episodes of each task.
     pub episodes_per_task: u32,
     /// When it was queued.
     pub created_at: Timestamp,
-    /// How far it is.
+    /// Episodes done and in total.
     pub progress: Progress,
-    /// Where it stands in the queue; absent once it is over.
+    /// Its position in the queue; absent once it has ended.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub queue: Option<QueueView>,
-    /// What happens next.
+    /// What happens next, in words.
     pub next: String,
-    /// What has become of it.
+    /// Its state, with the result or the reason of its failure.
     #[serde(flatten)]
     pub status: EvaluationStatus,
 }
 
-/// How much of an evaluation or of an ablation is played.
+/// Progress of an evaluation or of an ablation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 pub struct Progress {
-    /// Episodes played.
+    /// Episodes done.
     pub episodes_done: u32,
-    /// Episodes to play, over all tasks (and profiles).
+    /// Episodes in total, over all tasks (and profiles).
     pub episodes_total: u32,
 }

@@ -1,6 +1,6 @@
-//! What has become of an evaluation, and what happens to it next.
+//! States of an evaluation, with its result or failure, and what happens next.
 
-use crate::views::{shown, task::TaskView};
+use crate::views::{printable, task::TaskView};
 use faceoff_types::{
     AgentFault, EvaluationResult, Profile, Seed, SlotTiming, Task, Tier, Variation,
 };
@@ -9,120 +9,124 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use utoipa::ToSchema;
 
-/// What has become of an evaluation.
+/// State of an evaluation.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(tag = "state", rename_all = "snake_case")]
 pub enum EvaluationStatus {
-    /// It waits for a worker.
+    /// Waiting for a worker.
     Queued,
-    /// Episodes are being played.
+    /// Episodes are running.
     Running,
-    /// All episodes are played, the score is being computed.
+    /// All episodes are done; the score is being computed.
     Finalising,
     /// It has a score.
     Finished {
-        /// When the score was published.
+        /// When the score was stored.
         finished_at: Timestamp,
         /// The score; absent while the stage is blind.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         result: Option<Box<ResultView>>,
-        /// Path of the recorded dataset on this server; absent while the stage is blind, and once it was removed.
+        /// Path of the recorded dataset on this server; absent while the stage is blind, and once the dataset was
+        /// removed.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         dataset: Option<String>,
-        /// BLAKE3 of its archive, 64 hexadecimal digits; absent for datasets of older versions, and while the stage is
-        /// blind.
+        /// BLAKE3 hash of the dataset file, 64 hexadecimal digits; absent while the stage is blind, and for datasets of
+        /// older versions.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         dataset_blake3: Option<String>,
     },
-    /// The agent broke the protocol or a limit too often; no score.
+    /// The agent violated the protocol or exceeded a limit too often; no score.
     AgentFailed {
-        /// When the last of its faults was stored.
+        /// When the last fault was stored.
         finished_at: Timestamp,
-        /// What the agent did; absent in lists, and until the day is released.
+        /// The agent's faults; absent in lists, and until the day is released.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         faults: Option<Vec<FaultView>>,
         /// Last part of the agent's standard error; absent in lists, and until the day is released.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         log: Option<String>,
     },
-    /// Our fault. It is played again, with the same submission on the same episodes: twice by itself,
-    /// then if the organiser wants it.
+    /// A platform fault. The evaluation is repeated with the same submission on the same episodes: twice automatically,
+    /// then on an organiser's request.
     PlatformFailed {
-        /// When we gave it up.
+        /// When the evaluation was given up.
         finished_at: Timestamp,
         /// What failed.
         reason: String,
     },
-    /// Its day's deadline came before all of it was played: for want of our capacity. The turn is given back.
+    /// The day's deadline came before the evaluation finished, for lack of server capacity. It does not count as the
+    /// team's evaluation of the day.
     NotPlayed {
         /// When it was ended.
         finished_at: Timestamp,
-        /// Which deadline.
+        /// The deadline, in words.
         reason: String,
     },
-    /// Stopped by the organiser.
+    /// Cancelled by an organiser.
     Cancelled {
-        /// When it was stopped.
+        /// When it was cancelled.
         finished_at: Timestamp,
-        /// The organiser's words.
+        /// The organiser's reason.
         reason: String,
     },
 }
 
 impl EvaluationStatus {
-    /// What happens to a finished one next once its day is released.
+    /// What happens next to a finished evaluation of a released day.
     pub const DONE: &'static str =
-        "Nothing more: its dataset is its team's, and anybody may check the score.";
+        "Done. The team can download the dataset and verify the score.";
 
-    /// What happens to an evaluation next.
+    /// What happens next to an evaluation, in words.
     pub const fn next(&self, released: bool, voided: bool) -> &'static str {
         if voided {
-            return "It counts no more, and the turn is given back: the organiser may have it played again.";
+            return "It no longer counts as the team's evaluation of the day. An organiser can rerun it.";
         }
         match self {
             Self::Queued => {
-                "Its episodes are played as soon as slots are free for its team; what its day's deadline leaves unplayed \
-             is ended, and the turn given back."
+                "Its episodes start as soon as slots are free for the team. If they are not done by the day's deadline, \
+             the evaluation is ended and does not count."
             }
             Self::Running => {
-                "The rest of its episodes is played, and then the score computed; what its day's deadline leaves unplayed \
-             is ended, and the turn given back."
+                "The remaining episodes run, then the score is computed. If they are not done by the day's deadline, \
+             the evaluation is ended and does not count."
             }
-            Self::Finalising => "The score is computed and published, without anybody's doing.",
+            Self::Finalising => "The score is computed and published automatically.",
             Self::Finished { .. } if released => Self::DONE,
             Self::Finished { .. } => {
-                "Dataset and details come out when the last evaluation of its day has ended."
+                "Dataset and details are released when the day's last evaluation has ended."
             }
             Self::AgentFailed { .. } if released => {
-                "Nothing more: faults and log say what to correct; another upload plays the next day."
+                "Done. Faults and log show what to correct; a corrected submission is evaluated on the next day."
             }
             Self::AgentFailed { .. } => {
-                "Its team sees faults and log when the last evaluation of its day has ended."
+                "The team sees faults and log when the day's last evaluation has ended."
             }
             Self::PlatformFailed { .. } if released => {
-                "The turn is given back: the organiser may have the same agent play the same episodes again."
+                "It does not count as the team's evaluation of the day. An organiser can repeat it with the same \
+             submission on the same episodes."
             }
             Self::PlatformFailed { .. } => {
-                "The same agent plays the same episodes again: by itself twice, after one minute and after ten, then if \
-             the organiser wants it."
+                "The same submission is evaluated again on the same episodes: twice automatically, after one and after \
+             ten minutes, then on an organiser's request."
             }
             Self::NotPlayed { .. } => {
-                "The turn is given back, and the row of an older day stays on the board; what is active at the next cut \
-             plays the next day, and the organiser may have this one played after all."
+                "It does not count as the team's evaluation of the day, and the row of an earlier day stays on the board. \
+             The next cutoff evaluates the active submission. An organiser can still rerun this evaluation."
             }
             Self::Cancelled { .. } => {
-                "The turn is given back: the organiser may have the same agent play the same episodes again."
+                "It does not count as the team's evaluation of the day. An organiser can repeat it with the same \
+             submission on the same episodes."
             }
         }
     }
 
-    /// Will nothing change any more?
+    /// Whether the state is final.
     #[must_use]
     pub const fn is_final(&self) -> bool {
         !matches!(self, Self::Queued | Self::Running | Self::Finalising)
     }
 
-    /// When its score was published; `None` without one.
+    /// When the score was stored; `None` without a score.
     #[must_use]
     pub const fn finished_at(&self) -> Option<Timestamp> {
         match self {
@@ -132,15 +136,15 @@ impl EvaluationStatus {
     }
 }
 
-/// The score of one evaluation; laid out as `results.json` of the dataset, of which only score and points
-/// are told until the day is released.
+/// The score of an evaluation, in the layout of the dataset's `results.json`. Until the day is released only scores and
+/// points are present.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct ResultView {
-    /// The rules that it was scored by.
+    /// The ruleset of the score.
     pub ruleset: String,
-    /// The perturbations.
+    /// Perturbation profile of the simulator.
     pub profile: Profile,
-    /// What it was played and scored by otherwise than the ruleset has it.
+    /// Settings that differ from the ruleset's.
     #[serde(flatten)]
     pub variation: Variation,
     /// The seed of the day's evaluations, 64 hexadecimal digits; null until the day is released.
@@ -153,14 +157,14 @@ pub struct ResultView {
     pub penalty_points: f64,
     /// The worst of the tasks' tiers.
     pub tier: Tier,
-    /// The slots' noise floor and re-runs; absent until the day is released, and in results of older
+    /// Timing noise floor and repeated episodes of the slots; absent until the day is released, and in results of older
     /// versions.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub timing: Option<SlotTiming>,
 }
 
 impl ResultView {
-    /// Of a result: before the day is released without what tells of its episodes.
+    /// Leaves out everything that depends on the day's episodes unless the day is `released`.
     pub fn new(result: EvaluationResult, released: bool) -> Self {
         let tasks = result.tasks.iter();
         Self {
@@ -179,29 +183,29 @@ impl ResultView {
     }
 }
 
-/// Something an agent did wrong.
+/// A fault of an agent.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 pub struct FaultView {
-    /// What it did, in words.
+    /// The fault, in words.
     pub message: String,
-    /// In which task.
+    /// The task.
     pub task: String,
-    /// In which episode; null during start-up.
+    /// The episode, from 0; null during start-up.
     pub episode: Option<u32>,
-    /// At which control step; null outside of an episode.
+    /// The control step; null outside of an episode.
     pub step: Option<u32>,
-    /// The offending line, cut, where there was one.
+    /// The offending line of output, truncated; null without one.
     pub line: Option<String>,
 }
 
 impl From<AgentFault> for FaultView {
     fn from(fault: AgentFault) -> Self {
         Self {
-            message: shown(fault.fault.to_string()),
-            task: fault.contest.to_string(),
+            message: printable(fault.fault.to_string()),
+            task: fault.agent_task.to_string(),
             episode: fault.episode,
             step: fault.step,
-            line: fault.line.map(shown),
+            line: fault.line.map(printable),
         }
     }
 }
@@ -211,7 +215,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_state_of_an_evaluation_says_what_happens_next() {
+    fn next_step_is_described_for_each_evaluation_state() {
         let at = Timestamp::UNIX_EPOCH;
         let reason = || "a reason".to_owned();
         let finished = EvaluationStatus::Finished {
@@ -258,7 +262,7 @@ mod tests {
                 &EvaluationStatus::Running,
                 false,
                 false,
-                "The rest of its episodes",
+                "The remaining episodes",
             ),
             (
                 &EvaluationStatus::Finalising,
@@ -266,15 +270,20 @@ mod tests {
                 false,
                 "score is computed",
             ),
-            (&finished, false, false, "come out when the last"),
-            (&finished, true, false, "Nothing more: its dataset"),
-            (&finished, true, true, "counts no more"),
+            (&finished, false, false, "are released when the day's last"),
+            (&finished, true, false, "can download the dataset"),
+            (&finished, true, true, "no longer counts"),
             (&agent_failed, false, false, "sees faults and log when"),
             (&agent_failed, true, false, "what to correct"),
-            (&platform_failed, false, false, "by itself twice"),
-            (&platform_failed, true, false, "may have the same agent"),
-            (&not_played, true, false, "older day stays on the board"),
-            (&cancelled, true, false, "turn is given back"),
+            (&platform_failed, false, false, "twice automatically"),
+            (&platform_failed, true, false, "can repeat it"),
+            (
+                &not_played,
+                true,
+                false,
+                "earlier day stays on the board",
+            ),
+            (&cancelled, true, false, "does not count"),
         ] {
             let text = status.next(released, voided);
             assert!(text.contains(words), "{words} is not in {text}");

@@ -1,31 +1,32 @@
-//! What happened, as the organiser reads it.
+//! The event log, as organisers read it.
 
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 use utoipa::ToSchema;
 
-/// A change, and who made it.
+/// An event: a change of the season, and its actor.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct EventView {
-    /// Rises with every change, in the order in which they were stored.
+    /// Increases with every event, in the order in which they were stored.
     pub id: i64,
-    /// When it was.
+    /// When it happened.
     pub at: Timestamp,
     /// `organiser` (the host), `person:ID`, `team:ID`, `visitor`, `schedule`, `worker:NAME` or `server`.
     #[schema(example = "organiser")]
     pub actor: String,
-    /// The name of the person or the team; absent of others.
+    /// Name of the user or the team; absent for other actors.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub actor_name: Option<String>,
-    /// `season`, or kind and id: `stage:ID`, `day:STAGE/2026-03-01`, `team:ID`, `submission:ID`, `evaluation:ID`, `ablation:ID`,
-    /// `person:ID`, `registration:ID`, `announcement:ID`, `question:ID`, `proposal:ID`, `tournament:ID`, `game:ID`.
+    /// `season`, or kind and id: `stage:ID`, `day:STAGE/2026-03-01`, `team:ID`, `submission:ID`, `evaluation:ID`,
+    /// `ablation:ID`, `person:ID`, `registration:ID`, `announcement:ID`, `question:ID`, `proposal:ID`, `tournament:ID`,
+    /// `game:ID`.
     #[schema(example = "day:2026-03-01")]
     pub subject: String,
-    /// What happened.
+    /// Kind of the event.
     #[schema(example = "day_started")]
     pub kind: String,
-    /// What else is known of it; by the kind.
+    /// Details; their fields depend on the kind.
     #[schema(value_type = Object)]
     pub details: Map<String, Value>,
 }
@@ -33,8 +34,8 @@ pub struct EventView {
 /// A page of events.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct EventsView {
-    /// The newest first.
+    /// Newest first.
     pub events: Vec<EventView>,
-    /// The value of `before` that gives the next page; null on the last.
+    /// Value of `before` for the next page; null on the last page.
     pub next_before: Option<i64>,
 }

@@ -1,6 +1,6 @@
-//! A game between two submissions: what it is for, how it stands, what it came to.
+//! Games between two submissions: purpose, state and result.
 
-use faceoff_scoring::tournament::{Forfeit, Why};
+use faceoff_scoring::tournament::{Forfeit, ResultReason};
 use faceoff_types::{
     ComputationTimeSummary, GameId, RoundNumber, Seed, StageName, SubmissionId, TeamId, TeamName,
     Tier, TournamentId, ViolationCounts,
@@ -9,203 +9,203 @@ use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-/// A game. Pairs are the home side's first, which moves the first robot.
+/// A game. In pairs the home side comes first; it controls the first robot.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct GameView {
-    /// Names the game in paths.
+    /// Id of the game.
     pub id: GameId,
-    /// By whose rules it is played.
+    /// The tournament whose rules apply.
     pub tournament: TournamentId,
-    /// As the organiser named it.
+    /// Name of the tournament.
     pub tournament_name: StageName,
-    /// What it is for.
+    /// Why the game is played.
     #[serde(flatten)]
     pub purpose: PurposeView,
-    /// Who plays, with what.
+    /// Teams and their submissions.
     pub sides: [GameSideView; 2],
-    /// What its seed follows from, beside the season's secret; of a game that is played again the same.
+    /// Label from which the game's seed derives, together with the season secret. A rerun has the same label.
     #[schema(example = "tournament/1/round/2/meeting/5")]
     pub seed_label: String,
-    /// When it was queued first.
+    /// When it was first queued.
     pub created_at: Timestamp,
-    /// The team by whose leaving it does not count; absent otherwise.
+    /// The team whose departure excludes the game from the standings; absent otherwise.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub taken_out_by: Option<TeamName>,
-    /// What happens next.
+    /// What happens next, in words.
     pub next: String,
-    /// How it stands.
+    /// Its state, with the result or the reason of its failure.
     #[serde(flatten)]
     pub status: GameStatus,
 }
 
-/// A side of a game.
+/// One side of a game.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 pub struct GameSideView {
-    /// Which team.
+    /// Id of the team.
     pub team: TeamId,
-    /// As it is called now.
+    /// The team's current name.
     pub team_name: TeamName,
-    /// What it plays with, whatever it has active meanwhile.
+    /// The submission that plays, also if the team has activated another one since.
     pub submission: SubmissionId,
 }
 
-/// What a game is for.
+/// Purpose of a game.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(tag = "purpose", rename_all = "snake_case")]
 pub enum PurposeView {
-    /// It counts.
+    /// A game of a round, which counts.
     Round {
-        /// The round.
+        /// The round, from 1.
         #[schema(value_type = u32, minimum = 1, maximum = 100)]
         round: RoundNumber,
-        /// From 1; the games of one can be played side by side.
+        /// From 1; the games of a matchday can run in parallel.
         matchday: u32,
-        /// From 1, in the order in which the round was drawn.
+        /// Number of the meeting in the round's draw, from 1.
         meeting: u32,
-        /// Is it the second game of a mirrored pair, with sides swapped?
+        /// Whether it is the second game of a mirrored pair, with sides swapped.
         second_half: bool,
     },
-    /// Against the organisers' baseline.
+    /// A test game against the organisers' baseline.
     Test {
-        /// Who asked for it; null: an organiser.
+        /// The team that requested it; null: an organiser.
         asked_by: Option<TeamName>,
     },
-    /// Two teams, before or between rounds.
+    /// A friendly game of two teams, before or between rounds.
     Friendly {
-        /// Who asked for it.
+        /// The team that requested it.
         asked_by: TeamName,
     },
-    /// A game of the schedule, played again with another seed.
+    /// A game of the schedule, replayed with another seed.
     Replay {
-        /// Which time, from 1.
+        /// Number of the replay, from 1.
         replay: u32,
-        /// The round of the game that is played again.
+        /// The round of the replayed game.
         #[schema(value_type = u32, minimum = 1, maximum = 100)]
         round: RoundNumber,
-        /// Its matchday.
+        /// The matchday of the replayed game.
         matchday: u32,
-        /// Its meeting.
+        /// The meeting of the replayed game.
         meeting: u32,
-        /// Is it the second game of a mirrored pair?
+        /// Whether it is the second game of a mirrored pair.
         second_half: bool,
     },
 }
 
-/// How a game stands.
+/// State of a game.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(tag = "state", rename_all = "snake_case")]
 pub enum GameStatus {
-    /// No slot has it.
+    /// Waiting for a slot.
     Queued,
-    /// A slot plays it.
+    /// Running on a slot.
     Running {
-        /// Which attempt, from 1.
+        /// Number of the attempt, from 1.
         attempt: u32,
-        /// Since when.
+        /// When the attempt started.
         since: Timestamp,
     },
     /// It has a result.
     Played {
-        /// The attempt that it is of.
+        /// The attempt that gave the result.
         attempt: u32,
-        /// When it was committed.
+        /// When the result was stored.
         finished_at: Timestamp,
-        /// What it came to.
+        /// The result.
         result: Box<GameResultView>,
     },
-    /// Our fault, given up: it has no result until it is played again.
+    /// A platform fault. No result until the game is rerun.
     Broken {
-        /// When.
+        /// When the game was given up.
         at: Timestamp,
         /// What went wrong.
         reason: String,
     },
-    /// It had a result that counts no more: it has none until it is played again.
+    /// An organiser voided its result. No result until the game is rerun.
     Void {
-        /// When.
+        /// When it was voided.
         at: Timestamp,
-        /// The organiser's words.
+        /// The organiser's reason.
         reason: String,
     },
-    /// It is not played: a side left, or it does not count and was called off.
+    /// It is not played: a team left, or a game that does not count was cancelled.
     Cancelled {
-        /// When.
+        /// When it was cancelled.
         at: Timestamp,
-        /// Why.
+        /// Why it was cancelled.
         reason: String,
     },
 }
 
-/// What a game came to. Pairs are the home side's first.
+/// Result of a game. In pairs the home side comes first.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct GameResultView {
-    /// The final score, which counts: points for the opponent's fouls included, 10 : 0 after a forfeit.
+    /// Final score, which counts: includes points for the opponent's fouls; 10 : 0 after a forfeit.
     pub score: [u32; 2],
-    /// As played, without points for fouls.
+    /// Goals, without points for fouls.
     pub goals: [u32; 2],
-    /// Of each side.
+    /// Fouls of each side.
     pub fouls: [u32; 2],
-    /// Over all windows of 500 steps.
+    /// Penalty points over all windows of 500 steps.
     pub penalty_points: [f64; 2],
-    /// What follows from the penalty points.
+    /// Tiers that follow from the penalty points.
     pub tiers: [Tier; 2],
-    /// Windows with each violation.
+    /// Number of windows with each violation.
     pub violations: [ViolationCounts; 2],
-    /// Crashes, rubbish and hard time-outs.
+    /// Agent faults: crashes, malformed answers and hard timeouts.
     pub faults: [u32; 2],
     /// Answers that came too late to take effect.
     pub late_answers: [u32; 2],
-    /// Of all answers.
+    /// Computation times of all answers, in seconds.
     pub computation_time_s: [ComputationTimeSummary; 2],
-    /// What a side used up that forfeited; null: it did not.
+    /// Why a side forfeited: the limit that it exceeded; null if it did not forfeit.
     pub forfeits: [Option<Forfeit>; 2],
-    /// Null: a draw.
+    /// The winner's name; null: a draw.
     pub winner: Option<TeamName>,
-    /// Why, for programs.
+    /// Why the winner won, for API clients.
     #[serde(flatten)]
-    pub why: Why,
-    /// Why, in words.
+    pub why: ResultReason,
+    /// Why the winner won, in words.
     #[schema(example = "the other side is non-deployable; the winner did not lead")]
     pub because: String,
     /// Control steps played.
     pub steps: u32,
-    /// Windows of 500 of them, a last shorter one included.
+    /// Windows of 500 control steps, including a shorter last one.
     pub windows: u32,
-    /// Rallies begun.
+    /// Rallies started.
     pub rallies: u32,
-    /// Its files; null of the schedule played again.
+    /// The recording; null for replays of the schedule.
     pub recording: Option<RecordingView>,
 }
 
-/// The files of a game that was played.
+/// The recording of a game.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 pub struct RecordingView {
-    /// Is it there for everybody, without a token?
+    /// Whether it is public, readable without a token.
     pub public: bool,
-    /// The game's own seed; null for those who do not see both sides.
+    /// The game's seed; null unless the caller may see both sides.
     pub seed: Option<Seed>,
-    /// Of `GET /games/{id}/recording`, 64 hexadecimal digits.
+    /// BLAKE3 hash of `GET /games/{id}/recording`, 64 hexadecimal digits.
     pub game_blake3: String,
-    /// Of `GET /games/{id}/sides/1` and `2`.
+    /// BLAKE3 hashes of `GET /games/{id}/sides/1` and `2`.
     pub side_blake3: [String; 2],
 }
 
-/// Games against the baseline that were queued.
+/// Requested test games against the baseline.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct TestGamesView {
-    /// Those that wait for a slot now.
+    /// The queued games.
     pub ordered: Vec<GameView>,
-    /// Teams without one, where an organiser asked for several.
-    pub not_ordered: Vec<NotOrdered>,
+    /// Teams that get no test game, if an organiser asked for several.
+    pub not_ordered: Vec<SkippedTestGame>,
 }
 
-/// A team that does not play against the baseline now.
+/// A team that gets no test game now.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
-pub struct NotOrdered {
-    /// Which.
+pub struct SkippedTestGame {
+    /// Id of the team.
     pub team: TeamId,
-    /// As it is called now.
+    /// The team's current name.
     pub team_name: TeamName,
-    /// Why.
+    /// Why it gets none.
     pub reason: String,
 }

@@ -1,27 +1,27 @@
-//! Is the server up, and is it fit for work?
+//! Liveness and readiness of the server.
 
 use crate::views::ruling::RulingView;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-/// The server does all that it is for.
+/// The server is ready.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 pub struct HealthView {
-    /// Always `ok`; anything else is a problem with status 503.
+    /// Always `ok`; otherwise the response is a problem with status 503.
     #[schema(example = "ok")]
     pub status: String,
     /// Version of the server.
     pub version: String,
-    /// Units of work that are being done.
+    /// Running jobs.
     pub running: u32,
-    /// Units of work that could be begun.
+    /// Pending jobs that could start.
     pub waiting: u32,
-    /// The organiser holds the queue: since when, and why; absent otherwise.
+    /// If an organiser paused the queue: since when, and why; absent otherwise.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub paused: Option<RulingView>,
 }
 
-/// The process answers.
+/// The server process responds.
 #[derive(Debug, Serialize, ToSchema)]
 pub struct LiveView {
     /// Always `alive`.
@@ -32,7 +32,7 @@ pub struct LiveView {
 }
 
 impl LiveView {
-    /// The process answers.
+    /// The only value.
     pub const ALIVE: Self = Self {
         status: "alive",
         version: env!("CARGO_PKG_VERSION"),

@@ -1,77 +1,77 @@
-//! What each team came to on each day of a stage, and where it stood by then.
+//! Board history: results and ranks of all teams, day by day.
 
 use crate::views::{ruling::RulingView, task::TaskView};
 use faceoff_types::{
-    DivisionName, EvaluationId, StageId, StageName, Standings, Task, TeamId, TeamName, Tier,
+    DivisionName, EvaluationId, StageId, StageName, CountingResult, Task, TeamId, TeamName, Tier,
 };
 use jiff::{Timestamp, civil::Date};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use utoipa::ToSchema;
 
-/// All results of a stage that count, by one revision of its rules.
+/// All results of a stage that count, under one revision of its rules.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct HistoryView {
-    /// Whose they are.
+    /// The stage.
     pub stage: StageId,
-    /// As the organiser named it.
+    /// Name of the stage.
     pub stage_name: StageName,
-    /// By which of the stage's rules they were played.
+    /// Revision of the stage's rules.
     pub revision: u32,
-    /// What boards of the stage are made of; ranks before a final day are by the newest results.
-    pub standings: Standings,
-    /// What teams were ranked by, if it was asked for something else; absent otherwise.
+    /// Which of a team's evaluations count for boards of the stage. Ranks before a final day use the newest ones.
+    pub standings: CountingResult,
+    /// Which of a team's evaluations rank it, if the query asks for others than `standings`; absent otherwise.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub by: Option<Standings>,
-    /// The stage is blind: without the organiser's token there are no rows until the organiser opens it.
+    pub by: Option<CountingResult>,
+    /// The stage is blind: only organisers see rows until the stage is revealed.
     pub blind: bool,
-    /// The result may still change: it is not signed off.
+    /// The result is not signed off and may still change.
     pub provisional: bool,
-    /// The task that ranks, or null for all together.
+    /// The task that ranks; null for all tasks together.
     pub task: Option<Task>,
-    /// Whose teams are ranked, among themselves alone; absent where all teams are.
+    /// Only teams of this division are ranked, among themselves; absent if all teams are.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub division: Option<DivisionName>,
-    /// Nothing is told that is newer: since when, and why; absent otherwise.
+    /// If the boards are frozen and newer results are left out: since when, and why; absent otherwise.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub frozen: Option<RulingView>,
-    /// Those with results, the earlier first.
+    /// Days with results, earliest first.
     pub days: Vec<Date>,
-    /// The earlier day first; of a day in board order.
+    /// Earliest day first; within a day in board order.
     pub rows: Vec<HistoryRow>,
 }
 
-/// What a team came to on a day.
+/// A team's result of a day.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct HistoryRow {
-    /// The date whose episodes it played.
+    /// The evaluation day.
     pub day: Date,
-    /// The team's name.
+    /// Name of the team.
     pub team: TeamName,
-    /// Stays when names change.
+    /// Id of the team; stays the same when the name changes.
     pub team_id: TeamId,
-    /// The division that the team is in now; absent if it is in none.
+    /// The team's current division; absent without one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub division: Option<DivisionName>,
-    /// A reference agent of the organisers, which takes no rank.
+    /// Whether the team is a baseline, a reference agent of the organisers without a rank.
     pub baseline: bool,
-    /// Where it stood on the board by the results up to that day; null of a baseline.
+    /// The team's rank by the results up to this day; null for a baseline.
     pub rank: Option<u32>,
-    /// The rank that a baseline would have taken; absent of others.
+    /// The rank that a baseline would have had; absent for other teams.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub would_rank: Option<u32>,
-    /// What it played.
+    /// The day's evaluation.
     pub evaluation: EvaluationId,
-    /// When its score was published.
+    /// When the score was stored.
     pub finished_at: Timestamp,
-    /// When all of the day came out; null until then.
+    /// When the day was released; null before.
     pub released_at: Option<Timestamp>,
-    /// Of the day's own result, overall or in the task.
+    /// Tier of the day's result, overall or in the task.
     pub tier: Tier,
-    /// The day's own, overall, in percent.
+    /// Overall score of the day in percent.
     pub score: f64,
-    /// The day's own, overall: the maximum over the tasks.
+    /// Overall penalty points of the day: the maximum over the tasks.
     pub penalty_points: f64,
-    /// The day's own results by task.
+    /// The day's results by task.
     pub tasks: BTreeMap<Task, TaskView>,
 }

@@ -1,95 +1,96 @@
 //! Invitations and registrations.
 
 use crate::requests::InvitedRole;
-use faceoff_types::{DivisionName, InvitationId, PersonId, RegistrationId, TeamId, TeamName};
+use faceoff_types::{DivisionName, InvitationId, UserId, RegistrationId, TeamId, TeamName};
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-/// A link by which one person joins, once.
+/// An invitation for one person, which can be used once.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct InvitationView {
-    /// Names it; tells nothing of the link.
+    /// Id of the invitation; does not reveal the link.
     pub id: InvitationId,
-    /// What it makes of whoever follows it.
+    /// The role that the invitation gives.
     pub role: InvitedRole,
-    /// Of a member.
+    /// The team of a future member; absent for other roles.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub team: Option<TeamId>,
-    /// Who is to return.
+    /// The user who gets access again; absent for other roles.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub person: Option<PersonId>,
-    /// For whom it is.
+    pub person: Option<UserId>,
+    /// A label for lists, e.g. the invited person's name.
     pub note: String,
-    /// When it was made.
+    /// When it was created.
     pub created_at: Timestamp,
-    /// From then on it is worth nothing.
+    /// When it expires.
     pub expires_at: Timestamp,
     /// `open`, `accepted`, `revoked` or `expired`.
     #[schema(example = "open")]
     pub state: String,
-    /// Who has accepted it.
+    /// The user who accepted it; absent before.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub accepted_by: Option<PersonId>,
+    pub accepted_by: Option<UserId>,
 }
 
-/// A new invitation with its link, which is shown this once.
+/// A new invitation with its link, which is shown only once.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct NewInvitationView {
-    /// What is stored of it.
+    /// The invitation.
     #[serde(flatten)]
     pub invitation: InvitationView,
-    /// The code; only its hash is stored.
+    /// The code; the server stores only its hash.
     #[schema(example = "fo_invite_…")]
     pub code: String,
-    /// The page where it is accepted: an address, or a path of this server if it does not know its own.
+    /// Page on which the invitation is accepted: a URL, or a path if the server's public URL is not configured.
     #[schema(example = "/join/fo_invite_…")]
     pub link: String,
 }
 
-/// A team that wants to take part.
+/// A team's registration.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct RegistrationView {
-    /// Names it; tells nothing of its link.
+    /// Id of the registration; does not reveal its link.
     pub id: RegistrationId,
-    /// What it wants to be called.
+    /// The requested team name.
     pub team_name: TeamName,
-    /// Where it is from.
+    /// The team's institution or company; null if not given.
     pub affiliation: Option<String>,
-    /// Its page.
+    /// The team's web page; null if not given.
     pub link: Option<String>,
-    /// The division that it wants to be in.
+    /// The requested division; null if not given.
     pub division: Option<DivisionName>,
-    /// How the organisers reach it.
+    /// How the organisers can reach the team.
     pub contact: String,
-    /// Which terms it has accepted.
+    /// The accepted version of the terms; null without terms.
     pub accepted_terms: Option<u32>,
-    /// When it came.
+    /// When the team registered.
     pub created_at: Timestamp,
     /// `waiting`, `approved` or `refused`.
     #[schema(example = "waiting")]
     pub state: String,
-    /// When it was decided about.
+    /// When it was approved or refused; absent before.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub decided_at: Option<Timestamp>,
-    /// Why it was refused.
+    /// Why it was refused; absent otherwise.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub reason: Option<String>,
-    /// The team that came of it.
+    /// Id of the created team; absent unless approved.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub team: Option<TeamId>,
 }
 
-/// A registration with its link, which is shown this once: it is worth something once the organisers have approved.
+/// A new registration with its link, which is shown only once. The link is valid once the organisers have approved the
+/// registration.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct NewRegistrationView {
-    /// What is stored of it.
+    /// The registration.
     #[serde(flatten)]
     pub registration: RegistrationView,
-    /// The code; only its hash is stored.
+    /// The code; the server stores only its hash.
     #[schema(example = "fo_invite_…")]
     pub code: String,
-    /// The page that says where it stands, and lets the first member join.
+    /// Page that shows the registration's state and lets the first member join.
     #[schema(example = "/join/fo_invite_…")]
     pub join_link: String,
 }

@@ -1,14 +1,14 @@
-//! Links that download a file without a token.
+//! Signed links, which download a file without a token.
 
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-/// A link that was made, and is shown this once.
+/// A new download link, which is shown only once.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 pub struct LinkView {
-    /// What to follow; a path, if the server does not know its own address.
+    /// A URL, or a path if the server's public URL is not configured.
     pub url: String,
-    /// From then on it is worth nothing.
+    /// When the link expires.
     pub expires_at: Timestamp,
 }

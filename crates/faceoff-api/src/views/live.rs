@@ -1,35 +1,35 @@
-//! What is told of a game as it is watched, beside the happenings and positions themselves.
+//! Control events of a live game's stream, beside its game events and positions.
 
 use faceoff_types::GameId;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-/// Nothing more is told of a game: the last event of a stream.
+/// The last event of a game's stream.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 pub struct LiveEnd {
-    /// Which.
+    /// Id of the game.
     pub game: GameId,
-    /// How it stands then; `GET /games/{id}` has the rest, a result a moment later.
+    /// The game's state. `GET /games/{id}` returns the rest; a result is there a moment later.
     pub state: LiveEndState,
 }
 
-/// How a game stands that nobody plays, and that nobody is about to play.
+/// State of a game that is neither running nor queued.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum LiveEndState {
-    /// It was played to its end.
+    /// It has a result.
     Played,
-    /// Our fault, given up.
+    /// It was given up after a platform fault.
     Broken,
-    /// Its result counts no more.
+    /// An organiser voided its result.
     Void,
     /// It is not played.
     Cancelled,
 }
 
-/// A game waits for a slot.
+/// The game waits for a slot.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 pub struct LiveWait {
-    /// Which.
+    /// Id of the game.
     pub game: GameId,
 }

@@ -1,56 +1,56 @@
-//! How a team stands today.
+//! A team's own status: today's evaluation and the submission for the next cutoff.
 
-use crate::views::{day::NextCut, not_taken::NotTakenView, queue::QueueView, team::TeamView};
+use crate::views::{day::NextCutoff, exclusion::StageExclusion, queue::QueueView, team::TeamView};
 use faceoff_types::{EvaluationId, StageId, SubmissionId};
 use jiff::civil::Date;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-/// The calling team: who it is, what plays for it today and what it enters next.
+/// Status of the calling team.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct MeView {
-    /// Whose token the caller has.
+    /// The team.
     pub team: TeamView,
-    /// Today's.
-    pub turn: TurnView,
-    /// What it enters at the next cut; null while it has no valid submission.
+    /// Today's evaluation.
+    pub turn: TodayView,
+    /// The submission that the next cutoff evaluates; null while there is no valid one.
     pub active_submission: Option<SubmissionId>,
-    /// The stages that are not over and do not take what is active: it does not play there, and why; absent without one.
+    /// Stages that have not ended and exclude the active submission, and why; absent if there are none.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub not_taken: Vec<NotTakenView>,
-    /// What waits for its smoke run or is in it, the newest first.
-    pub validating: Vec<ValidatingView>,
-    /// When that cut is; null if none comes.
-    pub next_cut: Option<NextCut>,
-    /// Largest packed bundle that the server takes, in bytes.
+    pub not_taken: Vec<StageExclusion>,
+    /// Submissions whose validation run is pending or running, newest first.
+    pub validating: Vec<PendingValidationView>,
+    /// The next cutoff; null if there is none.
+    pub next_cut: Option<NextCutoff>,
+    /// Largest bundle that the server accepts, packed, in bytes.
     pub max_bundle_bytes: u64,
 }
 
-/// What plays for a team on a day.
+/// A team's evaluation of a day.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
-pub struct TurnView {
-    /// The stage that is open.
+pub struct TodayView {
+    /// The open stage.
     pub stage: StageId,
-    /// The date in its zone.
+    /// The evaluation day, a date in the stage's time zone.
     pub day: Date,
-    /// The evaluation that counts; null before the day's cut, if the team had nothing active then, and
-    /// if it was cancelled, voided, not played in time or failed by our fault, and is not played again.
+    /// The evaluation that counts. Null before the day's cutoff, and if the team had no active submission then. Also
+    /// null if it was cancelled, voided, not played in time or failed by a platform fault, and is not repeated.
     pub evaluation: Option<EvaluationId>,
-    /// Where that stands in the queue; absent if there is none, or it is over.
+    /// Its position in the queue; absent without an evaluation, and once it has ended.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub queue: Option<QueueView>,
-    /// What happens to it next; absent if there is none.
+    /// What happens next, in words; absent without an evaluation.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub next: Option<String>,
 }
 
-/// A submission that has no verdict yet.
+/// A submission without a verdict.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
-pub struct ValidatingView {
-    /// Which.
+pub struct PendingValidationView {
+    /// Id of the submission.
     pub submission: SubmissionId,
-    /// Where its smoke run stands; null when it has just ended.
+    /// Position of its validation run in the queue; null if the run has just ended.
     pub queue: Option<QueueView>,
-    /// What happens next.
+    /// What happens next, in words.
     pub next: String,
 }

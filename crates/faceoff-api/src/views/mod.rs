@@ -1,21 +1,21 @@
-//! What can be known of a resource, as it is answered: one file per resource. API and pages show these very types, and
-//! the command line's client reads them.
+//! Response bodies, one file per resource. The API and the pages show these types, and the command line's client reads
+//! them.
 
 pub mod ablation;
 pub mod announcement;
-pub mod archived;
+pub mod archive;
 pub mod attempt;
 pub mod baseline;
 pub mod board;
 pub mod capacity;
-pub mod certainty;
+pub mod champion_shares;
 pub mod clips;
 pub mod comparison;
 pub mod day;
 pub mod evaluation;
 mod evaluation_status;
 pub mod event;
-pub mod finalised;
+pub mod sign_off;
 pub mod game;
 pub mod health;
 pub mod history;
@@ -23,8 +23,8 @@ pub mod invitation;
 pub mod link;
 pub mod live;
 pub mod me;
-pub mod not_taken;
-pub mod person;
+pub mod exclusion;
+pub mod user;
 pub mod proposal;
 pub mod queue;
 pub mod ruling;
@@ -41,8 +41,8 @@ pub mod violations;
 pub mod webhook;
 pub mod workers;
 
-/// Text of agents as API and pages show it; what older versions have stored may hold anything.
+/// Text that an agent or a user wrote, with control characters removed. Rows of older versions may contain any.
 #[must_use]
-pub fn shown(text: String) -> String {
-    faceoff_types::harmless(&text).into_owned()
+pub fn printable(text: String) -> String {
+    faceoff_types::escape_unprintable(&text).into_owned()
 }

@@ -1,4 +1,4 @@
-//! What is tried without counting, and what a re-evaluation would change.
+//! Trials and proposed re-evaluations: evaluations that do not count, and the changes that they would make.
 
 use crate::views::{
     board::BoardView,
@@ -11,163 +11,163 @@ use jiff::{Timestamp, civil::Date};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-/// Evaluations of a stage that do not count: a trial, or a re-evaluation until it is applied. The organiser alone sees
-/// them.
+/// A trial, or a proposed re-evaluation: evaluations of a stage that do not count unless they are applied. Only
+/// organisers see them.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct ProposalView {
-    /// Names the proposal in paths.
+    /// Id of the proposal.
     pub id: ProposalId,
-    /// Whose rules they are played by.
+    /// The stage whose rules apply.
     pub stage: StageId,
-    /// As the organiser named it.
+    /// Name of the stage.
     pub stage_name: StageName,
-    /// By which of the stage's rules.
+    /// Revision of the stage's rules.
     pub revision: u32,
-    /// What is played.
+    /// Which evaluations it consists of.
     pub kind: ProposalKindView,
-    /// The date whose results it would change; null of a trial.
+    /// The day whose results it would change; null for a trial.
     pub day: Option<Date>,
-    /// The organiser's words.
+    /// The organiser's reason.
     pub reason: String,
     /// When it was queued.
     pub created_at: Timestamp,
-    /// How far it is, or what became of it.
+    /// Its progress or outcome.
     pub state: ProposalStateView,
     /// When it was applied or dropped; null before.
     pub settled_at: Option<Timestamp>,
-    /// What is played, in the order in which it was queued; absent in lists.
+    /// Its evaluations, in the order in which they were queued; absent in lists.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub evaluations: Vec<DraftView>,
-    /// What it would change, or how its agents compare; absent in lists, and unless all of it is played and nothing is
-    /// decided yet.
+    pub evaluations: Vec<ProposedEvaluationView>,
+    /// What applying it would change; for a trial, how its agents compare. Present only while all evaluations have
+    /// ended and it is neither applied nor dropped; absent in lists.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub outcome: Option<OutcomeView>,
 }
 
-/// What a proposal plays.
+/// Kind of a proposal.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum ProposalKindView {
-    /// What was active, on episodes of its own; it never counts.
+    /// Active submissions on episodes of their own; never counts.
     Trial,
-    /// One evaluation, on the same episodes.
+    /// One evaluation, repeated on the same episodes.
     Evaluation,
-    /// All of a day that counted, on the same episodes.
+    /// All evaluations of a day that count, repeated on the same episodes.
     Day,
-    /// The same by the stage's newest rules, for the board of these.
+    /// All evaluations of a day that count, repeated under the stage's newest rules, for the board of these.
     Rules,
 }
 
-/// How far a proposal is.
+/// State of a proposal.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum ProposalStateView {
-    /// Something of it waits or is under way.
+    /// Evaluations are pending or running.
     Playing,
-    /// All of it is over; the organiser applies or drops it.
+    /// All evaluations have ended; an organiser applies or drops the proposal.
     Played,
-    /// It counts.
+    /// Its evaluations count.
     Applied,
-    /// It never will.
+    /// Its evaluations never count.
     Dropped,
 }
 
-/// The boards before and after.
+/// Boards before and after a proposal is applied.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct OutcomeView {
-    /// Whose rank or score would be another, in the order of the new board; none of a trial.
+    /// Teams whose rank, tier, score or points change, in the order of the new board; empty for a trial.
     pub changes: Vec<ChangeView>,
-    /// As it is; null of a trial.
+    /// The current board; null for a trial.
     pub old_board: Option<BoardView>,
-    /// As it would be; of a trial, that of its results alone.
+    /// The board after the proposal is applied; for a trial, a board of its results only.
     pub new_board: BoardView,
 }
 
-/// What would change for a team.
+/// How a team's rank and score change.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct ChangeView {
-    /// Whose.
+    /// Name of the team.
     pub team: TeamName,
-    /// As the board is; null if it is not on it.
-    pub old: Option<StandingView>,
-    /// As it would be; null if it would not be on it.
-    pub new: Option<StandingView>,
+    /// On the current board; null if the team has no row.
+    pub old: Option<RankView>,
+    /// On the new board; null if the team has no row.
+    pub new: Option<RankView>,
 }
 
-/// Where a team stands on a board.
+/// Rank and score of a team.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
-pub struct StandingView {
+pub struct RankView {
     /// From 1.
     pub rank: u32,
-    /// Overall.
+    /// Overall tier.
     pub tier: Tier,
-    /// In percent.
+    /// Overall score in percent.
     pub score: f64,
-    /// Overall.
+    /// Overall penalty points.
     pub penalty_points: f64,
 }
 
-/// One evaluation that does not count.
+/// An evaluation of a trial or a proposal.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
-pub struct DraftView {
-    /// The evaluation that it becomes if it is applied.
+pub struct ProposedEvaluationView {
+    /// Id of the evaluation, which it keeps if it is applied.
     pub evaluation: EvaluationId,
-    /// Whose it is.
+    /// Id of the team.
     pub team: TeamId,
-    /// As the board shows it.
+    /// Name of the team.
     pub team_name: TeamName,
-    /// What plays.
+    /// The evaluated submission.
     pub submission: SubmissionId,
-    /// The evaluation that it plays again; null in a trial.
+    /// The evaluation that it repeats; null in a trial.
     pub replaces: Option<EvaluationId>,
-    /// How far it is.
+    /// Episodes done and in total.
     pub progress: Progress,
-    /// What has become of it.
+    /// Its state, with the result or the reason of its failure.
     #[serde(flatten)]
-    pub status: DraftStatus,
+    pub status: ProposedEvaluationStatus,
 }
 
-/// What has become of an evaluation that does not count.
+/// State of an evaluation that does not count.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(tag = "state", rename_all = "snake_case")]
-pub enum DraftStatus {
-    /// It waits behind what counts.
+pub enum ProposedEvaluationStatus {
+    /// Waiting behind evaluations that count.
     Queued,
-    /// Episodes are being played.
+    /// Episodes are running.
     Running,
     /// The score is being computed.
     Finalising,
     /// It has a score.
     Finished {
-        /// When.
+        /// When the score was stored.
         finished_at: Timestamp,
-        /// All of it.
+        /// The complete result.
         result: Box<ResultView>,
-        /// Path of the recorded dataset on this server, for organisers alone until it is applied; absent once it is
+        /// Path of the recorded dataset on this server, for organisers only until it is applied; absent once it is
         /// dropped.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         dataset: Option<String>,
-        /// BLAKE3 of its archive, 64 hexadecimal digits; likewise.
+        /// BLAKE3 hash of the dataset file, 64 hexadecimal digits; absent once it is dropped.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         dataset_blake3: Option<String>,
     },
-    /// The agent broke the protocol or a limit too often: applied, it has no score.
+    /// The agent violated the protocol or exceeded a limit too often. If it is applied, the team has no score.
     AgentFailed {
-        /// When.
+        /// When the last fault was stored.
         finished_at: Timestamp,
-        /// What the agent did.
+        /// The agent's faults.
         faults: Vec<FaultView>,
     },
-    /// Our fault: applied, it changes nothing.
+    /// A platform fault. If it is applied, the earlier result stays.
     PlatformFailed {
-        /// When.
+        /// When the evaluation was given up.
         finished_at: Timestamp,
         /// What failed.
         reason: String,
     },
-    /// It was dropped before its end.
+    /// Its proposal was dropped before it ended.
     Cancelled {
-        /// When.
+        /// When it was cancelled.
         finished_at: Timestamp,
     },
 }

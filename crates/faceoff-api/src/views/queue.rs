@@ -1,17 +1,18 @@
-//! Where something stands in the queue.
+//! Positions in the queue.
 
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-/// Where something that waits, or is under way, stands among all of its sort.
+/// Position of a pending or running evaluation or validation run in the queue. Evaluations and validation runs are
+/// counted separately.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 pub struct QueueView {
-    /// From 1: the how manieth to be over, if nothing is added; smoke runs and evaluations each for themselves.
+    /// Position in the expected order of completion, from 1, if nothing is added.
     pub place: u32,
-    /// Of how many that are not over.
+    /// Number of evaluations, or of validation runs, that have not ended.
     pub of: u32,
-    /// When it will be over, by what such work took in the last seven days; null while the queue is paused, and
-    /// where something that comes before it was never measured.
+    /// Expected time of completion, from durations of the last seven days; null while the queue is paused, and if there
+    /// are no measurements for an earlier position.
     pub expected_at: Option<Timestamp>,
 }

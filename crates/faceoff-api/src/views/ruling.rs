@@ -1,14 +1,14 @@
-//! What the organiser has decided, and why.
+//! Decisions of organisers.
 
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-/// A decision against a result or a team.
+/// An organiser's decision about a result, a team or the queue.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 pub struct RulingView {
-    /// When.
+    /// When it was made.
     pub at: Timestamp,
-    /// The organiser's words.
+    /// The organiser's reason.
     pub reason: String,
 }

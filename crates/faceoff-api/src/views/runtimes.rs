@@ -1,4 +1,4 @@
-//! What agents find on this server: runtimes with their packages, and limits, contest by contest.
+//! Runtimes and resource limits of agents, for the server and for each stage and tournament.
 
 use crate::views::stage::PhaseView;
 use faceoff_types::{
@@ -7,64 +7,64 @@ use faceoff_types::{
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-/// What agents run on here.
+/// Runtimes and resource limits of agents on this server.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct RuntimesView {
-    /// The ruleset of what is played now.
+    /// The ruleset of current evaluations.
     #[schema(example = "airhockey-2023.3")]
     pub ruleset: String,
-    /// What `agent.toml` may name, with what was found in each when the server started; empty in an archive.
+    /// The runtimes that `agent.toml` can name, with the packages found at the server's start; empty in an archive.
     pub runtimes: Vec<RuntimeInventory>,
-    /// Whose CPUs agents use.
+    /// CPUs of the machines that run agents.
     pub machine: AgentMachine,
-    /// There is none: agents see no device.
+    /// Agents have no GPU.
     #[schema(example = "none")]
     pub gpu: Absent,
-    /// There is none but an empty loopback interface.
+    /// Agents have no network, only an empty loopback interface.
     #[schema(example = "none")]
     pub network: Absent,
-    /// What agents are held to by the server's configuration; where a contest has limits of its own, those count.
+    /// Resource limits from the server's configuration. A stage or tournament may override them.
     pub limits: AgentLimits,
-    /// The stages that are not over, the first to open first.
-    pub stages: Vec<StageOffer>,
-    /// The tournaments that are not closed, the first one first.
-    pub tournaments: Vec<TournamentOffer>,
+    /// Stages that have not ended, in order of their opening.
+    pub stages: Vec<StageResources>,
+    /// Tournaments that are not closed, in order of creation.
+    pub tournaments: Vec<TournamentResources>,
 }
 
-/// Agents have none of it.
+/// Agents do not have this resource.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Absent {
-    /// None.
+    /// Not available.
     None,
 }
 
-/// What agents of a stage have and are held to.
+/// Runtimes and resource limits of agents in a stage.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
-pub struct StageOffer {
-    /// Which.
+pub struct StageResources {
+    /// Id of the stage.
     pub id: StageId,
-    /// As the organiser named it.
+    /// Name of the stage.
     pub name: StageName,
-    /// Where it is now.
+    /// The stage's phase.
     pub phase: PhaseView,
-    /// Of the runtimes those that it takes.
+    /// Names of the runtimes that the stage accepts.
     pub runtimes: Vec<String>,
-    /// All of them, its own and the server's.
+    /// All limits: the stage's own, and the server's for the rest.
     pub limits: AgentLimits,
 }
 
-/// What agents of a tournament have and are held to.
+/// Runtimes and resource limits of agents in a tournament.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
-pub struct TournamentOffer {
-    /// Which.
+pub struct TournamentResources {
+    /// Id of the tournament.
     pub id: TournamentId,
-    /// As the organiser named it.
+    /// Name of the tournament.
     pub name: StageName,
-    /// Of the runtimes those that it takes.
+    /// Names of the runtimes that the tournament accepts.
     pub runtimes: Vec<String>,
-    /// All of them, its own and the server's.
+    /// All limits: the tournament's own, and the server's for the rest.
     pub limits: AgentLimits,
-    /// Of each side of a game, besides.
+    /// Further limits of each side of a game.
     pub game_limits: GameLimits,
 }

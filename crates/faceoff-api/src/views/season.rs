@@ -1,73 +1,74 @@
-//! The season's commitment, and what may be known of its seeds.
+//! The season: its commitment, stages and days, and the seeds that are revealed.
 
-use crate::views::{archived::ArchivedView, day::NextCut, ruling::RulingView, stage::StageView};
+use crate::views::{archive::ArchiveView, day::NextCutoff, ruling::RulingView, stage::StageView};
 use faceoff_types::{DivisionName, Seed, StageId};
 use jiff::{Timestamp, civil::Date};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-/// What everybody may know of the season.
+/// The season, as far as it is public.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct SeasonView {
-    /// As the organiser named it.
+    /// Name of the season.
     pub name: String,
-    /// The rules that all scores refer to.
+    /// The ruleset of all scores.
     #[schema(example = "airhockey-2023.3")]
     pub ruleset: String,
-    /// BLAKE3 of the season secret, 64 hexadecimal digits. All seeds derive from the secret, so that
-    /// nobody can change them after the commitment is known.
+    /// BLAKE3 hash of the season secret, 64 hexadecimal digits. All seeds derive from the secret, so they cannot be
+    /// changed once the commitment is public.
     pub commitment: String,
     /// When the secret was drawn and the season began.
     pub created_at: Timestamp,
-    /// When it was closed; null while it runs.
+    /// When the season was closed; null while it is running.
     pub closed_at: Option<Timestamp>,
-    /// The organiser holds the queue: since when, and why; absent otherwise. Nothing is begun meanwhile.
+    /// If an organiser paused the queue: since when, and why. No job starts meanwhile. Absent otherwise.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub paused: Option<RulingView>,
-    /// It stands still, as an archive has it; absent of a season that runs.
+    /// If the server shows an archive: when it was made; absent for a running season.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub archived: Option<ArchivedView>,
-    /// May anybody register a team?
+    pub archived: Option<ArchiveView>,
+    /// Whether teams can register.
     #[serde(default)]
     pub takes_registrations: bool,
-    /// That teams can be in.
+    /// Names of the divisions.
     #[serde(default)]
     pub divisions: Vec<DivisionName>,
-    /// The newest version of the terms; null: there are none.
+    /// The newest version of the terms; null without terms.
     #[serde(default)]
     pub terms_version: Option<u32>,
     /// The season secret, 64 hexadecimal digits; null until the season is closed.
     pub secret: Option<Seed>,
     /// The seed of the season's model mismatch; null until the season is closed.
     pub mismatch_seed: Option<Seed>,
-    /// The current date, in the zone of the stage that is open.
+    /// The current date in the time zone of the open stage.
     pub today: Date,
-    /// Its parts, the first to open first.
+    /// The stages, in order of their opening.
     pub stages: Vec<StageView>,
-    /// When the next day starts, with what each team has active then; null if none does.
-    pub next_cut: Option<NextCut>,
-    /// The days that had their cut, the newest first.
+    /// The next cutoff; null if there is none.
+    pub next_cut: Option<NextCutoff>,
+    /// The evaluation days whose cutoff has passed, newest first.
     pub days: Vec<SeasonDay>,
 }
 
-/// A day of the season.
+/// An evaluation day of the season.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct SeasonDay {
-    /// Whose day.
+    /// The day's stage.
     pub stage: StageId,
-    /// Its date in the stage's zone.
+    /// The evaluation day, a date in the stage's time zone.
     pub day: Date,
-    /// When it started; what each team had active then plays it.
+    /// The cutoff: each team's active submission of this moment is evaluated.
     pub cut_at: Timestamp,
-    /// What is not played by then is ended, and the day released; null: however long it takes.
+    /// When evaluations that are not finished are ended, and the day is released; null: no deadline.
     pub deadline_at: Option<Timestamp>,
-    /// When its last evaluation had ended and all of it came out; null before.
+    /// When the day was released, after its last evaluation; null before.
     pub released_at: Option<Timestamp>,
-    /// It was missed on its date and played later, and why; absent otherwise.
+    /// If the day was missed on its date and started later: the reason; absent otherwise.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub missed: Option<String>,
-    /// Its finished evaluations.
+    /// Number of finished evaluations.
     pub finished: u32,
-    /// The seed of its evaluations; null until it is released, and while its stage is blind: scores follow from it.
+    /// The seed of the day's evaluations; null until the day is released, and while its stage is blind, as it reveals
+    /// scores.
     pub seed: Option<Seed>,
 }

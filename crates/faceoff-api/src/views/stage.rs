@@ -1,6 +1,6 @@
-//! A stage: when it is open, by which rules it is played, and when its next day starts.
+//! Stages: opening times, rules and the next cutoff.
 
-use crate::views::{capacity::DayLoad, day::NextCut, finalised::FinalisedView, ruling::RulingView};
+use crate::views::{capacity::DayLoad, day::NextCutoff, sign_off::SignOffView, ruling::RulingView};
 use faceoff_types::{Retention, StageId, StageName, StageRules, StageSettings, Zone};
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
@@ -9,66 +9,66 @@ use utoipa::ToSchema;
 /// A part of the season with its own days, rules and board.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct StageView {
-    /// Names the stage in paths, and enters the seeds of its days.
+    /// Id of the stage; the seeds of its days derive from it.
     pub id: StageId,
-    /// As the organiser named it.
+    /// Name of the stage.
     pub name: StageName,
-    /// Where it is now.
+    /// The current phase.
     pub phase: PhaseView,
-    /// From then on its days start, and its rules are fixed.
+    /// When the stage opens: its days may start, and its rules are fixed.
     pub opens_at: Timestamp,
-    /// From then on none of its days starts; null: it has no end yet.
+    /// When the stage closes: no further day starts; null: no end.
     pub closes_at: Option<Timestamp>,
-    /// Its days are dates there, and its schedule is of its clocks.
+    /// Time zone of its days and its schedule.
     pub zone: Zone,
-    /// When its next day starts; null if none does.
-    pub next_cut: Option<NextCut>,
-    /// Its boards show what they showed then: since when, and why; absent otherwise.
+    /// The stage's next cutoff; null if there is none.
+    pub next_cut: Option<NextCutoff>,
+    /// If its boards are frozen: since when, and why; absent otherwise.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub frozen: Option<RulingView>,
-    /// Do the seeds of its days follow from its id? Not of a season's first stage, if that began before there were
-    /// stages.
+    /// Whether the seeds of its days derive from its id. False only for the first stage of a season that began with an
+    /// older version.
     pub names_seeds: bool,
-    /// Does it take rules and settings from the server's configuration, at each start?
+    /// Whether its rules and settings are read from the server's configuration at each start.
     pub configured: bool,
-    /// Its result is signed off, if it is: nothing of it changes any more. Null: its result is provisional.
-    pub finalised: Option<FinalisedView>,
-    /// What is kept of its datasets and of the archives of what has played it; `{}`: everything.
+    /// When and by whom its result was signed off; the stage is final then. Null while its result is provisional.
+    pub finalised: Option<SignOffView>,
+    /// Which of its datasets and bundles are kept; `{}`: all.
     #[serde(default)]
     pub retention: Retention,
-    /// What no score depends on.
+    /// Settings that do not affect scores.
     #[serde(flatten)]
     pub settings: StageSettings,
-    /// What scores depend on, as they are now.
+    /// The current rules, which affect scores.
     #[serde(flatten)]
     pub rules: RevisionView,
-    /// All rules that it has had, the first ones first. A board shows results of one revision.
+    /// All revisions of its rules, oldest first. A board shows results of one revision.
     pub revisions: Vec<RevisionView>,
-    /// Do its days fit: those under way and the next one. For organisers, absent for everybody else.
+    /// Capacity forecast of its running days and the next one; for organisers only, absent otherwise.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub capacity: Option<Vec<DayLoad>>,
 }
 
-/// Where a stage is.
+/// Phase of a stage.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum PhaseView {
-    /// It opens later.
+    /// It has not opened yet.
     Upcoming,
     /// Its days start.
     Open,
-    /// It is over.
+    /// It has closed.
     Closed,
 }
 
-/// Rules from one time on.
+/// A revision of a stage's rules.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct RevisionView {
     /// From 1.
     pub revision: u32,
-    /// When they became the stage's.
+    /// When it took effect.
     pub since: Timestamp,
-    /// Themselves.
+    /// The rules.
     #[serde(flatten)]
     pub rules: StageRules,
 }

@@ -1,29 +1,29 @@
-//! How much room a team's files take, and how much of that counts towards its quota.
+//! Disk usage and quota of teams.
 
 use faceoff_types::{TeamId, TeamName};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-/// The room that the files of a team take.
+/// Disk usage of a team's files.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 pub struct StorageView {
-    /// Whose.
+    /// Id of the team.
     pub team: TeamId,
-    /// Its name.
+    /// Name of the team.
     pub team_name: TeamName,
-    /// Archives of submissions that are kept.
+    /// Number of stored bundles.
     pub archives: u32,
-    /// Of these; what counts towards the quota.
+    /// Bytes of stored bundles, which count towards the quota.
     pub archive_bytes: u64,
-    /// How much the archives may have, by the stage that matters now or the server's configuration.
+    /// Quota of stored bundles in bytes, from the current stage or the server's configuration.
     pub quota_bytes: u64,
-    /// Datasets of evaluations that are kept; for the team, of released days and of no blind stage.
+    /// Number of stored datasets; for the team, only of released days and of stages that are not blind.
     pub datasets: u32,
-    /// Of these, as far as they were measured.
+    /// Bytes of these datasets, as far as they are measured.
     pub dataset_bytes: u64,
-    /// Datasets among them that nobody has measured yet; the server does, within minutes.
+    /// Number of these datasets whose size is not measured yet; the server measures them within minutes.
     pub unmeasured_datasets: u32,
-    /// Datasets of trials and proposals; for the organiser alone, absent otherwise.
+    /// Bytes of datasets of trials and proposals; for organisers only, absent otherwise.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub proposal_bytes: Option<u64>,
 }

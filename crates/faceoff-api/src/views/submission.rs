@@ -1,97 +1,97 @@
-//! An uploaded agent and its smoke run's verdict.
+//! Submissions and the verdicts of their validation runs.
 
-use crate::views::{not_taken::NotTakenView, queue::QueueView, ruling::RulingView};
-use faceoff_types::{SmokeTiming, SubmissionId, TeamId};
+use crate::views::{exclusion::StageExclusion, queue::QueueView, ruling::RulingView};
+use faceoff_types::{ValidationTiming, SubmissionId, TeamId};
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-/// One uploaded agent.
+/// A submission.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct SubmissionView {
-    /// Names the submission in paths.
+    /// Id of the submission.
     pub id: SubmissionId,
-    /// Who uploaded it.
+    /// Id of its team.
     pub team: TeamId,
-    /// Name of the archive.
+    /// File name of the bundle.
     pub file_name: String,
-    /// Size of the archive in bytes.
+    /// Size of the packed bundle in bytes.
     pub bytes: u64,
-    /// BLAKE3 of the archive, 64 hexadecimal digits.
+    /// BLAKE3 hash of the packed bundle, 64 hexadecimal digits.
     pub blake3: String,
     /// When the upload was complete.
     pub created_at: Timestamp,
-    /// The agent's own name, known once the bundle was unpacked.
+    /// Name of the agent, from its bundle; null until that is unpacked.
     pub agent_name: Option<String>,
-    /// The runtime that its `agent.toml` names; absent until that was read, and of what older versions have checked.
+    /// The runtime that its `agent.toml` names; absent until that is read, and for submissions of older versions.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub runtime: Option<String>,
-    /// The stages that are not over and do not take its runtime: it does not play there, and why; absent without one.
+    /// Stages that have not ended and exclude its runtime, and why; absent if there are none.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub not_taken: Vec<NotTakenView>,
-    /// How long its answers took in the smoke run, for each task that was played.
+    pub not_taken: Vec<StageExclusion>,
+    /// Computation times in the validation run, for each task.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub timing: Vec<SmokeTiming>,
-    /// Is it what its team enters at the next cut?
+    pub timing: Vec<ValidationTiming>,
+    /// Whether it is the team's active submission, which the next cutoff evaluates.
     pub active: bool,
-    /// When its team took it back: it enters no further day, unless it is chosen again; absent otherwise.
+    /// When the team withdrew it: it is not evaluated again unless the team activates it; absent otherwise.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub withdrawn_at: Option<Timestamp>,
-    /// What its team calls it; absent without one.
+    /// The team's name for it; absent without one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub label: Option<String>,
-    /// What its team writes about it; absent without it.
+    /// The team's notes; absent without one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub note: Option<String>,
-    /// The team's first submission of the same archive, if this is another; absent otherwise.
+    /// The team's first submission of an identical bundle; absent otherwise.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub same_as: Option<SubmissionId>,
-    /// Its archive was removed, if it was: when and why; nobody plays it any more. Absent otherwise.
+    /// If its bundle was removed: when, and why. It cannot be evaluated any more. Absent otherwise.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub archive_removed: Option<RulingView>,
-    /// Who has deleted it, and when; absent if nobody has.
+    /// If it was deleted: when, and by whom; absent otherwise.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub deleted: Option<DeletedView>,
-    /// Where its smoke run stands in the queue; absent once there is a verdict.
+    pub deleted: Option<DeletionView>,
+    /// Position of its validation run in the queue; absent once there is a verdict.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub queue: Option<QueueView>,
-    /// What happens next.
+    /// What happens next, in words.
     pub next: String,
-    /// The smoke run's verdict.
+    /// The verdict of its validation run.
     #[serde(flatten)]
     pub status: SubmissionStatus,
 }
 
-/// Who has had the archive of a submission removed.
+/// The deletion of a submission's bundle.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
-pub struct DeletedView {
-    /// When.
+pub struct DeletionView {
+    /// When it was deleted.
     pub at: Timestamp,
-    /// As the log has them: `team:ID`, `person:ID` or `organiser`.
+    /// Who deleted it, as the event log writes actors: `team:ID`, `person:ID` or `organiser`.
     pub by: String,
 }
 
-/// What has become of a submission.
+/// State of a submission.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(tag = "state", rename_all = "snake_case")]
 pub enum SubmissionStatus {
-    /// It waits for its smoke run, or is in it.
+    /// Its validation run is pending or running.
     Validating,
-    /// It starts, answers and keeps time: it can be evaluated.
+    /// It starts, answers and keeps the time limits: it can be evaluated.
     Valid {
         /// Last part of the agent's standard error; absent in lists.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         log: Option<String>,
     },
-    /// The bundle or the agent is at fault.
+    /// The bundle or the agent is faulty.
     Invalid {
-        /// What is wrong and where.
+        /// What is wrong, and where.
         reason: String,
         /// Last part of the agent's standard error; absent in lists.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         log: Option<String>,
     },
-    /// The smoke run failed by our fault, several times; upload it again.
+    /// The validation run failed several times by a platform fault; upload the bundle again.
     ValidationError {
         /// What failed.
         reason: String,
@@ -99,25 +99,27 @@ pub enum SubmissionStatus {
 }
 
 impl SubmissionStatus {
-    /// What happens to a submission next, by itself or by its team.
+    /// What happens next to a submission, automatically or by its team, in words.
     pub const fn next(&self, active: bool, withdrawn: bool) -> &'static str {
         match self {
             Self::Validating => {
-                "A smoke run checks whether it starts, answers and keeps time; if it is valid and the newest, it is \
-             active then, by itself."
+                "A validation run checks whether it starts, answers and keeps the time limits. If it is valid and the \
+             newest submission, it is activated automatically."
             }
             Self::Valid { .. } if active => {
-                "It plays at the next cut, unless a later upload turns valid or another one is chosen before."
+                "It is evaluated at the next cutoff, unless a newer submission becomes valid or the team activates \
+             another one before."
             }
             Self::Valid { .. } if withdrawn => {
-                "It plays no further day, unless it is chosen again; a day that had its cut goes on."
+                "It is not evaluated again, unless the team activates it. An evaluation whose cutoff has passed continues."
             }
-            Self::Valid { .. } => "It plays no further day, unless it is chosen.",
+            Self::Valid { .. } => "Not in use: it is evaluated only if the team activates it.",
             Self::Invalid { .. } => {
-                "It plays nothing: its bundle is removed. Correct what the reason names, and upload another."
+                "Rejected, and its bundle was deleted. Fix the error in the reason and upload again."
             }
             Self::ValidationError { .. } => {
-                "It plays nothing, by our fault: upload it again, which costs no place in the queue of pending uploads."
+                "The check failed by a platform fault. Upload the bundle again; this one does not count as a pending \
+             submission."
             }
         }
     }
@@ -129,27 +131,27 @@ mod tests {
     use std::collections::BTreeSet;
 
     #[test]
-    fn every_state_of_a_submission_says_what_happens_next() {
+    fn next_step_is_described_for_each_submission_state() {
         let reason = || "a reason".to_owned();
         let states = [
-            (SubmissionStatus::Validating, false, false, "smoke run"),
+            (SubmissionStatus::Validating, false, false, "validation run"),
             (
                 SubmissionStatus::Valid { log: None },
                 true,
                 false,
-                "next cut",
+                "next cutoff",
             ),
             (
                 SubmissionStatus::Valid { log: None },
                 false,
                 true,
-                "chosen again",
+                "not evaluated again",
             ),
             (
                 SubmissionStatus::Valid { log: None },
                 false,
                 false,
-                "unless it is chosen.",
+                "Not in use",
             ),
             (
                 SubmissionStatus::Invalid {
@@ -158,13 +160,13 @@ mod tests {
                 },
                 false,
                 false,
-                "upload another",
+                "upload again",
             ),
             (
                 SubmissionStatus::ValidationError { reason: reason() },
                 false,
                 false,
-                "our fault",
+                "platform fault",
             ),
         ];
         let mut texts = BTreeSet::new();
@@ -173,6 +175,6 @@ mod tests {
             assert!(text.contains(words), "{words} is not in {text}");
             texts.insert(text);
         }
-        assert_eq!(texts.len(), states.len(), "no two say the same");
+        assert_eq!(texts.len(), states.len(), "each text is unique");
     }
 }

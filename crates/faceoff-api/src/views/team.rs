@@ -1,4 +1,4 @@
-//! Teams, and their tokens as they are handed out.
+//! Teams, and their first tokens.
 
 use crate::views::ruling::RulingView;
 use faceoff_types::{DivisionName, TeamId, TeamName};
@@ -9,43 +9,43 @@ use utoipa::ToSchema;
 /// A team.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct TeamView {
-    /// Names the team in paths; a name may hold spaces.
+    /// Id of the team.
     pub id: TeamId,
-    /// As the board shows it.
+    /// Name of the team; may contain spaces.
     #[schema(example = "AiRLIHockey")]
     pub name: TeamName,
-    /// When it came.
+    /// When the team was created.
     pub created_at: Timestamp,
-    /// It neither plays nor is ranked, if it is; absent otherwise.
+    /// If the team is disqualified, and neither evaluated nor ranked: since when, and why; absent otherwise.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub disqualified: Option<RulingView>,
-    /// Where it is from; null: it does not say.
+    /// The team's institution or company; null if not given.
     #[serde(default)]
     pub affiliation: Option<String>,
-    /// Its page; null: none.
+    /// The team's web page; null if not given.
     #[serde(default)]
     pub link: Option<String>,
-    /// The division that it is in; null: none.
+    /// The team's division; null without one.
     #[serde(default)]
     pub division: Option<DivisionName>,
-    /// Since when it plays no more, by its own wish; null: it plays.
+    /// When the team retired; null while it takes part.
     #[serde(default)]
     pub retired_at: Option<Timestamp>,
-    /// It is a reference agent of the organisers: boards show it apart and do not rank it; absent otherwise.
+    /// True if the team is a reference agent of the organisers, which boards show unranked; absent otherwise.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub baseline: bool,
-    /// Does it play no friendly games that other teams ask for? Told of a single team; absent in lists.
+    /// Whether the team declines friendly games that other teams ask for; absent in lists.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub declines_friendly_games: Option<bool>,
 }
 
-/// A team and its new token, which is shown this once.
+/// A team and its new token, which is shown only once.
 #[derive(Debug, Clone, Serialize, Deserialize, ToSchema)]
 pub struct TeamWithToken {
-    /// Whose token it is.
+    /// The team.
     #[serde(flatten)]
     pub team: TeamView,
-    /// The bearer token; only its hash is stored.
+    /// The bearer token; the server stores only its hash.
     #[schema(example = "fo_team_…")]
     pub token: String,
 }

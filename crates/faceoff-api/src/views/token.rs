@@ -1,43 +1,43 @@
-//! Tokens and sessions, without what would open anything.
+//! Tokens and sessions, without their secrets.
 
-use faceoff_types::{PersonId, TeamId, TokenId};
+use faceoff_types::{UserId, TeamId, TokenId};
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-/// A token, or the session of a browser.
+/// An API token, or a browser's session.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct TokenView {
-    /// Names it; tells nothing of the token.
+    /// Id of the token; does not reveal its secret.
     pub id: TokenId,
-    /// What its owner calls it.
+    /// The owner's name for it.
     pub name: String,
-    /// `key`, or `session` of a browser.
+    /// `key` for an API token, `session` for a browser's session.
     #[schema(example = "key")]
     pub kind: String,
-    /// Whose programs it is for, if it is a team's own.
+    /// The team that it acts for, if it is a team's token; absent otherwise.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub team: Option<TeamId>,
-    /// For whom it speaks, if it is a person's; without both it is the host's.
+    /// The user that it acts for, if it is a user's token. Without `team` and `person` it is the host's.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub person: Option<PersonId>,
-    /// When it was made.
+    pub person: Option<UserId>,
+    /// When it was created.
     pub created_at: Timestamp,
-    /// From then on it is worth nothing; null: it has no end.
+    /// When it expires; null: never.
     pub expires_at: Option<Timestamp>,
-    /// To the minute; null: never.
+    /// When it was last used, to the minute; null: never.
     pub last_used_at: Option<Timestamp>,
-    /// Since when it is worth nothing; null: it is good.
+    /// When it was revoked; null while it is valid.
     pub revoked_at: Option<Timestamp>,
 }
 
-/// A new token, which is shown this once.
+/// A new token, which is shown only once.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct NewTokenView {
-    /// What is stored of it.
+    /// The token's metadata.
     #[serde(flatten)]
     pub token: TokenView,
-    /// The bearer token; only its hash is stored.
+    /// The bearer token; the server stores only its hash.
     #[schema(example = "fo_person_…")]
     pub secret: String,
 }

@@ -1,161 +1,161 @@
-//! A tournament: its rules, who is in it, its rounds, its tables, and what comes next.
+//! Tournaments: rules, entrants, rounds and standings.
 
 use crate::views::ruling::RulingView;
 use faceoff_scoring::tournament::schedule::Table;
 use faceoff_types::{
-    LeftAs, RoundNumber, StageId, StageName, SubmissionId, TeamId, TeamName, TournamentId,
+    DepartureKind, RoundNumber, StageId, StageName, SubmissionId, TeamId, TeamName, TournamentId,
     TournamentRules, TournamentSettings,
 };
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-/// A tournament, as lists have it.
+/// A tournament, as in lists.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct TournamentHead {
-    /// Names the tournament in paths.
+    /// Id of the tournament.
     pub id: TournamentId,
-    /// In its season, from 1; its seeds follow from it.
+    /// Number in its season, from 1; the seeds derive from it.
     pub number: u32,
-    /// As the organiser named it.
+    /// Name of the tournament.
     pub name: StageName,
-    /// Where it is now.
+    /// The current phase.
     pub phase: TournamentPhase,
-    /// When the organiser opened it.
+    /// When it was created.
     pub created_at: Timestamp,
-    /// The stage whose tiers its first entrants come from; null: the organiser named them.
+    /// The stage that qualified its first entrants; null: an organiser named them.
     pub stage: Option<StageId>,
-    /// No game of it begins: since when, and why; null otherwise.
+    /// If it is paused and no game starts: since when, and why; null otherwise.
     pub paused: Option<RulingView>,
-    /// From then on nothing of it changes; null: it is not closed.
+    /// When it was closed and became final; null before.
     pub closed_at: Option<Timestamp>,
-    /// First of the deciding table, once all rounds are over; null before.
+    /// The first team of the deciding table, once all rounds are over; null before.
     pub champion: Option<TeamName>,
-    /// What comes next.
+    /// What happens next, in words.
     pub next: String,
 }
 
-/// Where a tournament is.
+/// Phase of a tournament.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum TournamentPhase {
-    /// No round was started: entrants and rules may change.
+    /// No round has started: entrants and rules may change.
     Open,
-    /// A game of a round has no result and can still get one.
+    /// A round is running: a game lacks a result that it can still get.
     Round,
-    /// All games of the rounds that were started have results, and there is another round.
+    /// All games of the started rounds have results; another round follows.
     Between,
     /// All rounds are over.
     Played,
-    /// The organiser has closed it.
+    /// An organiser has closed it.
     Closed,
 }
 
-/// A tournament with all that everybody may know of it but its games.
+/// A tournament without its games.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct TournamentView {
-    /// As lists have it.
+    /// The fields that lists have.
     #[serde(flatten)]
     pub head: TournamentHead,
     /// What results depend on; fixed from the first round on.
     pub rules: TournamentRules,
-    /// What they do not depend on.
+    /// What results do not depend on.
     pub settings: TournamentSettings,
-    /// The organisers' agent, against which teams may test theirs; null: none.
+    /// The organisers' submission that is the opponent of test games; null: none.
     pub baseline: Option<SubmissionId>,
-    /// Its teams, by name, those that left included.
+    /// The entrants by name, including those that left.
     pub entrants: Vec<EntrantView>,
-    /// Those that were started, in order.
+    /// The started rounds, in order.
     pub rounds: Vec<RoundView>,
-    /// The standings, the deciding ones first: one table, or the final's and each group's.
+    /// The standings, the deciding table first: one table, or the final's and each group's.
     pub tables: Vec<Table>,
 }
 
-/// A team of a tournament.
+/// A team in a tournament.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 pub struct EntrantView {
-    /// Which.
+    /// Id of the team.
     pub team: TeamId,
-    /// As it is called now.
+    /// The team's current name.
     pub team_name: TeamName,
-    /// Since when it is in it.
+    /// When it entered.
     pub entered_at: Timestamp,
-    /// It plays no more in it; absent otherwise.
+    /// If it left: when, how, and why; absent otherwise.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub left: Option<LeaveView>,
+    pub left: Option<DepartureView>,
 }
 
-/// A team left.
+/// A team's departure from a tournament.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
-pub struct LeaveView {
-    /// How.
-    pub r#as: LeftAs,
-    /// The first round whose games with it do not count.
+pub struct DepartureView {
+    /// Whether it withdrew or was disqualified.
+    pub r#as: DepartureKind,
+    /// The first round whose games against it do not count.
     #[schema(value_type = u32, minimum = 1, maximum = 100)]
     pub from_round: RoundNumber,
-    /// When.
+    /// When it left.
     pub at: Timestamp,
-    /// As everybody may read it.
+    /// The public reason.
     pub reason: String,
 }
 
-/// A round, as it was drawn.
+/// A round with its draw.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 pub struct RoundView {
     /// From 1.
     #[schema(value_type = u32, minimum = 1, maximum = 100)]
     pub number: RoundNumber,
-    /// From then on its submissions are fixed.
+    /// When it started; its submissions are fixed since then.
     pub started_at: Timestamp,
-    /// When the last of its games had ended for the first time; null before.
+    /// When the last of its games ended for the first time; null before.
     pub over_at: Option<Timestamp>,
-    /// Games that can be played side by side, one after another.
+    /// Number of matchdays. The games of a matchday can run in parallel.
     pub matchdays: u32,
-    /// How far it is.
+    /// Number of its games in each state.
     pub progress: RoundProgress,
-    /// Who plays in which group; empty without groups.
+    /// Teams of each group; empty without groups.
     pub groups: Vec<Vec<TeamName>>,
-    /// Who has nobody to play, in the order of play.
+    /// Byes in order of the matchdays.
     pub byes: Vec<ByeView>,
-    /// What each team plays with.
+    /// The submission of each team.
     pub submissions: Vec<RoundSubmission>,
 }
 
-/// Of a round's games, how many stand how.
+/// Number of a round's games in each state.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 pub struct RoundProgress {
-    /// All of them.
+    /// All games.
     pub games: u32,
-    /// That have a result.
+    /// Games with a result.
     pub played: u32,
-    /// That a slot plays.
+    /// Running games.
     pub running: u32,
-    /// That wait for a slot.
+    /// Games that wait for a slot.
     pub queued: u32,
-    /// That wait for the organiser: void, or broken by us, to be played again.
+    /// Games that an organiser has to rerun: void, or given up after a platform fault.
     pub to_be_rerun: u32,
-    /// That are not played, since a side left.
+    /// Games that are not played, because a team left.
     pub cancelled: u32,
 }
 
-/// A team that has nobody to play on a matchday.
+/// A team without an opponent on a matchday.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 pub struct ByeView {
     /// From 1.
     pub matchday: u32,
-    /// Which.
+    /// Id of the team.
     pub team: TeamId,
-    /// As it is called now.
+    /// The team's current name.
     pub team_name: TeamName,
 }
 
-/// What a team plays a round with.
+/// A team's submission for a round.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 pub struct RoundSubmission {
-    /// Which team.
+    /// Id of the team.
     pub team: TeamId,
-    /// As it is called now.
+    /// The team's current name.
     pub team_name: TeamName,
-    /// What it had active when the round was started.
+    /// The submission that was active when the round started.
     pub submission: SubmissionId,
 }

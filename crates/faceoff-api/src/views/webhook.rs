@@ -1,116 +1,116 @@
-//! Webhooks, without what signs, and what came of their deliveries.
+//! Webhooks, without their secrets, and their deliveries.
 
 use faceoff_types::{DeliveryId, TeamId, WebhookId};
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-/// An address that is told of what happens.
+/// A webhook: an address to which events are delivered.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct WebhookView {
-    /// Names it.
+    /// Id of the webhook.
     pub id: WebhookId,
-    /// Whose; absent: the organisers'.
+    /// The team that owns it; absent for the organisers' webhooks.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub team: Option<TeamId>,
-    /// What its owner calls it.
+    /// The owner's name for it.
     pub name: String,
-    /// Where it is.
+    /// Address that receives the deliveries.
     pub url: String,
-    /// What it is told of; empty: everything that its owner may know of.
+    /// Filters of the delivered events; empty: all events that the owner may see.
     pub about: Vec<String>,
-    /// When it was made.
+    /// When it was created.
     pub created_at: Timestamp,
-    /// Until when the secret before this one signs, too; absent: no other does.
+    /// Until when the previous secret also signs deliveries; absent after that.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub old_secret_until: Option<Timestamp>,
-    /// Does it take what it is told?
+    /// Whether the receiver accepts deliveries.
     #[serde(flatten)]
     pub state: WebhookState,
 }
 
-/// How a webhook stands.
+/// State of a webhook.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(tag = "state", rename_all = "snake_case")]
 pub enum WebhookState {
-    /// It took what it was told last, or was told nothing yet.
+    /// The last delivery succeeded, or there was none yet.
     Alive,
-    /// It has taken nothing since then; what it was told is sent again.
+    /// Deliveries have failed since then and are retried.
     Failing {
-        /// Since when.
+        /// Time of the first failure.
         since: Timestamp,
     },
-    /// It is told nothing any more, until it is changed to be alive.
+    /// Deliveries have stopped until the owner reactivates the webhook.
     Dead {
-        /// Since when.
+        /// When deliveries stopped.
         since: Timestamp,
-        /// Why.
+        /// Why they stopped.
         reason: String,
     },
 }
 
-/// A webhook with its secret, which is shown this once.
+/// A webhook with its secret, which is shown only once.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct NewWebhookView {
-    /// What can be read of it later.
+    /// The webhook.
     #[serde(flatten)]
     pub webhook: WebhookView,
-    /// With what the receiver checks signatures, by the Standard Webhooks.
+    /// Secret with which the receiver verifies signatures, as Standard Webhooks defines them.
     #[schema(example = "whsec_…")]
     pub secret: String,
 }
 
-/// One thing told to a webhook.
+/// A delivery to a webhook.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct DeliveryView {
-    /// As the receiver reads it in the header `webhook-id`, however often it is sent.
+    /// Value of the header `webhook-id`, the same in every attempt.
     pub id: DeliveryId,
-    /// The id of the event; absent: a test.
+    /// Id of the event; absent for a test delivery.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub event: Option<i64>,
-    /// What happened, by name; `test`, if nothing has.
+    /// Kind of the event; `test` for a test delivery.
     #[schema(example = "day_released")]
     pub kind: String,
-    /// When it was noted.
+    /// When the delivery was created.
     pub created_at: Timestamp,
-    /// So often it was sent.
+    /// Number of attempts so far.
     pub attempts: u32,
-    /// What came of the last time; absent before the first.
+    /// The last attempt; absent before the first.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub last: Option<AttemptView>,
-    /// How it stands.
+    pub last: Option<DeliveryAttemptView>,
+    /// State of the delivery.
     #[serde(flatten)]
     pub state: DeliveryStateView,
 }
 
-/// What came of sending something.
+/// An attempt to deliver an event.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
-pub struct AttemptView {
-    /// When.
+pub struct DeliveryAttemptView {
+    /// When it was made.
     pub at: Timestamp,
-    /// The status that was answered; null: there was no answer.
+    /// HTTP status of the response; null without a response.
     pub status: Option<u16>,
-    /// What was wrong; null: nothing.
+    /// What went wrong; null on success.
     pub error: Option<String>,
 }
 
-/// How something told to a webhook stands.
+/// State of a delivery.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(tag = "state", rename_all = "snake_case")]
 pub enum DeliveryStateView {
-    /// It is sent, again.
+    /// Waiting for the first or next attempt.
     Waiting {
-        /// When.
+        /// Time of the next attempt.
         next_at: Timestamp,
     },
-    /// It was taken.
+    /// The receiver accepted it.
     Delivered {
-        /// When.
+        /// When it was accepted.
         settled_at: Timestamp,
     },
-    /// It is not sent any more.
+    /// No further attempts are made.
     GivenUp {
-        /// Since when.
+        /// When it was given up.
         settled_at: Timestamp,
     },
 }

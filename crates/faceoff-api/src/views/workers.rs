@@ -1,4 +1,4 @@
-//! Who works for the server on other machines.
+//! Remote workers and their slots.
 
 use faceoff_types::{EvaluationId, GameId};
 use jiff::Timestamp;
@@ -6,104 +6,104 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 use uuid::Uuid;
 
-/// Who plays, and what keeps others from it.
+/// Remote workers, and problems that keep them from working.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 pub struct WorkersView {
-    /// Slots of the server itself that play; 0 if others do.
+    /// Slots of the server itself; 0 if only remote workers run jobs.
     pub own_slots: u32,
-    /// Slots elsewhere that can be given work now.
+    /// Slots of remote workers that can lease jobs now.
     pub remote_slots: u32,
-    /// Is work given to other machines?
+    /// Whether the server leases jobs to remote workers.
     pub is_given: bool,
-    /// What the server cannot do for other machines, and why; empty if nothing is missing.
+    /// Problems that keep remote workers from working; empty without problems.
     #[schema(example = json!([]))]
     pub troubles: Vec<String>,
-    /// What takes so long that it is worth a look; empty if nothing does.
+    /// Jobs that run for conspicuously long; empty without such jobs.
     #[serde(default)]
     #[schema(example = json!([]))]
     pub alarms: Vec<String>,
-    /// By name, as far as this process has heard of them.
+    /// By name; only workers that contacted this server process.
     pub workers: Vec<WorkerView>,
-    /// Of whom nothing is taken, by name.
+    /// Banned workers by name.
     pub bans: Vec<WorkerBanView>,
 }
 
-/// A worker of which nothing is taken.
+/// A banned worker; the server rejects its results.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 pub struct WorkerBanView {
-    /// What it is called.
+    /// Name of the worker.
     #[schema(example = "rack-1")]
     pub worker: String,
-    /// Since when.
+    /// When it was banned.
     pub at: Timestamp,
-    /// Why.
+    /// Why it was banned.
     pub reason: String,
-    /// Evaluations that count and of which it has played a part, the newest first, 100 at most: void what is not to be believed.
+    /// Evaluations that count and of which it ran a part, newest first, 100 at most. Void those that cannot be trusted.
     #[schema(example = json!([]))]
     pub evaluations: Vec<EvaluationId>,
-    /// Games that it has played and whose result counts, the newest first, 100 at most.
+    /// Games that it ran and whose result counts, newest first, 100 at most.
     #[schema(example = json!([]))]
     pub games: Vec<GameId>,
 }
 
-/// A worker on another machine.
+/// A remote worker.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 pub struct WorkerView {
-    /// What it is called.
+    /// Name of the worker.
     #[schema(example = "rack-1")]
     pub name: String,
-    /// The version of its program.
+    /// Version of its program.
     pub version: String,
-    /// Units that it works at at the same time.
+    /// Jobs that it runs in parallel.
     pub slots: u32,
-    /// What its owner calls it by beside its name.
+    /// Labels that its owner gave it.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     #[schema(example = json!(["lab 3"]))]
     pub labels: Vec<String>,
-    /// When the server heard of it first, since it was started.
+    /// First contact since this server process started.
     pub first_at: Timestamp,
-    /// When it did last.
+    /// Last contact.
     pub last_at: Timestamp,
-    /// How it stands.
+    /// Its state.
     pub state: WorkerState,
-    /// Why it gets no work; absent unless it is `refused`.
+    /// Why it is refused jobs; absent unless `state` is `refused`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub refused: Option<String>,
-    /// What its slots do.
-    pub busy: Vec<BusyView>,
+    /// Its slots that run a job.
+    pub busy: Vec<BusySlotView>,
 }
 
-/// How a worker stands.
+/// State of a worker.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum WorkerState {
-    /// A slot has something to do.
+    /// A slot runs a job.
     Working,
-    /// None has.
+    /// No slot runs a job.
     Idle,
-    /// It is not like the server, and gets no work.
+    /// It differs from the server, e.g. in version, and gets no jobs.
     Refused,
-    /// Nothing was heard of it for half a minute.
+    /// No contact for half a minute.
     Silent,
 }
 
-/// What a slot does.
+/// A slot that runs a job.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
-pub struct BusyView {
-    /// Which slot.
+pub struct BusySlotView {
+    /// Name of the slot.
     #[schema(example = "slot-0")]
     pub slot: String,
-    /// The unit of work, as the server's log names it.
+    /// Id of the job, as in the server's log.
     pub unit: Uuid,
-    /// What it is; absent if it was begun before the server was started.
+    /// Description of the job; absent if it started before this server process.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schema(example = "hit episodes 0 to 49")]
     pub what: Option<String>,
-    /// Since when.
+    /// When the job started.
     pub since: Timestamp,
-    /// It takes longer than an hour.
+    /// Whether the job has been running for more than an hour.
     pub is_long: bool,
-    /// What keeps it from handing in what came of it; absent if nothing does.
+    /// Why the slot cannot send its result; absent without a problem.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub trouble: Option<String>,
 }

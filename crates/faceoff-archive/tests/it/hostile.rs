@@ -1,20 +1,20 @@
-//! What somebody could send in place of an archive.
+//! Hostile and damaged archives.
 
 use super::*;
 use faceoff_archive::{ArchiveError, check, unpack};
 use std::{fs, io::Write};
 use tar::{EntryType, Header};
 
-/// One entry as it comes: its name is not looked at by the library.
-struct Raw {
+/// A tar entry without validation of its path.
+struct RawEntry {
     kind: EntryType,
     path: &'static str,
     link: &'static str,
     content: Vec<u8>,
 }
 
-fn file(path: &'static str, content: &[u8]) -> Raw {
-    Raw {
+fn file(path: &'static str, content: &[u8]) -> RawEntry {
+    RawEntry {
         kind: EntryType::Regular,
         path,
         link: "",
@@ -22,9 +22,9 @@ fn file(path: &'static str, content: &[u8]) -> Raw {
     }
 }
 
-fn packed(manifest: &[u8], entries: &[Raw]) -> Vec<u8> {
+fn pack(manifest: &[u8], entries: &[RawEntry]) -> Vec<u8> {
     let mut tar = tar::Builder::new(Vec::new());
-    let mut add = |raw: &Raw| {
+    let mut add = |raw: &RawEntry| {
         let mut header = Header::new_ustar();
         header.as_old_mut().name[..raw.path.len()].copy_from_slice(raw.path.as_bytes());
         header.as_old_mut().linkname[..raw.link.len()].copy_from_slice(raw.link.as_bytes());
@@ -43,9 +43,9 @@ fn json(manifest: &Manifest) -> Vec<u8> {
     serde_json::to_vec(manifest).unwrap()
 }
 
-/// Both ways of reading refuse it, with these words, and nothing lies outside of the folder afterwards.
+/// Asserts that `check` and `unpack` refuse the archive with these words and write nothing outside of the folder.
 #[track_caller]
-fn refused(archive: &[u8], words: &str) {
+fn assert_refused(archive: &[u8], words: &str) {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("hostile.tar.zst");
     fs::write(&file, archive).unwrap();
@@ -53,8 +53,8 @@ fn refused(archive: &[u8], words: &str) {
     fs::create_dir_all(&into).unwrap();
     for error in [check(&file).unwrap_err(), unpack(&file, &into).unwrap_err()] {
         assert!(!matches!(error, ArchiveError::Io(_)), "{error}");
-        let told = error.to_string();
-        assert!(told.contains(words), "{words:?} is not in {told:?}");
+        let message = error.to_string();
+        assert!(message.contains(words), "{words:?} is not in {message:?}");
     }
     let beside: Vec<_> = fs::read_dir(folder.path()).unwrap().collect();
     assert_eq!(beside.len(), 2, "{beside:?}");
@@ -62,19 +62,19 @@ fn refused(archive: &[u8], words: &str) {
 }
 
 #[test]
-fn paths_that_lead_elsewhere_are_refused() {
+fn path_outside_of_folder_is_refused() {
     for path in ["../out", "/tmp/out", "a/../../out", "results/./x", "a//b"] {
-        let named = json(&manifest(vec![entry(path, b"x")]));
-        refused(&packed(&named, &[file(path, b"x")]), "names the file");
+        let manifest_json = json(&manifest(vec![entry(path, b"x")]));
+        assert_refused(&pack(&manifest_json, &[file(path, b"x")]), "names the file");
     }
-    // The manifest is clean, the archive is not.
-    let clean = json(&manifest(vec![entry("out", b"x")]));
-    refused(&packed(&clean, &[file("../out", b"x")]), "does not name");
+    // The manifest is valid, the archive is not.
+    let valid = json(&manifest(vec![entry("out", b"x")]));
+    assert_refused(&pack(&valid, &[file("../out", b"x")]), "does not name");
 }
 
 #[test]
-fn only_files_are_taken() {
-    let named = json(&manifest(vec![entry("a", b""), entry("a/b", b"x")]));
+fn entries_other_than_files_are_refused() {
+    let manifest_json = json(&manifest(vec![entry("a", b""), entry("a/b", b"x")]));
     for (kind, words) in [
         (EntryType::Symlink, "is a link"),
         (EntryType::Link, "is a link"),
@@ -85,81 +85,81 @@ fn only_files_are_taken() {
         (EntryType::GNULongName, "is of an unknown kind"),
         (EntryType::XHeader, "is of an unknown kind"),
     ] {
-        let raw = Raw {
+        let raw = RawEntry {
             kind,
             path: "a",
             link: "/etc",
             content: Vec::new(),
         };
-        refused(&packed(&named, &[raw, file("a/b", b"x")]), words);
+        assert_refused(&pack(&manifest_json, &[raw, file("a/b", b"x")]), words);
     }
 }
 
 #[test]
-fn what_is_not_as_the_manifest_says_is_refused() {
-    let named = json(&manifest(vec![entry("a", b"one"), entry("b", b"two")]));
+fn difference_from_manifest_is_refused() {
+    let manifest_json = json(&manifest(vec![entry("a", b"one"), entry("b", b"two")]));
     let (a, b) = (|| file("a", b"one"), || file("b", b"two"));
-    refused(&packed(&named, &[a(), file("b", b"owt")]), "has the hash");
-    refused(&packed(&named, &[a(), file("b", b"more")]), "has 4 bytes");
-    refused(&packed(&named, &[a()]), "ends before 1 of its files, \"b\"");
-    refused(
-        &packed(&named, &[a(), b(), file("c", b"")]),
+    assert_refused(&pack(&manifest_json, &[a(), file("b", b"owt")]), "has the hash");
+    assert_refused(&pack(&manifest_json, &[a(), file("b", b"more")]), "has 4 bytes");
+    assert_refused(&pack(&manifest_json, &[a()]), "ends before 1 of its files, \"b\"");
+    assert_refused(
+        &pack(&manifest_json, &[a(), b(), file("c", b"")]),
         "does not name",
     );
-    refused(&packed(&named, &[a(), a(), b()]), "or a second time");
+    assert_refused(&pack(&manifest_json, &[a(), a(), b()]), "or contains it twice");
 
     let twice = json(&manifest(vec![entry("a", b"one"), entry("a", b"one")]));
-    refused(&packed(&twice, &[a()]), "twice");
+    assert_refused(&pack(&twice, &[a()]), "twice");
     let mut unhashed = manifest(vec![entry("a", b"one")]);
     unhashed.files[0].blake3 = "00".into();
-    refused(&packed(&json(&unhashed), &[a()]), "64 hexadecimal digits");
-    refused(&packed(b"{}", &[]), "missing field `format`");
-    refused(&packed(b"no JSON", &[]), "not the manifest");
+    assert_refused(&pack(&json(&unhashed), &[a()]), "64 hexadecimal digits");
+    assert_refused(&pack(b"{}", &[]), "missing field `format`");
+    assert_refused(&pack(b"no JSON", &[]), "not the manifest");
 }
 
 #[test]
-fn a_later_format_is_named() {
+fn later_format_is_reported() {
     let later = br#"{"format":2,"program":"faceoff 9.0.0","layout":"unheard of"}"#;
-    refused(&packed(later, &[]), "format 2 (made by \"faceoff 9.0.0\")");
+    assert_refused(&pack(later, &[]), "format 2 (made by \"faceoff 9.0.0\")");
 }
 
 #[test]
-fn an_archive_that_was_cut_off_is_refused_wherever_that_is() {
+fn truncated_or_damaged_archive_is_refused() {
     let folder = tempfile::tempdir().unwrap();
-    let (archive, _) = honest(folder.path());
+    let (archive, _) = valid_archive(folder.path());
     let whole = fs::read(&archive).unwrap();
-    for kept in [8, 100, whole.len() / 2, whole.len() - 5, whole.len() - 1] {
-        refused(&whole[..kept], "");
+    for length in [8, 100, whole.len() / 2, whole.len() - 5, whole.len() - 1] {
+        assert_refused(&whole[..length], "");
     }
-    refused(&[], "expected a .tar.zst");
-    refused(b"PK\x03\x04 a zip", "expected a .tar.zst");
-    let mut turned = whole.clone();
-    let middle = turned.len() / 2;
-    turned[middle] ^= 0x10;
-    refused(&turned, "");
+    assert_refused(&[], "expected a .tar.zst");
+    assert_refused(b"PK\x03\x04 a zip", "expected a .tar.zst");
+    let mut damaged = whole.clone();
+    let middle = damaged.len() / 2;
+    damaged[middle] ^= 0x10;
+    assert_refused(&damaged, "");
 }
 
 #[test]
-fn a_bomb_is_not_unpacked() {
-    // It says how large it is: what it is made of does not explain that.
+fn archive_bomb_is_not_unpacked() {
+    // Its manifest states a length that is impossible for the packed length.
     let zeros = vec![0; 1 << 20];
     let mut large = entry("zeros", &zeros);
     large.bytes = 1 << 40;
-    let named = json(&manifest(vec![large]));
-    refused(
-        &packed(&named, &[file("zeros", &zeros)]),
-        "does not explain",
+    let manifest_json = json(&manifest(vec![large]));
+    assert_refused(
+        &pack(&manifest_json, &[file("zeros", &zeros)]),
+        "too many for an archive",
     );
 
-    // It does not: it is read no further than it says.
-    let named = json(&manifest(vec![entry("a", b"x")]));
-    let mut behind = zstd::decode_all(packed(&named, &[file("a", b"x")]).as_slice()).unwrap();
-    behind.resize(behind.len() + (512 << 20), 0);
+    // Its data is longer than the manifest says: reading stops there.
+    let manifest_json = json(&manifest(vec![entry("a", b"x")]));
+    let mut tar = zstd::decode_all(pack(&manifest_json, &[file("a", b"x")]).as_slice()).unwrap();
+    tar.resize(tar.len() + (512 << 20), 0);
     let mut encoder = zstd::Encoder::new(Vec::new(), 1).unwrap();
-    encoder.write_all(&behind).unwrap();
-    refused(&encoder.finish().unwrap(), "longer than its manifest tells");
+    encoder.write_all(&tar).unwrap();
+    assert_refused(&encoder.finish().unwrap(), "longer than its manifest says");
 
-    // A manifest without end.
+    // The manifest is too long.
     let long = vec![b' '; (64 << 20) + 1];
-    refused(&packed(&long, &[]), "at most 67108864 are allowed");
+    assert_refused(&pack(&long, &[]), "at most 67108864 are allowed");
 }

@@ -1,7 +1,7 @@
-//! Archives as they are made, and as strangers make them.
+//! Valid and hostile archives.
 #![expect(
     clippy::unwrap_used,
-    reason = "helpers of tests fail as tests do: by panicking"
+    reason = "helpers of tests fail by panicking"
 )]
 
 mod hostile;
@@ -31,13 +31,13 @@ fn manifest(files: Vec<Entry>) -> Manifest {
     }
 }
 
-/// What an honest archive holds.
+/// Files of a valid archive.
 fn contents() -> Vec<(&'static str, Vec<u8>)> {
     vec![
         ("README.txt", b"read me\n".to_vec()),
         ("results/1-qualifying/board.json", b"{}".to_vec()),
         ("empty", Vec::new()),
-        // more than a piece, and no multiple of a block
+        // Longer than a buffer, and no multiple of a tar block.
         (
             "artifacts/datasets/a.zip",
             (0..700_001_u32).map(|n| (n % 251) as u8).collect(),
@@ -45,8 +45,8 @@ fn contents() -> Vec<(&'static str, Vec<u8>)> {
     ]
 }
 
-/// An archive of these files, as the program makes it.
-fn honest(folder: &Path) -> (PathBuf, Manifest) {
+/// Writes a valid archive of [`contents`].
+fn valid_archive(folder: &Path) -> (PathBuf, Manifest) {
     let contents = contents();
     let files = contents.iter().map(|(path, content)| entry(path, content));
     let manifest = manifest(files.collect());

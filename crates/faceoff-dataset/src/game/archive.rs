@@ -15,7 +15,7 @@ use crate::{
     simulator::simulator_id,
 };
 use faceoff_episode::FinishedGame;
-use faceoff_scoring::tournament::{GameScore, PlayedAs, score_game};
+use faceoff_scoring::tournament::{GameScore, GameSettings, score_game};
 use faceoff_types::{GameOutcome, Side};
 use faceoff_wire::{
     dataset::FileDigest,
@@ -56,8 +56,8 @@ pub struct GameArchives {
 }
 
 /// By what a game's score is told.
-pub(super) fn played_as(spec: &GameSpec, agents: &[String; 2]) -> PlayedAs {
-    PlayedAs {
+pub(super) fn played_as(spec: &GameSpec, agents: &[String; 2]) -> GameSettings {
+    GameSettings {
         ruleset: spec.ruleset,
         profile: spec.profile,
         perturbations: spec.perturbations.clone(),

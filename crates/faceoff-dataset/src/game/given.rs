@@ -8,8 +8,8 @@ use arrow_array::{
     cast::AsArray,
     types::{Float64Type, Int64Type},
 };
-use faceoff_episode::{Answered, Effect, Entry, Response, SideFault};
-use faceoff_types::{ACTION_LIMIT, AgentFault, AgentFaultKind, Contest, Interpolation, Side};
+use faceoff_episode::{AnswerTiming, Effect, RallyEntry, Response, SideFault};
+use faceoff_types::{ACTION_LIMIT, AgentFault, AgentFaultKind, AgentTask, Interpolation, Side};
 
 /// Where something is recorded.
 #[derive(Debug, Clone, Copy)]
@@ -42,7 +42,7 @@ impl Place {
 /// How one side got ready for a rally, and its fault in it.
 #[derive(Debug)]
 pub(super) struct GivenEntry {
-    pub entry: Entry,
+    pub entry: RallyEntry,
     /// Its fault at one of the rally's steps.
     pub later: Option<AgentFault>,
 }
@@ -62,7 +62,7 @@ impl GivenEntry {
             .transpose()
             .map_err(|error| at.differs("fault", error.to_string(), "a fault as JSON"))?;
         if let Some(fault) = &fault {
-            let its_own = fault.contest == Contest::Game { side };
+            let its_own = fault.agent_task == AgentTask::Game { side };
             let in_time = match (fault.episode, fault.step) {
                 (None, None) => true,
                 (Some(rally), _) => rally == at.rally,
@@ -107,11 +107,11 @@ impl GivenEntry {
                 let fault = fault.map(side_fault).ok_or_else(|| {
                     at.differs("fault", "nothing", "the fault by which it did not start")
                 })?;
-                (Entry::FailedToStart { startup_s, fault }, None)
+                (RallyEntry::StartFailed { startup_s, fault }, None)
             }
             (startup_s, Some(interpolation), Some(reset_s)) if started => match fault {
                 Some(fault) if fault.step.is_none() => {
-                    let entry = Entry::FailedToReset {
+                    let entry = RallyEntry::ResetFailed {
                         startup_s,
                         interpolation,
                         reset_s,
@@ -120,7 +120,7 @@ impl GivenEntry {
                     (entry, None)
                 }
                 later => {
-                    let entry = Entry::Plays {
+                    let entry = RallyEntry::Ready {
                         startup_s,
                         interpolation,
                         reset_s,
@@ -154,11 +154,11 @@ fn side_fault(fault: AgentFault) -> SideFault {
 pub(super) enum GivenResponse {
     Answer {
         action: Float64Array,
-        answered: Answered,
+        answered: AnswerTiming,
     },
     Fault {
         fault: SideFault,
-        answered: Answered,
+        answered: AnswerTiming,
     },
     Held,
 }
@@ -207,11 +207,11 @@ impl GivenResponse {
         match self {
             Self::Answer { action, answered } => Response::Answer {
                 action: action.values(),
-                answered: *answered,
+                timing: *answered,
             },
             Self::Fault { fault, answered } => Response::Fault {
                 fault: fault.clone(),
-                answered: *answered,
+                timing: *answered,
             },
             Self::Held => Response::Held,
         }
@@ -246,12 +246,12 @@ fn action(
     }
 }
 
-fn answered(steps: &RecordBatch, row: usize, at: Place) -> Result<Answered, Difference> {
+fn answered(steps: &RecordBatch, row: usize, at: Place) -> Result<AnswerTiming, Difference> {
     let [computation, host, cpu] = SIDE_TIMES;
     let needed = |name: &str| {
         time(steps, name, row, at)?.ok_or_else(|| at.differs(name, "nothing", "a time"))
     };
-    Ok(Answered {
+    Ok(AnswerTiming {
         computation_time_s: needed(computation)?,
         host_time_s: needed(host)?,
         cpu_time_s: time(steps, cpu, row, at)?,

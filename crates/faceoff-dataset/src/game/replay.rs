@@ -12,12 +12,12 @@ use crate::{
 };
 use arrow_array::{ArrayRef, RecordBatch};
 use arrow_schema::SchemaRef;
-use faceoff_episode::{Arena, FinishedGame, GameCourse, RecordError};
+use faceoff_episode::{Arena, FinishedGame, RunningGame, RecordError};
 use faceoff_types::{AgentFault, Interpolation, Side};
 
 /// A game being simulated again with what was recorded of it.
 pub(super) struct Replay {
-    course: GameCourse<GameRows>,
+    course: RunningGame<GameRows>,
     rallies: GameTable,
     entries: [GameTable; 2],
     motion: GameTable,
@@ -35,7 +35,7 @@ struct Given {
 impl Replay {
     pub fn open(recording: &GameRecording) -> Result<Self, DatasetError> {
         let spec = &recording.manifest().spec;
-        let arena = Arena::by(
+        let arena = Arena::with_ruleset(
             spec.ruleset,
             spec.profile,
             &spec.perturbations,
@@ -52,7 +52,7 @@ impl Replay {
             entries: [entries(Side::First)?, entries(Side::Second)?],
             motion: recording.table(MOTION_FILE, rows.motion.schema())?,
             steps: [steps(Side::First)?, steps(Side::Second)?],
-            course: GameCourse::begin(&arena, spec.steps, spec.limits.clone(), rows),
+            course: RunningGame::begin(&arena, spec.steps, spec.limits.clone(), rows),
         })
     }
 

@@ -123,7 +123,7 @@ impl EpisodeRows {
     }
 
     pub fn step(&mut self, row: &StepRow<'_>) {
-        self.digests.add(row.action, &row.answered);
+        self.digests.add(row.action, &row.timing);
         self.last_observation.clear();
         self.last_observation
             .extend_from_slice(row.next_observation);

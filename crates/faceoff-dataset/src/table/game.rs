@@ -13,7 +13,7 @@ use arrow_array::{
     },
 };
 use arrow_schema::{DataType, Field, Schema, SchemaRef};
-use faceoff_episode::{Entry, GameStepRow, RallyRow, RallyStart};
+use faceoff_episode::{RallyEntry, GameStepRow, RallyRow, RallyStart};
 use faceoff_types::{AgentFault, Side};
 use std::sync::Arc;
 
@@ -158,7 +158,7 @@ impl SideRows {
         }
         self.actions.append(side.action.is_some());
         self.effects.append_value(side.effect.as_str());
-        let answered = side.answered.as_ref();
+        let answered = side.timing.as_ref();
         let [computation, host, cpu] = &mut self.times;
         computation.append_option(answered.map(|a| nanoseconds(a.computation_time_s)));
         host.append_option(answered.map(|a| nanoseconds(a.host_time_s)));
@@ -304,13 +304,13 @@ impl EntryRows {
     pub fn begin(&mut self, start: &RallyStart<'_>) {
         let entry = &start.entries[self.side.index()];
         let (startup_s, reset_s) = match entry {
-            Entry::Plays {
+            RallyEntry::Ready {
                 startup_s, reset_s, ..
             }
-            | Entry::FailedToReset {
+            | RallyEntry::ResetFailed {
                 startup_s, reset_s, ..
             } => (*startup_s, Some(*reset_s)),
-            Entry::FailedToStart { startup_s, .. } => (Some(*startup_s), None),
+            RallyEntry::StartFailed { startup_s, .. } => (Some(*startup_s), None),
         };
         self.rallies.append_value(start.rally);
         self.startups.append_option(startup_s.map(nanoseconds));

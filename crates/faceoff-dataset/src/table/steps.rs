@@ -113,11 +113,11 @@ impl StepRows {
         self.actions.values().append_slice(row.action);
         self.actions.append(true);
         self.computation_times
-            .append_value(nanoseconds(row.answered.computation_time_s));
+            .append_value(nanoseconds(row.timing.computation_time_s));
         self.host_times
-            .append_value(nanoseconds(row.answered.host_time_s));
+            .append_value(nanoseconds(row.timing.host_time_s));
         self.cpu_times
-            .append_option(row.answered.cpu_time_s.map(nanoseconds));
+            .append_option(row.timing.cpu_time_s.map(nanoseconds));
         let rest = &mut self.rest;
         rest.put_state(row.state);
         let c = row.constraints;

@@ -6,7 +6,7 @@ use crate::{
 use arrow_array::RecordBatch;
 use faceoff_sim::EPISODE_STEPS;
 use faceoff_types::Task;
-use faceoff_wire::work::ShardSpec;
+use faceoff_wire::job::ShardSpec;
 use std::{collections::BTreeMap, path::Path};
 
 /// What is recorded of one episode.

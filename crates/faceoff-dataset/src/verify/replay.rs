@@ -12,7 +12,7 @@ use arrow_array::{
     cast::AsArray,
     types::{Float64Type, Int64Type},
 };
-use faceoff_episode::{Answered, Arena, Course, EpisodeStart, RecordError, StepRow, StepSink};
+use faceoff_episode::{AnswerTiming, Arena, RunningEpisode, EpisodeStart, RecordError, StepRow, StepSink};
 use faceoff_types::{ACTION_LIMIT, AgentFault, EpisodeOutcome, Interpolation, Ruleset};
 
 /// What it takes to simulate the episodes of an evaluation again.
@@ -34,7 +34,7 @@ struct Again<'a> {
     recorded: &'a Recorded,
     ruleset: Ruleset,
     interpolation: Interpolation,
-    course: Course<Rows>,
+    course: RunningEpisode<Rows>,
 }
 
 /// The rows that the episode should have.
@@ -59,7 +59,7 @@ impl StepSink for Rows {
         self.episodes.step(row);
         let c = row.constraints;
         self.measured.push(Measured {
-            answered: row.answered,
+            answered: row.timing,
             constraints: [c.joint_pos, c.joint_vel, c.ee, c.link],
         });
     }
@@ -99,7 +99,7 @@ impl Replay {
             ruleset: self.ruleset,
             // Without an agent there are no steps to interpolate.
             interpolation: given.interpolation.unwrap_or(Interpolation::Cubic),
-            course: Course::begin(&self.arena, task, episode, given.interpolation, rows),
+            course: RunningEpisode::begin(&self.arena, task, episode, given.interpolation, rows),
         };
         let mut ended = None;
         for piece in &recorded.steps {
@@ -189,7 +189,7 @@ impl Again<'_> {
     }
 
     /// The recorded times, which nothing else tells.
-    fn answered(&self, piece: &RecordBatch, row: usize, step: u32) -> Result<Answered, Difference> {
+    fn answered(&self, piece: &RecordBatch, row: usize, step: u32) -> Result<AnswerTiming, Difference> {
         let time = |name: &str| -> Result<Option<i64>, Difference> {
             let column: &Int64Array = piece[name].as_primitive::<Int64Type>();
             if column.is_null(row) {
@@ -206,7 +206,7 @@ impl Again<'_> {
         let Some(computation_time) = time(name)? else {
             return Err(self.at_step(step, name, "nothing".to_owned(), "a time".to_owned()));
         };
-        Ok(Answered {
+        Ok(AnswerTiming {
             computation_time_s: seconds(computation_time),
             host_time_s: time(HOST_TIME)?.map(seconds).unwrap_or_default(),
             cpu_time_s: time("cpu_time_ns")?.map(seconds),
@@ -225,7 +225,7 @@ impl Again<'_> {
             (Some(outcome), None) => outcome,
             (None, Some(fault)) => {
                 let told = fault.to_string();
-                self.course.ended_by(fault).ok_or_else(|| {
+                self.course.outcome_after_recorded_fault(fault).ok_or_else(|| {
                     let expected = diverged
                         .unwrap_or_else(|| format!("a fault of this episode after {steps} steps"));
                     in_row(recorded, "fault", told, expected)

@@ -10,7 +10,7 @@ use crate::{
 use arrow_array::RecordBatch;
 use faceoff_episode::Arena;
 use faceoff_types::EpisodeOutcome;
-use faceoff_wire::work::ShardSpec;
+use faceoff_wire::job::ShardSpec;
 use std::path::Path;
 
 /// Reads the recording of a shard in the folder `dir`, and simulates the episodes of `sample` again: every number of theirs must be what
@@ -37,7 +37,7 @@ pub fn verify_shard(
     if recording.report.outcomes != outcomes {
         return Err(unusable("the recording and the report tell of other outcomes").into());
     }
-    let arena = Arena::by(
+    let arena = Arena::with_ruleset(
         spec.ruleset,
         spec.profile,
         &spec.perturbations,

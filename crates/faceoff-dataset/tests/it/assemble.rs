@@ -87,7 +87,7 @@ fn the_dataset_is_whole_and_its_score_is_the_direct_one() {
             .collect();
         let of_task: &StringArray = steps["task"].as_string();
         let nanoseconds = steps["computation_time_ns"].as_primitive::<Int64Type>();
-        let mut times = StepTimes::of(outcomes.iter().map(|o| u64::from(o.steps)).sum());
+        let mut times = StepTimes::for_steps(outcomes.iter().map(|o| u64::from(o.steps)).sum());
         for row in (0..steps.num_rows()).filter(|row| of_task.value(*row) == task.as_str()) {
             let time = Duration::from_nanos(nanoseconds.value(row).unsigned_abs());
             times.add(time.as_secs_f64());

@@ -138,7 +138,7 @@ fn contacts_lie_on_the_way_between_the_samples() {
 #[test]
 fn the_sheet_has_a_line_for_each_episode_that_says_what_the_dataset_says() {
     let made = made("clips");
-    let sheet = made.pack.sheet().unwrap();
+    let sheet = made.pack.clip_index().unwrap();
     let outcomes: Vec<_> = made
         .evaluation
         .reports

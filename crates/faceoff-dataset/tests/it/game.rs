@@ -9,7 +9,7 @@ use faceoff_dataset::{
     DatasetError,
     game::{GAME_FILE, GameRecorder, GameRecording, RecordedGame, side_file, verify_game},
 };
-use faceoff_episode::{Answered, Arena, Entry, GameCourse, Response, SideFault};
+use faceoff_episode::{AnswerTiming, Arena, RallyEntry, RunningGame, Response, SideFault};
 use faceoff_replay::{CHUNK_STEPS, Clip, Key, Pack};
 use faceoff_types::{
     AgentFaultKind, GameLimits, Interpolation, Profile, Ruleset, Seed, Side, SlotTiming,
@@ -44,7 +44,7 @@ fn record(out: &Path) {
     let spec = spec();
     let arena = Arena::new(spec.profile, spec.seed, spec.mismatch_seed);
     let recorder = GameRecorder::create(&out.join("tables")).unwrap();
-    let mut course = GameCourse::begin(&arena, spec.steps, spec.limits.clone(), recorder);
+    let mut course = RunningGame::begin(&arena, spec.steps, spec.limits.clone(), recorder);
     let fault = |detail: &str| SideFault {
         kind: AgentFaultKind::NotJson {
             detail: detail.to_owned(),
@@ -60,24 +60,24 @@ fn record(out: &Path) {
                 _ => Interpolation::Linear,
             };
             match (rally, side) {
-                (1, Side::Second) => Entry::FailedToReset {
+                (1, Side::Second) => RallyEntry::ResetFailed {
                     startup_s,
                     interpolation,
                     reset_s: 0.125,
                     fault: fault("reset"),
                 },
-                (2, Side::First) if startup_s.is_some() => Entry::FailedToStart {
+                (2, Side::First) if startup_s.is_some() => RallyEntry::StartFailed {
                     startup_s: 0.5,
                     fault: fault("start"),
                 },
-                _ => Entry::Plays {
+                _ => RallyEntry::Ready {
                     startup_s,
                     interpolation,
                     reset_s: 0.0625,
                 },
             }
         });
-        let interpolations = entries.each_ref().map(Entry::interpolation);
+        let interpolations = entries.each_ref().map(RallyEntry::interpolation);
         course.start_rally(entries).unwrap();
         while course.is_in_rally() {
             let step = course.rally_steps();
@@ -86,7 +86,7 @@ fn record(out: &Path) {
                 let mut held: [f64; 7] = question.observation[6..13].try_into().unwrap();
                 held[0] += 0.001 * f64::from(step % 30);
                 let interpolation = interpolations[side.index()].unwrap();
-                Some(interpolation.held(&held)[..interpolation.len()].to_vec())
+                Some(interpolation.hold_position(&held)[..interpolation.len()].to_vec())
             });
             let responses = [0, 1].map(|side| {
                 let computation_time_s = if step % 100 == 7 {
@@ -94,7 +94,7 @@ fn record(out: &Path) {
                 } else {
                     0.001953125
                 };
-                let answered = Answered {
+                let answered = AnswerTiming {
                     computation_time_s,
                     host_time_s: 0.0,
                     cpu_time_s: None,
@@ -107,10 +107,10 @@ fn record(out: &Path) {
                     {
                         Response::Fault {
                             fault: fault("step"),
-                            answered,
+                            timing: answered,
                         }
                     }
-                    Some(action) => Response::Answer { action, answered },
+                    Some(action) => Response::Answer { action, timing: answered },
                 }
             });
             course.answer(responses).unwrap();

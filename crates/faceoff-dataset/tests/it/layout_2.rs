@@ -7,7 +7,7 @@ use crate::{
 use arrow_array::{RecordBatch, cast::AsArray, types::Int64Type};
 use faceoff_dataset::{Dataset, DatasetError, Layout};
 use faceoff_types::Task;
-use faceoff_wire::work::ShardSpec;
+use faceoff_wire::job::ShardSpec;
 use parquet::{
     basic::Encoding,
     file::reader::{FileReader, SerializedFileReader},

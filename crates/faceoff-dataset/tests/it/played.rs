@@ -2,13 +2,13 @@
 
 use arrow_array::RecordBatch;
 use faceoff_dataset::{Assembled, Recorder, RecordingError, ShardFolder, ShardReport, assemble};
-use faceoff_episode::{Answered, EpisodeStart, StepRow, StepSink};
+use faceoff_episode::{AnswerTiming, EpisodeStart, StepRow, StepSink};
 use faceoff_sim::{Episode, Interpolation, Plant};
 use faceoff_types::{
     AgentFault, AgentFaultKind, ComputationTime, EpisodeEnd, EpisodeOutcome, Profile, RoundTrips,
     Ruleset, Seed, SlotTiming, Task, Variation,
 };
-use faceoff_wire::work::{EvaluationMeta, ShardSpec};
+use faceoff_wire::job::{EvaluationMeta, ShardSpec};
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 use std::{
     fs::{self, File},
@@ -147,7 +147,7 @@ fn converse(
         recorder.step(&StepRow {
             step,
             action: action.as_flattened(),
-            answered: Answered {
+            timing: AnswerTiming {
                 computation_time_s: time.as_secs_f64(),
                 host_time_s: 0.0,
                 cpu_time_s: (!step.is_multiple_of(5)).then(|| (time / 2).as_secs_f64()),
@@ -198,7 +198,7 @@ fn failed(
         computation_time: summary(times_s),
         fault: Some(AgentFault {
             fault: AgentFaultKind::NonFinite,
-            contest: task.into(),
+            agent_task: task.into(),
             episode: during,
             step,
             line: None,

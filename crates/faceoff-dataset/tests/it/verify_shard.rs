@@ -9,7 +9,7 @@ use faceoff_dataset::{
     verify::{VerifyError, verify_shard},
 };
 use faceoff_types::{Seed, Task};
-use faceoff_wire::work::ShardSpec;
+use faceoff_wire::job::ShardSpec;
 use serde_json::Value;
 use std::{fs, path::Path};
 

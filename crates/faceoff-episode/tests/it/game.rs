@@ -1,12 +1,12 @@
-//! Games from answers that are made up.
+//! Games from scripted answers.
 
 use faceoff_episode::{
-    Answered, Arena, Effect, Entry, FinishedGame, GameCourse, GameSink, GameStepRow, RallyEnding,
+    AnswerTiming, Arena, Effect, RallyEntry, FinishedGame, RunningGame, GameSink, GameStepRow, RallyEnding,
     RallyRow, RallyStart, RecordError, Response, SideFault,
 };
 use faceoff_sim::{Bounds, RallyEnd};
 use faceoff_types::{
-    AgentFaultKind, Contest, ForfeitCause, GameEnd, GameLimits, Interpolation, Profile, Seed, Side,
+    AgentFaultKind, AgentTask, ForfeitCause, GameEnd, GameLimits, Interpolation, Profile, Seed, Side,
 };
 
 fn arena() -> Arena {
@@ -14,30 +14,30 @@ fn arena() -> Arena {
     Arena::new(Profile::Ideal, seed, seed.model_mismatch())
 }
 
-/// Less than what a joint is pushed to by commands at the bound.
+/// Bounds that commands at the largest numbers exceed.
 const NARROW: Bounds = Bounds {
     joint_rad_s: 20.0,
     ..Bounds::WIDE
 };
 
-fn took(computation_time_s: f64) -> Answered {
-    Answered {
+fn took(computation_time_s: f64) -> AnswerTiming {
+    AnswerTiming {
         computation_time_s,
         host_time_s: 0.0,
         cpu_time_s: None,
     }
 }
 
-fn broken() -> SideFault {
+fn fault() -> SideFault {
     SideFault {
         kind: AgentFaultKind::ClosedOutput,
         line: None,
     }
 }
 
-/// Keeps what is told of a game in few words.
+/// Records a summary of what a sink receives.
 #[derive(Debug, Default, PartialEq)]
-struct Told {
+struct SinkLog {
     rallies: Vec<(u32, u32)>,
     effects: [Vec<Effect>; 2],
     ends: Vec<(u32, u32, RallyEnding, [bool; 2])>,
@@ -46,7 +46,7 @@ struct Told {
     q: Vec<[f64; 2]>,
 }
 
-impl GameSink for Told {
+impl GameSink for SinkLog {
     fn begin_rally(&mut self, start: &RallyStart<'_>) -> Result<(), RecordError> {
         self.rallies.push((start.rally, start.game_step));
         Ok(())
@@ -69,96 +69,97 @@ impl GameSink for Told {
     }
 }
 
-/// What a side does at a rally's step.
-type Does = fn(rally: u32, step: u32) -> Does1;
+/// The behaviour of a side: its response at a step of a rally.
+type Script = fn(rally: u32, step: u32) -> ScriptedStep;
 
-enum Does1 {
-    Holds(f64),
-    Swings(f64),
-    Breaks,
-    Explodes,
+/// Answers have their computation time in seconds.
+enum ScriptedStep {
+    Hold(f64),
+    Swing(f64),
+    Fault,
+    Diverge,
 }
 
-fn enters(course: &GameCourse<Told>, side: Side) -> Entry {
-    Entry::Plays {
-        startup_s: course.needs_start(side).then_some(0.5),
+fn ready(running: &RunningGame<SinkLog>, side: Side) -> RallyEntry {
+    RallyEntry::Ready {
+        startup_s: running.needs_start(side).then_some(0.5),
         interpolation: Interpolation::Trajectory,
         reset_s: 0.25,
     }
 }
 
-fn play(steps: u32, limits: GameLimits, does: [Does; 2]) -> FinishedGame<Told> {
-    play_in(&arena(), steps, limits, does)
+fn play(steps: u32, limits: GameLimits, scripts: [Script; 2]) -> FinishedGame<SinkLog> {
+    play_in(&arena(), steps, limits, scripts)
 }
 
-fn play_in(arena: &Arena, steps: u32, limits: GameLimits, does: [Does; 2]) -> FinishedGame<Told> {
-    let mut course = GameCourse::begin(arena, steps, limits, Told::default());
+fn play_in(arena: &Arena, steps: u32, limits: GameLimits, scripts: [Script; 2]) -> FinishedGame<SinkLog> {
+    let mut running = RunningGame::begin(arena, steps, limits, SinkLog::default());
     let mut speeds = [[0.0; 7]; 2];
-    while course.end().is_none() {
-        course
-            .start_rally(Side::BOTH.map(|side| enters(&course, side)))
+    while running.end().is_none() {
+        running
+            .start_rally(Side::BOTH.map(|side| ready(&running, side)))
             .unwrap();
-        while course.is_in_rally() {
-            let (rally, step) = (course.rally(), course.rally_steps());
+        while running.is_in_rally() {
+            let (rally, step) = (running.rally(), running.rally_steps());
             let mut actions = [const { Vec::new() }; 2];
             let mut times = [Some(0.0); 2];
             for side in Side::BOTH {
-                let Some(question) = course.question(side).unwrap() else {
+                let Some(question) = running.question(side).unwrap() else {
                     continue;
                 };
                 let at = side.index();
                 assert_eq!(question.step, step);
                 let held: [f64; 7] = question.observation[6..13].try_into().unwrap();
                 speeds[at] = question.observation[13..20].try_into().unwrap();
-                let (target, time) = match does[at](rally, step) {
-                    Does1::Holds(time) => (held, Some(time)),
-                    Does1::Swings(time) => (held.map(|q| q + 0.05), Some(time)),
-                    Does1::Breaks => (held, None),
-                    Does1::Explodes => {
+                let (target, time) = match scripts[at](rally, step) {
+                    ScriptedStep::Hold(time) => (held, Some(time)),
+                    ScriptedStep::Swing(time) => (held.map(|q| q + 0.05), Some(time)),
+                    ScriptedStep::Fault => (held, None),
+                    ScriptedStep::Diverge => {
                         let push = speeds[at].map(|dq| if dq > 0.0 { 1e4 } else { -1e4 });
                         actions[at] = [push; 60].concat();
                         continue;
                     }
                 };
-                actions[at] = Interpolation::Trajectory.held(&target).to_vec();
+                actions[at] = Interpolation::Trajectory.hold_position(&target).to_vec();
                 times[at] = time;
             }
             let responses = [0, 1].map(|at| {
                 let side = Side::BOTH[at];
-                match (course.fault(side), times[at]) {
+                match (running.fault(side), times[at]) {
                     (Some(_), _) => Response::Held,
                     (None, None) => Response::Fault {
-                        fault: broken(),
-                        answered: took(1.0),
+                        fault: fault(),
+                        timing: took(1.0),
                     },
                     (None, Some(time)) => Response::Answer {
                         action: &actions[at],
-                        answered: took(time),
+                        timing: took(time),
                     },
                 }
             });
-            course.answer(responses).unwrap();
+            running.answer(responses).unwrap();
         }
     }
-    course.finish()
+    running.finish()
 }
 
-fn holds(_: u32, _: u32) -> Does1 {
-    Does1::Holds(0.001)
+fn hold(_: u32, _: u32) -> ScriptedStep {
+    ScriptedStep::Hold(0.001)
 }
 
 #[test]
-fn a_late_answer_moves_nothing_and_counts() {
-    fn late(_: u32, step: u32) -> Does1 {
-        Does1::Swings(if step < 20 { 0.021 } else { 0.02 })
+fn late_answers_have_no_effect_and_are_counted() {
+    fn late(_: u32, step: u32) -> ScriptedStep {
+        ScriptedStep::Swing(if step < 20 { 0.021 } else { 0.02 })
     }
-    let game = play(40, GameLimits::default(), [late, holds]);
+    let game = play(40, GameLimits::default(), [late, hold]);
     let [first, second] = &game.outcome.sides;
     assert_eq!((first.late_answers, first.answers), (20, 40));
     assert_eq!((second.late_answers, second.answers), (0, 40));
     assert_eq!(game.sink.effects[0][..20], [Effect::Late; 20]);
     assert_eq!(game.sink.effects[0][20..], [Effect::InTime; 20]);
-    // The base stays where it was until the first answer that is in time.
+    // The first joint does not move until the first answer in time.
     assert!(
         game.sink.q[..20]
             .iter()
@@ -170,55 +171,55 @@ fn a_late_answer_moves_nothing_and_counts() {
 }
 
 #[test]
-fn after_a_fault_the_arm_holds_to_the_rallys_end_and_the_side_is_started_anew() {
-    fn breaks_once(rally: u32, step: u32) -> Does1 {
+fn fault_holds_the_arm_and_restarts_the_agent() {
+    fn fault_once(rally: u32, step: u32) -> ScriptedStep {
         if (rally, step) == (0, 3) {
-            Does1::Breaks
+            ScriptedStep::Fault
         } else {
-            Does1::Holds(0.001)
+            ScriptedStep::Hold(0.001)
         }
     }
-    let game = play(800, GameLimits::default(), [holds, breaks_once]);
-    let told = &game.sink;
-    assert_eq!(told.effects[1][..3], [Effect::InTime; 3]);
-    assert_eq!(told.effects[1][3], Effect::Fault);
-    assert_eq!(told.effects[1][4..752], [Effect::Held; 748]);
-    assert_eq!(told.effects[1][752..], [Effect::InTime; 48]);
-    assert_eq!(told.effects[0], [Effect::InTime; 800]);
-    assert_eq!(told.rallies, [(0, 0), (1, 752)]);
+    let game = play(800, GameLimits::default(), [hold, fault_once]);
+    let log = &game.sink;
+    assert_eq!(log.effects[1][..3], [Effect::InTime; 3]);
+    assert_eq!(log.effects[1][3], Effect::Fault);
+    assert_eq!(log.effects[1][4..752], [Effect::Held; 748]);
+    assert_eq!(log.effects[1][752..], [Effect::InTime; 48]);
+    assert_eq!(log.effects[0], [Effect::InTime; 800]);
+    assert_eq!(log.rallies, [(0, 0), (1, 752)]);
     let [
         (0, 752, first, [false, true]),
         (1, 48, RallyEnding::GameOver, [false, false]),
-    ] = told.ends[..]
+    ] = log.ends[..]
     else {
-        panic!("{:?}", told.ends)
+        panic!("{:?}", log.ends)
     };
     assert!(matches!(first, RallyEnding::Table(RallyEnd::Foul { .. })));
     let [good, bad] = &game.outcome.sides;
-    // Two starts and two resets against one start and two resets.
+    // One start and two resets, against two starts and two resets.
     assert!((good.time_used_s - (0.5 + 0.5 + 0.8)).abs() < 1e-9);
     assert!((bad.time_used_s - (1.0 + 0.5 + 1.0 + 0.051)).abs() < 1e-9);
     let fault = &bad.faults[0];
     assert_eq!(fault.game_step, 3);
-    let contest = Contest::Game { side: Side::Second };
+    let agent_task = AgentTask::Game { side: Side::Second };
     assert_eq!(
-        (fault.fault.contest, fault.fault.episode, fault.fault.step),
-        (contest, Some(0), Some(3))
+        (fault.fault.agent_task, fault.fault.episode, fault.fault.step),
+        (agent_task, Some(0), Some(3))
     );
     let faults: Vec<u32> = bad.windows.iter().map(|window| window.faults).collect();
     assert_eq!(faults, [1, 0]);
 }
 
 #[test]
-fn more_faults_than_allowed_forfeit_at_once_and_both_in_one_step_draw() {
-    fn breaks(_: u32, _: u32) -> Does1 {
-        Does1::Breaks
+fn too_many_faults_forfeit_and_both_sides_draw() {
+    fn always_fault(_: u32, _: u32) -> ScriptedStep {
+        ScriptedStep::Fault
     }
     let limits = GameLimits {
         max_faults: 1,
         ..GameLimits::default()
     };
-    let game = play(45_000, limits.clone(), [holds, breaks]);
+    let game = play(45_000, limits.clone(), [hold, always_fault]);
     let cause = ForfeitCause::Faults {
         count: 2,
         allowed: 1,
@@ -226,21 +227,21 @@ fn more_faults_than_allowed_forfeit_at_once_and_both_in_one_step_draw() {
     let by = Side::Second;
     assert_eq!(game.outcome.end, GameEnd::Forfeit { by, cause });
     assert_eq!(game.outcome.steps, 753);
-    let game = play(45_000, limits, [breaks, breaks]);
+    let game = play(45_000, limits, [always_fault, always_fault]);
     let causes = [cause; 2];
     assert_eq!(game.outcome.end, GameEnd::BothForfeit { causes });
 }
 
 #[test]
-fn the_time_of_a_side_is_its_own() {
-    fn slow(_: u32, _: u32) -> Does1 {
-        Does1::Holds(0.5)
+fn sides_have_separate_time_budgets() {
+    fn slow(_: u32, _: u32) -> ScriptedStep {
+        ScriptedStep::Hold(0.5)
     }
     let limits = GameLimits {
         total_s: 10.0,
         ..GameLimits::default()
     };
-    let game = play(45_000, limits.clone(), [slow, holds]);
+    let game = play(45_000, limits.clone(), [slow, hold]);
     let GameEnd::Forfeit {
         by: Side::First,
         cause: ForfeitCause::Time { used_s, allowed_s },
@@ -248,7 +249,7 @@ fn the_time_of_a_side_is_its_own() {
     else {
         panic!("{:?}", game.outcome.end)
     };
-    // 0.75 s to start and to get ready.
+    // Includes 0.75 s for start and reset.
     assert_eq!((used_s, allowed_s, game.outcome.steps), (10.25, 10.0, 19));
     assert!(game.outcome.sides[1].time_used_s < 1.0);
     let game = play(45_000, limits, [slow, slow]);
@@ -256,21 +257,21 @@ fn the_time_of_a_side_is_its_own() {
 }
 
 #[test]
-fn who_cannot_start_has_a_fault_and_no_process() {
+fn failed_start_is_a_fault() {
     let limits = GameLimits {
         max_faults: 0,
         ..GameLimits::default()
     };
-    let mut course = GameCourse::begin(&arena(), 100, limits, Told::default());
-    let fails = Entry::FailedToStart {
+    let mut running = RunningGame::begin(&arena(), 100, limits, SinkLog::default());
+    let start_failed = RallyEntry::StartFailed {
         startup_s: 120.0,
-        fault: broken(),
+        fault: fault(),
     };
-    let plays = enters(&course, Side::First);
-    course.start_rally([plays, fails]).unwrap();
-    let fault = course.fault(Side::Second).unwrap();
+    let ready_entry = ready(&running, Side::First);
+    running.start_rally([ready_entry, start_failed]).unwrap();
+    let fault = running.fault(Side::Second).unwrap();
     assert_eq!((fault.episode, fault.step), (None, None));
-    let game = course.finish();
+    let game = running.finish();
     assert_eq!((game.outcome.steps, game.outcome.rallies), (0, 1));
     assert_eq!(
         game.sink.ends,
@@ -278,17 +279,17 @@ fn who_cannot_start_has_a_fault_and_no_process() {
     );
     assert_eq!(game.outcome.sides[1].faults.len(), 1);
     for side in &game.outcome.sides {
-        assert_eq!(side.windows, [], "nothing was played");
+        assert_eq!(side.windows, [], "no step was played");
     }
 }
 
 #[test]
-fn a_world_that_diverges_is_the_fault_of_the_side_that_made_it() {
-    fn explodes(_: u32, _: u32) -> Does1 {
-        Does1::Explodes
+fn divergence_is_the_fault_of_its_side() {
+    fn diverge(_: u32, _: u32) -> ScriptedStep {
+        ScriptedStep::Diverge
     }
-    let narrow = arena().within(NARROW);
-    let game = play_in(&narrow, 1000, GameLimits::default(), [holds, explodes]);
+    let narrow = arena().with_bounds(NARROW);
+    let game = play_in(&narrow, 1000, GameLimits::default(), [hold, diverge]);
     let [good, bad] = &game.outcome.sides;
     assert_eq!(good.faults, []);
     assert!(!bad.faults.is_empty());

@@ -1,5 +1,5 @@
-//! Episodes played from answers that are given here.
+//! Episodes and games run from scripted answers.
 #![expect(clippy::unwrap_used, reason = "a helper's failure is its test's")]
 
-mod course;
+mod episode;
 mod game;

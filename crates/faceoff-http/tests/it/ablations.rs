@@ -1,4 +1,4 @@
-//! Ablations: ordered by the organiser, shown to everybody, in the way of nobody.
+//! Ablations: started by the organiser and shown on public pages. They affect neither evaluations nor the board.
 
 use crate::{
     clips,
@@ -10,9 +10,9 @@ use faceoff_types::{Profile, SubmissionId};
 use scraper::{Html, Selector};
 use serde_json::json;
 
-/// Plays the ablation that comes next: in `ideal` all episodes succeed, with tracking loss none, in the
-/// other profiles every second.
-async fn play(site: &Site, shards: u32) {
+/// Runs `shards` shards of the next ablation. All episodes succeed in `ideal`, none with tracking loss, and every second
+/// one in the other profiles.
+async fn run_shards(site: &Site, shards: u32) {
     for _ in 0..shards {
         let (claim, run, shard) = site.claim_shard().await;
         let outcomes: Vec<_> = (shard.first_episode..shard.end_episode)
@@ -39,7 +39,7 @@ async fn play(site: &Site, shards: u32) {
     }
 }
 
-async fn competitor(site: &Site) -> (TestTeam, String, String) {
+async fn team_with_submission(site: &Site) -> (TestTeam, String, String) {
     let team = site.team("Alpha").await;
     let submission = site.valid_submission(&team, "striker").await;
     let api = format!("{submission}/ablation");
@@ -48,24 +48,24 @@ async fn competitor(site: &Site) -> (TestTeam, String, String) {
 }
 
 #[tokio::test]
-async fn an_organiser_orders_one_and_its_team_and_visitors_see_what_came_of_it() {
+async fn ablation_results_are_shown_to_team_and_visitors() {
     let site = Site::start().await;
-    let (team, api, page) = competitor(&site).await;
+    let (team, api, page) = team_with_submission(&site).await;
     site.get(&api, Some(&team.token))
         .await
         .problem(404, "not-found", &["ablation"]);
     assert_eq!(site.get(&page, None).await.status.as_u16(), 404);
 
-    let order = json!({ "episodes_per_task": 8 });
-    let ordered = site.post(&api, Some(ADMIN), &order).await.json(201);
-    assert_eq!(ordered["state"], "open");
+    let request = json!({ "episodes_per_task": 8 });
+    let started = site.post(&api, Some(ADMIN), &request).await.json(201);
+    assert_eq!(started["state"], "open");
     assert_eq!(
-        ordered["progress"],
+        started["progress"],
         json!({ "episodes_done": 0, "episodes_total": 8 * 18 })
     );
-    site.post(&api, Some(ADMIN), &order)
+    site.post(&api, Some(ADMIN), &request)
         .await
-        .problem(409, "conflict", &["under way"]);
+        .problem(409, "conflict", &["running"]);
     assert!(
         site.get(&page, None)
             .await
@@ -73,7 +73,7 @@ async fn an_organiser_orders_one_and_its_team_and_visitors_see_what_came_of_it()
             .contains("0 of 144 episodes")
     );
 
-    play(&site, 2 * 18).await;
+    run_shards(&site, 2 * 18).await;
     let view = site.get(&api, Some(&team.token)).await.json(200);
     assert_eq!(view["state"], "finished");
     let hit = view["tasks"]["hit"].as_array().unwrap();
@@ -100,7 +100,7 @@ async fn an_organiser_orders_one_and_its_team_and_visitors_see_what_came_of_it()
         "0 of 8",
         "−100.0",
         "0.008",
-        "told apart",
+        "significant",
     ] {
         assert!(row.contains(part), "{part:?} is not in {row:?}");
     }
@@ -111,16 +111,16 @@ async fn an_organiser_orders_one_and_its_team_and_visitors_see_what_came_of_it()
 }
 
 #[tokio::test]
-async fn only_the_organiser_orders_and_other_teams_see_nothing_in_the_api() {
+async fn ablation_is_started_by_organiser_and_hidden_from_other_teams() {
     let site = Site::start().await;
-    let (team, api, _) = competitor(&site).await;
+    let (team, api, _) = team_with_submission(&site).await;
     let refused = site.post(&api, Some(&team.token), &json!({})).await;
     assert_eq!(refused.status.as_u16(), 403);
     site.post(&api, Some(ADMIN), &json!({ "episodes_per_task": 0 }))
         .await
         .problem(422, "invalid-content", &["episodes_per_task"]);
-    let ordered = site.post(&api, Some(ADMIN), &json!({})).await.json(201);
-    assert_eq!(ordered["episodes_per_task"], 100);
+    let started = site.post(&api, Some(ADMIN), &json!({})).await.json(201);
+    assert_eq!(started["episodes_per_task"], 100);
     let other = site.team("Beta").await;
     site.get(&api, Some(&other.token))
         .await
@@ -128,13 +128,13 @@ async fn only_the_organiser_orders_and_other_teams_see_nothing_in_the_api() {
 }
 
 #[tokio::test]
-async fn it_takes_no_turn_and_leaves_the_board_alone_and_the_evaluation_leads_to_it() {
+async fn ablation_is_no_evaluation_but_is_linked_from_it() {
     let site = Site::start().await;
-    let (team, api, page) = competitor(&site).await;
+    let (team, api, page) = team_with_submission(&site).await;
     site.post(&api, Some(ADMIN), &json!({ "episodes_per_task": 1 }))
         .await
         .json(201);
-    play(&site, 18).await;
+    run_shards(&site, 18).await;
     let board = site.get("/api/v1/board", None).await.json(200);
     assert_eq!(board["rows"], json!([]));
     let submission = api.replace("/ablation", "");
@@ -143,16 +143,16 @@ async fn it_takes_no_turn_and_leaves_the_board_alone_and_the_evaluation_leads_to
     assert!(shown.body.contains(&format!("href=\"{page}\"")));
 }
 
-/// A summary is told from the outcomes by a success that no outcome knows: whoever shows it has not read
-/// the outcomes again.
+/// The stored summary is changed to one success more than the outcomes have. A response that shows it was made from the
+/// summary, not from the outcomes.
 #[tokio::test]
-async fn its_outcomes_are_read_once_and_never_again() {
+async fn ablation_outcomes_are_summarised_once() {
     let mut site = Site::start().await;
-    let (_, api, page) = competitor(&site).await;
+    let (_, api, page) = team_with_submission(&site).await;
     site.post(&api, Some(ADMIN), &json!({ "episodes_per_task": 4 }))
         .await
         .json(201);
-    play(&site, 18).await;
+    run_shards(&site, 18).await;
     let first = site.get(&api, Some(ADMIN)).await.json(200);
     assert_eq!(first["tasks"]["hit"][4]["successes"], 0);
 
@@ -166,13 +166,13 @@ async fn its_outcomes_are_read_once_and_never_again() {
     let run = runs[&Profile::TrackingLoss];
     let marked = stored[&run].replacen(r#""words":[0]"#, r#""words":[1]"#, 1);
     assert_ne!(marked, stored[&run]);
-    let kept = site
+    let stored_summary = site
         .store
-        .keep_episode_summary(run, version, &marked, site.now());
-    kept.await.unwrap();
+        .store_episode_summary(run, version, &marked, site.now());
+    stored_summary.await.unwrap();
 
     let again = site.get(&api, Some(ADMIN)).await.json(200);
-    assert_eq!(again, first, "what is in memory is not read at all");
+    assert_eq!(again, first, "the cached summary is not read from the database again");
     site.restart().await;
     let restarted = site.get(&api, Some(ADMIN)).await.json(200);
     assert_eq!(restarted["tasks"]["hit"][4]["successes"], 1);
@@ -181,21 +181,21 @@ async fn its_outcomes_are_read_once_and_never_again() {
 }
 
 #[tokio::test]
-async fn an_episode_that_a_perturbation_changes_is_shown_beside_the_ideal_one() {
+async fn perturbed_episode_is_shown_beside_the_ideal_one() {
     let site = Site::start().await;
-    let (team, api, page) = competitor(&site).await;
-    let order = json!({ "episodes_per_task": 1 });
-    site.post(&api, Some(ADMIN), &order).await.json(201);
-    play(&site, 18).await;
+    let (team, api, page) = team_with_submission(&site).await;
+    let request = json!({ "episodes_per_task": 1 });
+    site.post(&api, Some(ADMIN), &request).await.json(201);
+    run_shards(&site, 18).await;
     let without = site.get(&page, None).await;
-    assert!(!without.body.contains("What changes"), "{}", without.body);
+    assert!(!without.body.contains("Episodes with another outcome"), "{}", without.body);
 
     let submission = api.split('/').nth(4).unwrap().parse().unwrap();
     let ablation = site.store.newest_ablation(submission).await.unwrap();
     let folder = tempfile::tempdir().unwrap();
-    let pack = clips::pack(folder.path());
+    let pack = clips::record_clips(folder.path());
     for profile in [Profile::Ideal, Profile::TrackingLoss] {
-        let key = Artifacts::ablation_clips(ablation.as_ref().unwrap().id, profile);
+        let key = Artifacts::ablation_clips_key(ablation.as_ref().unwrap().id, profile);
         site.store.artifacts().put_file(&key, &pack).await.unwrap();
     }
     let pair = format!("{page}/tracking_loss/prepare/0");
@@ -212,7 +212,7 @@ async fn an_episode_that_a_perturbation_changes_is_shown_beside_the_ideal_one() 
         .select(&replays)
         .map(|replay| replay.attr("data-motion").unwrap().to_owned())
         .collect();
-    let expected = ["ideal", "tracking_loss"].map(|of| format!("{api}/{of}/prepare/0/motion"));
+    let expected = ["ideal", "tracking_loss"].map(|profile| format!("{api}/{profile}/prepare/0/motion"));
     assert_eq!(motions, expected);
     for motion in &motions {
         assert_eq!(site.get(motion, None).await.status, 200, "{motion}");
@@ -224,12 +224,12 @@ async fn an_episode_that_a_perturbation_changes_is_shown_beside_the_ideal_one() 
             assert_eq!(site.get(&observed, Some(own)).await.status, 200);
         }
     }
-    for nothing in [
+    for missing in [
         format!("{page}/disturbance/prepare/0"),
         format!("{page}/tracking_loss/hit/0"),
         format!("{page}/wind/hit/0"),
         format!("{api}/tracking_loss/prepare/99/motion"),
     ] {
-        assert_eq!(site.get(&nothing, None).await.status, 404, "{nothing}");
+        assert_eq!(site.get(&missing, None).await.status, 404, "{missing}");
     }
 }

@@ -1,6 +1,6 @@
-//! The organisers' reference agents, which are ranked apart.
+//! Baselines: the organisers' reference agents, which are shown beside the ranked teams.
 
-use crate::site::{ADMIN, Answer, Site, TestTeam, result, text};
+use crate::site::{ADMIN, Answer, Site, TestTeam, result, string};
 use reqwest::Method;
 use serde_json::{Value, json};
 
@@ -10,7 +10,7 @@ async fn change(site: &Site, team: &TestTeam, token: &str, change: &Value) -> An
     Answer::of(request.json(change).send().await.unwrap()).await
 }
 
-/// A reference agent between two teams, marked by the organiser.
+/// Three teams with results; "Reference" is in the middle.
 async fn three_teams(site: &Site) -> [TestTeam; 3] {
     let teams = [
         site.team("Alpha").await,
@@ -24,18 +24,18 @@ async fn three_teams(site: &Site) -> [TestTeam; 3] {
         .await
         .json(200);
     for rate in [0.9, 0.7, 0.5] {
-        site.finish(&result([rate; 3], 10.0)).await;
+        site.finish_evaluation(&result([rate; 3], 10.0)).await;
     }
     teams
 }
 
 #[tokio::test]
-async fn a_baseline_takes_no_rank_from_anybody() {
+async fn baseline_takes_no_rank_from_teams() {
     let site = Site::start().await;
     let [_, reference, _] = three_teams(&site).await;
     let names = |board: &Value| -> Vec<(u64, String)> {
         let rows = board["rows"].as_array().unwrap().iter();
-        rows.map(|row| (row["rank"].as_u64().unwrap(), text(&row["team"])))
+        rows.map(|row| (row["rank"].as_u64().unwrap(), string(&row["team"])))
             .collect()
     };
     let before = site.get("/api/v1/board", None).await.json(200);
@@ -62,8 +62,8 @@ async fn a_baseline_takes_no_rank_from_anybody() {
             let at = columns.iter().position(|column| column == name).unwrap();
             last[at].to_owned()
         };
-        let told = ["rank", "baseline", "would_rank", "team"].map(field);
-        assert_eq!(told, ["", "true", "2", "Reference"]);
+        let fields = ["rank", "baseline", "would_rank", "team"].map(field);
+        assert_eq!(fields, ["", "true", "2", "Reference"]);
     }
     let history = site.get("/api/v1/board/history", None).await.json(200);
     let last = &history["rows"][2];
@@ -94,7 +94,7 @@ async fn a_baseline_takes_no_rank_from_anybody() {
 }
 
 #[tokio::test]
-async fn only_an_organiser_marks_a_baseline_and_it_enters_no_tournament_by_the_board() {
+async fn baseline_is_set_by_organiser_and_not_entered_in_tournaments() {
     let site = Site::start().await;
     let [alpha, reference, _] = three_teams(&site).await;
     let mark = json!({ "baseline": true });
@@ -111,17 +111,17 @@ async fn only_an_organiser_marks_a_baseline_and_it_enters_no_tournament_by_the_b
         .await
         .json(201);
     let entrants = opened["entrants"].as_array().unwrap().iter();
-    let names: Vec<_> = entrants.map(|one| text(&one["team_name"])).collect();
+    let names: Vec<_> = entrants.map(|one| string(&one["team_name"])).collect();
     assert_eq!(names, ["Alpha", "Beta"]);
-    // A result that is signed off stays as it is.
+    // A signed-off result does not change any more.
     let stage = format!("/api/v1/stages/{}", site.stage().await);
     let closes = json!({ "closes_at": "2026-03-01T10:01:00Z" });
     let close = site.request(Method::PATCH, &stage, Some(ADMIN));
     Answer::of(close.json(&closes).send().await.unwrap())
         .await
         .json(200);
-    site.later(60);
-    let name = text(&site.get(&stage, None).await.json(200)["name"]);
+    site.advance(60);
+    let name = string(&site.get(&stage, None).await.json(200)["name"]);
     site.post(
         &format!("{stage}/finalise"),
         Some(ADMIN),
@@ -134,7 +134,7 @@ async fn only_an_organiser_marks_a_baseline_and_it_enters_no_tournament_by_the_b
         change(&site, team, ADMIN, &other).await.problem(
             409,
             "conflict",
-            &["signed off", "stays as it is"],
+            &["signed off", "cannot be changed any more"],
         );
     }
 }

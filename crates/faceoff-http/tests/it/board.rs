@@ -1,3 +1,5 @@
+//! The overall board and the task boards, in the API and on pages.
+
 use crate::{
     html::{page, texts},
     site::{Site, result},
@@ -8,7 +10,7 @@ use faceoff_scoring::{
 use scraper::Selector;
 use serde_json::json;
 
-/// Five teams of the paper's qualifying table, in another order than the board's.
+/// Five teams of the paper's qualifying table, not in board order.
 const TEAMS: [(&str, [f64; 3], f64); 5] = [
     ("RL3_polimi", [0.227, 0.616, 0.362], 920.0),
     ("Kalash Jain", [0.0, 0.195, 0.083], 0.0),
@@ -17,14 +19,14 @@ const TEAMS: [(&str, [f64; 3], f64); 5] = [
     ("AeroTron", [0.332, 0.232, 0.665], 594.0),
 ];
 
-async fn competition() -> Site {
+async fn site_with_results() -> Site {
     let site = Site::start().await;
     let teams = TEAMS.map(|(name, rates, points)| (name, result(rates, points)));
     site.ranked_teams(&teams).await;
     site
 }
 
-const ORDER: [(&str, &str); 5] = [
+const BOARD_ORDER: [(&str, &str); 5] = [
     ("deployable", "AiRLIHockey"),
     ("deployable", "Kalash Jain"),
     ("improvable", "RL3_polimi"),
@@ -33,17 +35,17 @@ const ORDER: [(&str, &str); 5] = [
 ];
 
 #[tokio::test]
-async fn the_board_shows_tiers_in_order_with_rates_intervals_points_and_score() {
-    let site = competition().await;
+async fn board_shows_tiers_rates_intervals_points_and_scores() {
+    let site = site_with_results().await;
     let html = page(&site, "/").await;
     assert_eq!(
         texts(&html, "tbody[data-tier] .group .tier"),
         ["✓ Deployable", "▲ Improvable", "✕ Non-deployable"]
     );
-    let names: Vec<_> = ORDER.iter().map(|(_, name)| *name).collect();
+    let names: Vec<_> = BOARD_ORDER.iter().map(|(_, name)| *name).collect();
     assert_eq!(texts(&html, ".board th.team > a"), names);
     assert_eq!(texts(&html, ".board td.rank"), ["1", "2", "3", "4", "5"]);
-    for (tier, name) in ORDER {
+    for (tier, name) in BOARD_ORDER {
         let rows = texts(&html, &format!("tbody[data-tier={tier}] th.team > a"));
         assert!(
             rows.contains(&name.to_owned()),
@@ -73,12 +75,12 @@ async fn the_board_shows_tiers_in_order_with_rates_intervals_points_and_score() 
         commitment.as_str(),
         "Wilson",
         "0.4 × hit",
-        "at most 0.5 per episode",
+        "at most 0.5,",
     ] {
         assert!(legend.contains(part), "{part:?} is not in the legend");
     }
     for rule in [
-        format!("end effector outside of its bounds {EE_POINTS}"),
+        format!("end effector out of bounds {EE_POINTS}"),
         format!("elbow or wrist too low {LINK_POINTS}"),
         format!("joint position {JOINT_POS_POINTS}"),
         format!("joint velocity {JOINT_VEL_POINTS}"),
@@ -88,14 +90,14 @@ async fn the_board_shows_tiers_in_order_with_rates_intervals_points_and_score() 
     }
     assert!(texts(&html, "footer")[0].contains("airhockey-2023.3"));
     assert!(texts(&html, ".lead")[0].contains("Test season"));
-    // what a screen reader needs of a table
+    // Screen readers need a caption and scoped headers.
     assert_eq!(texts(&html, "table.board caption").len(), 1);
     let unscoped = Selector::parse("table th:not([scope])").unwrap();
     assert_eq!(html.select(&unscoped).count(), 0);
 }
 
 #[tokio::test]
-async fn until_the_day_is_released_the_boards_tell_score_and_points_only() {
+async fn board_shows_only_score_and_points_before_the_release() {
     let site = Site::start().await;
     for (name, ..) in TEAMS {
         let team = site.team(name).await;
@@ -103,9 +105,9 @@ async fn until_the_day_is_released_the_boards_tell_score_and_points_only() {
     }
     let late = site.team("Late").await;
     let submission = site.valid_submission(&late, "late").await;
-    let straggler = site.evaluate(&late, &submission).await;
+    let late_evaluation = site.evaluate(&late, &submission).await;
     for (_, rates, points) in TEAMS {
-        site.finish(&result(rates, points)).await;
+        site.finish_evaluation(&result(rates, points)).await;
     }
     let seed = faceoff_types::Seed::from_number(7).to_string();
     let details = ["violations", "steps", "computation_time_s"];
@@ -126,18 +128,18 @@ async fn until_the_day_is_released_the_boards_tell_score_and_points_only() {
         }
     }
     let board = site.get("/api/v1/board", None).await.json(200);
-    for (row, (tier, name)) in board["rows"].as_array().unwrap().iter().zip(ORDER) {
+    for (row, (tier, name)) in board["rows"].as_array().unwrap().iter().zip(BOARD_ORDER) {
         assert_eq!((&row["tier"], &row["team"]), (&json!(tier), &json!(name)));
     }
-    assert_eq!(board["rows"].as_array().unwrap().len(), ORDER.len());
+    assert_eq!(board["rows"].as_array().unwrap().len(), BOARD_ORDER.len());
     assert_eq!(board["ruleset"], "airhockey-2023.3");
     let stage = site.stage().await;
     assert_eq!(
         (&board["stage"], &board["stage_name"], &board["revision"]),
         (&json!(stage), &json!("Qualifying"), &json!(1))
     );
-    let named = format!("/api/v1/board?stage={stage}&revision=1");
-    assert_eq!(site.get(&named, None).await.json(200), board);
+    let path_with_stage = format!("/api/v1/board?stage={stage}&revision=1");
+    assert_eq!(site.get(&path_with_stage, None).await.json(200), board);
     site.get("/api/v1/board?revision=2", None)
         .await
         .problem(404, "not-found", &["revision"]);
@@ -154,25 +156,25 @@ async fn until_the_day_is_released_the_boards_tell_score_and_points_only() {
         1,
         "no violations, no times"
     );
-    assert!(texts(&html, ".facts").join(" ").contains("held back"));
+    assert!(texts(&html, ".facts").join(" ").contains("published together"));
     let tasks = page(&site, "/tasks/hit").await;
     assert_eq!(texts(&tasks, "td.none").len(), TEAMS.len());
     assert!(!site.get(&evaluation, None).await.body.contains(&seed));
 
-    // The last one ends, and all of it is there, whoever asks.
-    site.finish(&result([0.1, 0.1, 0.1], 10.0)).await;
+    // With the end of the last evaluation all details become public.
+    site.finish_evaluation(&result([0.1, 0.1, 0.1], 10.0)).await;
     let board = site.get("/api/v1/board", None).await.json(200);
     assert_eq!(board["rows"][0]["seed"], seed);
     assert_eq!(board["rows"][0]["tasks"]["hit"]["violations"]["ee"], 7);
-    for path in [evaluation, straggler.replace("/api/v1", "")] {
+    for path in [evaluation, late_evaluation.replace("/api/v1", "")] {
         assert!(site.get(&path, None).await.body.contains(&seed));
     }
     assert_eq!(texts(&page(&site, "/tasks/hit").await, "td.none").len(), 0);
 }
 
 #[tokio::test]
-async fn a_tasks_board_ranks_by_the_task_alone() {
-    let site = competition().await;
+async fn task_board_ranks_by_its_task_only() {
+    let site = site_with_results().await;
     let board = site.get("/api/v1/board/prepare", None).await.json(200);
     let names: Vec<_> = board["rows"]
         .as_array()
@@ -216,8 +218,8 @@ async fn a_tasks_board_ranks_by_the_task_alone() {
 }
 
 #[tokio::test]
-async fn an_evaluations_page_shows_results_violations_and_times_to_everybody() {
-    let site = competition().await;
+async fn evaluation_page_shows_results_violations_and_times() {
+    let site = site_with_results().await;
     let board = site.get("/api/v1/board", None).await.json(200);
     let path = format!(
         "/evaluations/{}",
@@ -231,23 +233,23 @@ async fn an_evaluations_page_shows_results_violations_and_times_to_everybody() {
         assert!(tables.contains(part), "{part:?} is not in {tables:?}");
     }
     for part in [
-        "before2000.0210.0830.420",
+        "before the evaluation2000.0210.0830.420",
         "between episodes30000.0220.09531.200",
     ] {
         assert!(tables.contains(part), "{part:?} is not in {tables:?}");
     }
     let facts = texts(&html, ".facts").join(" ");
     for part in [
-        "Most that the host took of one answer30 ms",
-        "played again for it2",
-        "begun again after a fault of ours1",
+        "Longest delay caused by our machine30 ms",
+        "Episodes repeated because of it2",
+        "Restarts after a platform fault1",
     ] {
         assert!(facts.contains(part), "{part:?} is not in {facts:?}");
     }
 }
 
 #[tokio::test]
-async fn an_empty_board_says_what_comes_next_and_a_running_one_how_far_it_is() {
+async fn board_page_shows_next_steps_and_progress() {
     let site = Site::start().await;
     let html = page(&site, "/").await;
     let empty = texts(&html, ".empty").join(" ");
@@ -274,7 +276,7 @@ async fn an_empty_board_says_what_comes_next_and_a_running_one_how_far_it_is() {
         assert_eq!(rows, ["Alpha Running 3 of 12"], "{day}");
         let whole = texts(&html, ".under-way .whole").join(" ");
         assert!(
-            whole.starts_with("3 of 12 episodes; 0 of 1 evaluations are over."),
+            whole.starts_with("3 of 12 episodes; 0 of 1 evaluations done."),
             "{whole}"
         );
         site.next_day();

@@ -1,11 +1,11 @@
-//! Boards as programs read them: tables, tags, days and their history.
+//! Boards as API clients read them: CSV, ETags, past days and the history.
 
-use crate::site::{ADMIN, Answer, Site, TestTeam, result, text};
+use crate::site::{ADMIN, Answer, Site, TestTeam, result, string};
 use reqwest::Method;
 use serde_json::{Value, json};
 use std::{collections::BTreeMap, io::Read};
 
-/// Two teams on three days: each day's scores, and what the second one calls its agent.
+/// Two teams with results on three days. The second team's agent name looks like a spreadsheet formula.
 async fn three_days(site: &Site) -> [TestTeam; 2] {
     let teams = [site.team("Alpha").await, site.team("Beta").await];
     site.valid_submission(&teams[0], "plain").await;
@@ -15,21 +15,21 @@ async fn three_days(site: &Site) -> [TestTeam; 2] {
         if at > 0 {
             site.next_day();
         }
-        one_day(site, &[alpha, beta]).await;
+        run_day(site, &[alpha, beta]).await;
     }
     teams
 }
 
-async fn one_day(site: &Site, rates: &[f64]) {
+async fn run_day(site: &Site, rates: &[f64]) {
     let started = site.post("/api/v1/days", Some(ADMIN), &json!({})).await;
     started.json(200);
     for rate in rates {
-        site.finish(&result([*rate; 3], 10.0)).await;
+        site.finish_evaluation(&result([*rate; 3], 10.0)).await;
     }
 }
 
-/// Read by a reader of such tables; by the names of the columns.
-fn table(answer: &Answer) -> Vec<BTreeMap<String, String>> {
+/// The rows of a CSV response, by column name.
+fn csv_rows(answer: &Answer) -> Vec<BTreeMap<String, String>> {
     assert_eq!(answer.status, 200, "{}", answer.body);
     assert!(answer.header("content-type").starts_with("text/csv"));
     csv::Reader::from_reader(answer.body.as_bytes())
@@ -38,7 +38,7 @@ fn table(answer: &Answer) -> Vec<BTreeMap<String, String>> {
         .unwrap()
 }
 
-async fn with(site: &Site, path: &str, headers: &[(&str, &str)], token: Option<&str>) -> Answer {
+async fn get_with_headers(site: &Site, path: &str, headers: &[(&str, &str)], token: Option<&str>) -> Answer {
     let mut request = site.request(Method::GET, path, token);
     for (name, value) in headers {
         request = request.header(*name, *value);
@@ -48,23 +48,23 @@ async fn with(site: &Site, path: &str, headers: &[(&str, &str)], token: Option<&
 
 fn teams(board: &Value) -> Vec<(String, u64)> {
     let rows = board["rows"].as_array().unwrap().iter();
-    rows.map(|row| (text(&row["team"]), row["rank"].as_u64().unwrap()))
+    rows.map(|row| (string(&row["team"]), row["rank"].as_u64().unwrap()))
         .collect()
 }
 
 #[tokio::test]
-async fn a_board_is_a_table_that_says_what_its_rows_say() {
+async fn board_csv_matches_the_json() {
     let site = Site::start().await;
     three_days(&site).await;
     let board = site.get("/api/v1/board", None).await.json(200);
-    let by_query = table(&site.get("/api/v1/board?format=csv", None).await);
+    let by_query = csv_rows(&site.get("/api/v1/board?format=csv", None).await);
     let accept = [("accept", "text/csv;q=0.9, text/plain")];
-    let by_header = table(&with(&site, "/api/v1/board", &accept, None).await);
+    let by_header = csv_rows(&get_with_headers(&site, "/api/v1/board", &accept, None).await);
     assert_eq!(by_query, by_header);
     assert_eq!(by_query.len(), 2);
     for (line, row) in by_query.iter().zip(board["rows"].as_array().unwrap()) {
         let hit = &row["tasks"]["hit"];
-        for (column, told) in [
+        for (column, value) in [
             ("rank", &row["rank"]),
             ("rank_group", &row["rank_group"]),
             ("team", &row["team"]),
@@ -83,11 +83,11 @@ async fn a_board_is_a_table_that_says_what_its_rows_say() {
                 &hit["computation_time_s"]["p99"],
             ),
         ] {
-            let expected = match told {
+            let expected = match value {
                 Value::String(text) => text.clone(),
                 Value::Number(number) => {
-                    let told: f64 = line[column].parse().unwrap();
-                    assert_eq!(Some(told), number.as_f64(), "{column}");
+                    let parsed: f64 = line[column].parse().unwrap();
+                    assert_eq!(Some(parsed), number.as_f64(), "{column}");
                     continue;
                 }
                 other => panic!("{column}: {other}"),
@@ -96,15 +96,15 @@ async fn a_board_is_a_table_that_says_what_its_rows_say() {
         }
         assert_eq!(line["baseline"], "false");
     }
-    // No spreadsheet takes a stranger's words for a formula.
+    // The agent name is escaped, so that spreadsheets do not evaluate it as a formula.
     let agent = &by_query.iter().find(|line| line["team"] == "Beta").unwrap()["agent"];
     assert!(
         agent.starts_with("'=HYPERLINK(\"http://x\", 1),"),
         "{agent:?}"
     );
     let json = [("accept", "text/csv, application/json")];
-    with(&site, "/api/v1/board", &json, None).await.json(200);
-    let task = table(&site.get("/api/v1/board/hit?format=csv", None).await);
+    get_with_headers(&site, "/api/v1/board", &json, None).await.json(200);
+    let task = csv_rows(&site.get("/api/v1/board/hit?format=csv", None).await);
     assert_eq!(task.len(), 2);
     site.get("/api/v1/board?format=xml", None)
         .await
@@ -112,7 +112,7 @@ async fn a_board_is_a_table_that_says_what_its_rows_say() {
 }
 
 #[tokio::test]
-async fn a_board_that_has_not_changed_is_not_sent_again() {
+async fn unchanged_board_answers_not_modified() {
     let site = Site::start().await;
     let [alpha, _] = three_days(&site).await;
     for path in [
@@ -126,20 +126,20 @@ async fn a_board_that_has_not_changed_is_not_sent_again() {
         assert_eq!(first.header("cache-control"), "private, no-cache");
         assert_eq!(first.header("vary"), "authorization, cookie, accept");
         let known = [("if-none-match", tag.as_str())];
-        let again = with(&site, path, &known, None).await;
+        let again = get_with_headers(&site, path, &known, None).await;
         assert_eq!((again.status.as_u16(), again.body.as_str()), (304, ""));
         assert_eq!(again.header("etag"), tag);
         assert_eq!(again.header("vary"), "authorization, cookie, accept");
-        // To a team it is the same, to the organiser it may be another.
-        let team = with(&site, path, &known, Some(&alpha.token)).await;
+        // A team sees the same board, an organiser may see another one.
+        let team = get_with_headers(&site, path, &known, Some(&alpha.token)).await;
         assert_eq!(team.status, 304);
-        let organiser = with(&site, path, &known, Some(ADMIN)).await;
+        let organiser = get_with_headers(&site, path, &known, Some(ADMIN)).await;
         assert_eq!(organiser.status, 200);
         let other = format!(
             "{path}{}revision=1",
             if path.contains('?') { "&" } else { "?" }
         );
-        assert_eq!(with(&site, &other, &known, None).await.status, 200);
+        assert_eq!(get_with_headers(&site, &other, &known, None).await.status, 200);
         let head = site.request(Method::HEAD, path, None).send().await.unwrap();
         assert_eq!(head.headers()["etag"], tag.as_str());
         assert_eq!(
@@ -147,7 +147,7 @@ async fn a_board_that_has_not_changed_is_not_sent_again() {
             first.header("content-length")
         );
     }
-    // What is played is no news before it is a result.
+    // Progress without a result does not change the board.
     site.next_day();
     let started = site.post("/api/v1/days", Some(ADMIN), &json!({})).await;
     started.json(200);
@@ -157,19 +157,19 @@ async fn a_board_that_has_not_changed_is_not_sent_again() {
     let progress = site.store.heartbeat(&claim, 3, 60, site.now());
     assert!(progress.await.unwrap());
     site.store.release(&claim, site.now()).await.unwrap();
-    let again = with(&site, "/api/v1/board", &known, None).await;
+    let again = get_with_headers(&site, "/api/v1/board", &known, None).await;
     assert_eq!(again.status, 304);
-    site.finish(&result([0.8; 3], 10.0)).await;
-    let changed = with(&site, "/api/v1/board", &known, None).await.json(200);
+    site.finish_evaluation(&result([0.8; 3], 10.0)).await;
+    let changed = get_with_headers(&site, "/api/v1/board", &known, None).await.json(200);
     let score = changed["rows"][0]["score"].as_f64().unwrap();
     assert_eq!(score.round(), 80.0);
 }
 
 #[tokio::test]
-async fn a_board_is_shown_as_it_stood_on_a_day() {
+async fn board_of_a_past_day_shows_results_up_to_that_day() {
     let site = Site::start().await;
     three_days(&site).await;
-    let place = |name: &str, rank| (name.to_owned(), rank);
+    let row = |name: &str, rank| (name.to_owned(), rank);
     for (query, first, second) in [
         ("?day=2026-03-01", "Alpha", "Beta"),
         ("?day=2026-03-02", "Beta", "Alpha"),
@@ -182,7 +182,7 @@ async fn a_board_is_shown_as_it_stood_on_a_day() {
         let board = board.json(200);
         assert_eq!(
             teams(&board),
-            [place(first, 1), place(second, 2)],
+            [row(first, 1), row(second, 2)],
             "{query}"
         );
         let by = if query.contains("best") {
@@ -196,10 +196,10 @@ async fn a_board_is_shown_as_it_stood_on_a_day() {
         assert_eq!(board["day"].as_str(), day);
     }
     for (day, words) in [
-        ("2026-02-28", "none before it"),
+        ("2026-02-28", "no earlier day"),
         (
             "2026-03-04",
-            "the one before it that has some is 2026-03-03",
+            "the last earlier day with results is 2026-03-03",
         ),
     ] {
         site.get(&format!("/api/v1/board?day={day}"), None)
@@ -208,22 +208,22 @@ async fn a_board_is_shown_as_it_stood_on_a_day() {
     }
     let page = site.get("/?day=2026-03-02", None).await;
     assert!(
-        page.body.contains("of the days up to 2026-03-02"),
+        page.body.contains("up to 2026-03-02"),
         "{}",
         page.body
     );
 }
 
 #[tokio::test]
-async fn the_history_tells_each_days_results_and_ranks() {
+async fn history_lists_results_and_ranks_of_each_day() {
     let site = Site::start().await;
     three_days(&site).await;
-    let told = |history: &Value| -> Vec<(String, String, u64, f64)> {
+    let summary = |history: &Value| -> Vec<(String, String, u64, f64)> {
         let rows = history["rows"].as_array().unwrap().iter();
         rows.map(|row| {
             let rank = row["rank"].as_u64().unwrap();
             let score = row["score"].as_f64().unwrap().round();
-            (text(&row["day"]), text(&row["team"]), rank, score)
+            (string(&row["day"]), string(&row["team"]), rank, score)
         })
         .collect()
     };
@@ -232,7 +232,7 @@ async fn the_history_tells_each_days_results_and_ranks() {
     };
     let history = site.get("/api/v1/board/history", None).await.json(200);
     assert_eq!(
-        told(&history),
+        summary(&history),
         [
             row("01", "Alpha", 1, 50.0),
             row("01", "Beta", 2, 40.0),
@@ -247,16 +247,16 @@ async fn the_history_tells_each_days_results_and_ranks() {
         json!(["2026-03-01", "2026-03-02", "2026-03-03"])
     );
     assert_eq!(history["rows"][0]["tasks"]["hit"]["success_rate"], 0.5);
-    // By the best, the last day changes no rank.
+    // With `by=best` the last day changes no rank.
     let best = site
         .get("/api/v1/board/history?by=best&task=hit", None)
         .await;
-    let best = told(&best.json(200));
+    let best = summary(&best.json(200));
     assert_eq!(
         best[4..],
         [row("03", "Beta", 1, 30.0), row("03", "Alpha", 2, 70.0)]
     );
-    let lines = table(&site.get("/api/v1/board/history?format=csv", None).await);
+    let lines = csv_rows(&site.get("/api/v1/board/history?format=csv", None).await);
     assert_eq!(lines.len(), 6);
     assert_eq!(
         (
@@ -270,21 +270,21 @@ async fn the_history_tells_each_days_results_and_ranks() {
 }
 
 #[tokio::test]
-async fn neither_days_nor_history_look_behind_a_freeze() {
+async fn past_days_and_history_hide_results_after_a_freeze() {
     let site = Site::start().await;
     three_days(&site).await;
     let stage = format!("/api/v1/stages/{}", site.stage().await);
-    let why = json!({ "reason": "a surprise" });
-    site.post(&format!("{stage}/freeze"), Some(ADMIN), &why)
+    let reason = json!({ "reason": "a surprise" });
+    site.post(&format!("{stage}/freeze"), Some(ADMIN), &reason)
         .await
         .json(200);
     site.next_day();
-    one_day(&site, &[0.1, 0.2]).await;
+    run_day(&site, &[0.1, 0.2]).await;
     let history = "/api/v1/board/history";
     for token in [None, Some(ADMIN)] {
-        let told = site.get(history, token).await.json(200);
-        assert_eq!(told["days"].as_array().unwrap().len(), 3);
-        assert_eq!(told["frozen"]["reason"], "a surprise");
+        let view = site.get(history, token).await.json(200);
+        assert_eq!(view["days"].as_array().unwrap().len(), 3);
+        assert_eq!(view["frozen"]["reason"], "a surprise");
     }
     let live = format!("{history}?live=true");
     site.get(&live, None)
@@ -304,12 +304,12 @@ async fn neither_days_nor_history_look_behind_a_freeze() {
 }
 
 #[tokio::test]
-async fn texts_are_compressed_for_who_takes_that_and_files_are_not() {
+async fn texts_are_compressed_on_request_and_files_are_not() {
     let site = Site::start().await;
     let [alpha, _] = three_days(&site).await;
     let plain = site.get("/api/v1/board", None).await;
     assert!(!plain.headers.contains_key("content-encoding"));
-    let ask = async |path: &str| {
+    let get_gzip = async |path: &str| {
         let request = site.request(Method::GET, path, Some(&alpha.token));
         let sent = request
             .header("accept-encoding", "gzip")
@@ -319,14 +319,14 @@ async fn texts_are_compressed_for_who_takes_that_and_files_are_not() {
         let headers = sent.headers().clone();
         (headers, sent.bytes().await.unwrap())
     };
-    let (headers, body) = ask("/api/v1/board").await;
+    let (headers, body) = get_gzip("/api/v1/board").await;
     assert_eq!(headers["content-encoding"], "gzip");
-    let by = headers
+    let vary = headers
         .get_all("vary")
         .iter()
         .map(|value| value.to_str().unwrap());
     assert_eq!(
-        by.collect::<Vec<_>>().join(", "),
+        vary.collect::<Vec<_>>().join(", "),
         "authorization, cookie, accept, accept-encoding"
     );
     assert!(body.len() < plain.body.len() / 2);
@@ -340,10 +340,10 @@ async fn texts_are_compressed_for_who_takes_that_and_files_are_not() {
         .get("/api/v1/evaluations", Some(&alpha.token))
         .await
         .json(200);
-    let dataset = format!("/api/v1/evaluations/{}/dataset", text(&list[0]["id"]));
-    let (headers, body) = ask(&dataset).await;
+    let dataset = format!("/api/v1/evaluations/{}/dataset", string(&list[0]["id"]));
+    let (headers, body) = get_gzip(&dataset).await;
     assert!(!headers.contains_key("content-encoding"));
     assert_eq!(&body[..], b"PK the recorded dataset");
-    let (headers, _) = ask("/api/v1/whoami").await;
+    let (headers, _) = get_gzip("/api/v1/whoami").await;
     assert!(!headers.contains_key("content-encoding"), "it is small");
 }

@@ -1,10 +1,10 @@
-//! A browser without scripts: it opens pages, sends forms, and keeps one cookie.
+//! A browser without scripts: it opens pages, submits forms and keeps one cookie.
 
-use crate::site::{ADMIN, Answer, Site, http, text};
+use crate::site::{ADMIN, Answer, Site, client_builder, string};
 use reqwest::redirect::Policy;
 use scraper::{Html, Selector};
 
-/// A browser: it follows nothing by itself, keeps one cookie, and says where its forms come from.
+/// A browser that follows no redirects, keeps one cookie, and sends the origin of its forms.
 pub struct Browser<'a> {
     pub site: &'a Site,
     pub http: reqwest::Client,
@@ -13,7 +13,7 @@ pub struct Browser<'a> {
 
 impl<'a> Browser<'a> {
     pub fn new(site: &'a Site) -> Self {
-        let http = http().redirect(Policy::none());
+        let http = client_builder().redirect(Policy::none());
         Self {
             site,
             http: http.build().unwrap(),
@@ -42,7 +42,7 @@ impl<'a> Browser<'a> {
     pub async fn submit(&mut self, path: &str, fields: &[(&str, &str)]) -> Answer {
         let body: Vec<String> = fields
             .iter()
-            .map(|(name, value)| format!("{name}={}", encoded(value)))
+            .map(|(name, value)| format!("{name}={}", encode(value)))
             .collect();
         let request = self
             .http
@@ -54,7 +54,7 @@ impl<'a> Browser<'a> {
         self.send(request).await
     }
 
-    /// Sends an archive as the upload's form does.
+    /// Uploads an archive as the upload form does.
     pub async fn upload(&mut self, path: &str, name: &str, archive: &[u8]) -> Answer {
         let head = format!(
             "--X\r\nContent-Disposition: form-data; name=\"bundle\"; filename=\"{name}\"\r\n\
@@ -71,8 +71,8 @@ impl<'a> Browser<'a> {
         self.send(request).await
     }
 
-    /// What a foreign page has the browser send: with the cookie, as an old or a careless one would.
-    pub async fn lured(&mut self, form: &Form) -> Vec<Answer> {
+    /// Submits a form from a foreign page. The cookie is sent along, as an old browser would.
+    pub async fn submit_from_foreign_page(&mut self, form: &Form) -> Vec<Answer> {
         let mut answers = Vec::new();
         for (name, value) in [
             ("origin", "https://evil.example"),
@@ -84,7 +84,7 @@ impl<'a> Browser<'a> {
             let fields: Vec<String> = form
                 .fields
                 .iter()
-                .map(|(name, value)| format!("{name}={}", encoded(value)))
+                .map(|(name, value)| format!("{name}={}", encode(value)))
                 .collect();
             let media_type = match form.is_multipart {
                 true => "multipart/form-data; boundary=X",
@@ -101,9 +101,9 @@ impl<'a> Browser<'a> {
         answers
     }
 
-    /// Of somebody who has followed an invitation to be this.
-    pub async fn joined(site: &'a Site, name: &str, role: serde_json::Value) -> Self {
-        let link = invited(site, role).await;
+    /// A browser of a user who has accepted an invitation with this role.
+    pub async fn join(site: &'a Site, name: &str, role: serde_json::Value) -> Self {
+        let link = invite(site, role).await;
         let mut browser = Self::new(site);
         let fields = [("name", name), ("password", PASSWORD)];
         assert_eq!(browser.submit(&link, &fields).await.status, 303);
@@ -111,7 +111,7 @@ impl<'a> Browser<'a> {
     }
 }
 
-fn encoded(text: &str) -> String {
+fn encode(text: &str) -> String {
     let encoded = text.bytes().map(|byte| match byte {
         b' ' => "+".to_owned(),
         byte if byte.is_ascii_alphanumeric() || b"-._".contains(&byte) => {
@@ -122,7 +122,7 @@ fn encoded(text: &str) -> String {
     encoded.collect()
 }
 
-/// A form of a page, with what its fields hold.
+/// A form of a page, with the values of its fields.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Form {
     pub action: String,
@@ -134,7 +134,7 @@ pub struct Form {
 /// The forms of the page at a path.
 pub fn forms(path: &str, answer: &Answer) -> Vec<Form> {
     let page = Html::parse_document(&answer.body);
-    let select = |words: &str| Selector::parse(words).unwrap();
+    let select = |selector: &str| Selector::parse(selector).unwrap();
     let (forms, inputs) = (
         select("form"),
         select("input[name], textarea[name], select[name]"),
@@ -145,11 +145,11 @@ pub fn forms(path: &str, answer: &Answer) -> Vec<Form> {
             let attr = |name| form.value().attr(name);
             let fields = form.select(&inputs).filter_map(|field| {
                 let name = field.value().attr("name").unwrap().to_owned();
-                let value = |of: scraper::ElementRef<'_>| {
-                    let value = of.value().attr("value").map(str::to_owned);
-                    value.unwrap_or_else(|| of.text().collect())
+                let value = |element: scraper::ElementRef<'_>| {
+                    let value = element.value().attr("value").map(str::to_owned);
+                    value.unwrap_or_else(|| element.text().collect())
                 };
-                let is_box = field.value().attr("type") == Some("checkbox");
+                let is_checkbox = field.value().attr("type") == Some("checkbox");
                 match field.value().name() {
                     "select" => {
                         let options: Vec<_> = field.select(&options).collect();
@@ -159,7 +159,7 @@ pub fn forms(path: &str, answer: &Answer) -> Vec<Form> {
                             .or(options.first());
                         chosen.map(|option| (name, value(*option)))
                     }
-                    _ if is_box => field
+                    _ if is_checkbox => field
                         .value()
                         .attr("checked")
                         .map(|_| (name, field.value().attr("value").unwrap_or("on").to_owned())),
@@ -177,17 +177,17 @@ pub fn forms(path: &str, answer: &Answer) -> Vec<Form> {
 }
 
 /// The text of the first element that the selector finds.
-pub fn first(answer: &Answer, selector: &str) -> String {
+pub fn first_text(answer: &Answer, selector: &str) -> String {
     let page = Html::parse_document(&answer.body);
     let found = page.select(&Selector::parse(selector).unwrap()).next();
     let found = found.unwrap_or_else(|| panic!("no {selector} in {}", answer.body));
     found.text().collect::<String>().trim().to_owned()
 }
 
-/// The path of a new invitation's page.
-pub async fn invited(site: &Site, body: serde_json::Value) -> String {
+/// Creates an invitation. Returns the path of its page.
+pub async fn invite(site: &Site, body: serde_json::Value) -> String {
     let invited = site.post("/api/v1/invitations", Some(ADMIN), &body).await;
-    text(&invited.json(201)["link"])
+    string(&invited.json(201)["link"])
 }
 
 pub const PASSWORD: &str = "correct horse battery";

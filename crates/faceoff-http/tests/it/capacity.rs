@@ -1,6 +1,6 @@
-//! Whether a day fits, where what waits stands, and what happens to it next.
+//! The capacity forecast, queue positions and next steps, and warnings about days that do not fit.
 
-use crate::site::{ADMIN, Answer, Site, text};
+use crate::site::{ADMIN, Answer, Site, string};
 use faceoff_store::*;
 use reqwest::Method;
 use serde_json::{Value, json};
@@ -11,13 +11,13 @@ pub async fn change(site: &Site, stage: &str, body: Value) -> Answer {
     Answer::of(request.send().await.unwrap()).await
 }
 
-/// Plays the next evaluation; each shard takes so many seconds.
-pub async fn play_slowly(site: &Site, seconds: i64) {
+/// Runs the next evaluation. Each shard takes this many seconds.
+pub async fn run_evaluation_slowly(site: &Site, seconds: i64) {
     loop {
-        let Claimed { claim, work } = site.claim().await;
-        site.later(seconds);
-        match work {
-            Work::Shard { run, shard, .. } => {
+        let ClaimedJob { claim, job } = site.claim().await;
+        site.advance(seconds);
+        match job {
+            Job::Shard { run, shard, .. } => {
                 let commit = ShardCommit {
                     outcomes: (shard.first_episode..shard.end_episode)
                         .map(|episode| crate::site::outcome(shard.task, episode, false))
@@ -27,9 +27,9 @@ pub async fn play_slowly(site: &Site, seconds: i64) {
                     recording: Some(claim.recording_key(run.id)),
                 };
                 let committed = site.store.commit_shard(&claim, commit, site.now());
-                assert_eq!(committed.await.unwrap(), Committed::Now);
+                assert_eq!(committed.await.unwrap(), CommitOutcome::Stored);
             }
-            Work::Finalise { .. } => {
+            Job::Scoring { .. } => {
                 let result = crate::site::result([0.5, 0.5, 0.5], 10.0);
                 let hash = blake3::hash(b"d").to_string();
                 let finished =
@@ -38,14 +38,14 @@ pub async fn play_slowly(site: &Site, seconds: i64) {
                 finished.await.unwrap();
                 return;
             }
-            Work::Smoke { .. } | Work::Game { .. } => panic!("no upload waits, and no game"),
+            Job::Validation { .. } | Job::Game { .. } => panic!("expected a shard or a scoring job"),
         }
     }
 }
 
 #[tokio::test]
-async fn a_day_that_will_not_fit_is_told_of_before_it_starts() {
-    let site = Site::start_daily("12:00").await;
+async fn forecast_reports_a_day_that_will_not_fit() {
+    let site = Site::start_with_schedule("12:00").await;
     let alpha = site.team("Alpha").await;
     let stage = site.stage().await.to_string();
     let path = format!("/api/v1/stages/{stage}/capacity");
@@ -57,11 +57,11 @@ async fn a_day_that_will_not_fit_is_told_of_before_it_starts() {
         (&json!("Qualifying"), &json!(2))
     );
     assert_eq!(none["days"][0]["teams"], 0);
-    assert!(text(&none["days"][0]["summary"]).contains("no team has a valid submission"));
+    assert!(string(&none["days"][0]["summary"]).contains("no team has a valid submission"));
 
     let submission = site.valid_submission(&alpha, "a").await;
     let unknown = capacity().await["days"][0].clone();
-    // 3 tasks × 4 episodes, a shard each; the next cut, and a day until the one after.
+    // 3 tasks × 4 episodes, one shard each. The time is one day: from the next cutoff to the following one.
     assert_eq!(
         (
             &unknown["day"],
@@ -94,7 +94,7 @@ async fn a_day_that_will_not_fit_is_told_of_before_it_starts() {
     .json(200);
 
     site.evaluate(&alpha, &submission).await;
-    play_slowly(&site, 300).await;
+    run_evaluation_slowly(&site, 300).await;
     site.next_day();
     change(
         &site,
@@ -110,7 +110,7 @@ async fn a_day_that_will_not_fit_is_told_of_before_it_starts() {
         (&too_much["fit"], &too_much["hours_until_deadline"]),
         (&json!("not"), &json!(1.0))
     );
-    let summary = text(&too_much["summary"]);
+    let summary = string(&too_much["summary"]);
     for words in [
         "31.2 hours",
         "1.0 hours",
@@ -121,9 +121,9 @@ async fn a_day_that_will_not_fit_is_told_of_before_it_starts() {
         assert!(summary.contains(words), "{words} is not in {summary}");
     }
 
-    // Under way, it is what is left of it against what is left of the time.
+    // Once the day has started, the remaining episodes are compared with the remaining time.
     let evaluation = site.evaluate(&alpha, &submission).await;
-    site.later(1800);
+    site.advance(1800);
     let days = capacity().await["days"].clone();
     assert_eq!(days.as_array().unwrap().len(), 2);
     assert_eq!(
@@ -136,19 +136,19 @@ async fn a_day_that_will_not_fit_is_told_of_before_it_starts() {
     );
     let view = site.get(&evaluation, Some(&alpha.token)).await.json(200);
     assert_eq!(view["deadline_at"], days[0]["deadline_at"]);
-    site.later(1800);
+    site.advance(1800);
     site.store.end_overdue_days(site.now()).await.unwrap();
     let view = site.get(&evaluation, Some(&alpha.token)).await.json(200);
     assert_eq!(view["state"], "not_played");
-    assert!(text(&view["reason"]).contains("our capacity"), "{view}");
-    assert!(text(&view["next"]).contains("older day stays"), "{view}");
+    assert!(string(&view["reason"]).contains("the server ran out of time"), "{view}");
+    assert!(string(&view["next"]).contains("earlier day stays"), "{view}");
     assert_eq!(view["queue"], Value::Null);
     let board = site.get("/api/v1/board?revision=3", None).await.json(200);
     assert_eq!(board["rows"][0]["day"], "2026-03-01", "{board}");
     let page = evaluation.replace("/api/v1", "");
     let page = site.get(&page, None).await;
     assert!(
-        page.body.contains("for want of this server"),
+        page.body.contains("the server ran out of time"),
         "{}",
         page.body
     );
@@ -157,7 +157,7 @@ async fn a_day_that_will_not_fit_is_told_of_before_it_starts() {
 }
 
 #[tokio::test]
-async fn what_waits_tells_its_place_its_time_and_what_comes_next() {
+async fn pending_jobs_show_position_time_and_next_step() {
     let site = Site::start().await;
     let [alpha, beta] = [site.team("Alpha").await, site.team("Beta").await];
     let mut agents = Vec::new();
@@ -165,13 +165,13 @@ async fn what_waits_tells_its_place_its_time_and_what_comes_next() {
         agents.push(site.valid_submission(team, "a").await);
     }
     let upload = site.upload(&alpha.token, crate::site::GZIP.to_vec()).await;
-    let upload = format!("/api/v1/submissions/{}", text(&upload.json(201)["id"]));
+    let upload = format!("/api/v1/submissions/{}", string(&upload.json(201)["id"]));
     let waiting = site.get(&upload, Some(&alpha.token)).await.json(200);
     assert_eq!(
         waiting["queue"],
         json!({ "place": 1, "of": 1, "expected_at": null })
     );
-    assert!(text(&waiting["next"]).contains("smoke run"));
+    assert!(string(&waiting["next"]).contains("validation run"));
     let me = site.get("/api/v1/me", Some(&alpha.token)).await.json(200);
     assert_eq!(me["validating"][0]["queue"], waiting["queue"]);
     let list = site
@@ -180,10 +180,10 @@ async fn what_waits_tells_its_place_its_time_and_what_comes_next() {
         .json(200);
     assert_eq!(list[0]["queue"], waiting["queue"]);
     assert_eq!(list[1]["queue"], Value::Null);
-    assert!(text(&list[1]["next"]).contains("plays at the next cut"));
-    let smoke = site.claim().await;
-    site.later(20);
-    let outcome = faceoff_types::SmokeOutcome::Invalid {
+    assert!(string(&list[1]["next"]).contains("evaluated at the next cutoff"));
+    let validation = site.claim().await;
+    site.advance(20);
+    let outcome = faceoff_types::ValidationOutcome::Invalid {
         runtime: None,
         agent_name: None,
         reason: "no agent.toml".into(),
@@ -191,38 +191,38 @@ async fn what_waits_tells_its_place_its_time_and_what_comes_next() {
         log: String::new(),
     };
     site.store
-        .commit_smoke(&smoke.claim, outcome, site.now())
+        .commit_validation(&validation.claim, outcome, site.now())
         .await
         .unwrap();
     let refused = site.get(&upload, Some(&alpha.token)).await.json(200);
     assert_eq!(refused["queue"], Value::Null);
-    assert!(text(&refused["next"]).contains("upload another"));
+    assert!(string(&refused["next"]).contains("upload again"));
     let me = site.get("/api/v1/me", Some(&alpha.token)).await.json(200);
     assert_eq!(me["validating"], json!([]));
 
-    let of_alpha = site.evaluate(&alpha, &agents[0]).await;
-    let of_beta = site.evaluate(&beta, &agents[1]).await;
-    play_slowly(&site, 60).await;
-    let mut left = Vec::new();
-    for (team, path) in [(&alpha, &of_alpha), (&beta, &of_beta)] {
+    let alpha_evaluation = site.evaluate(&alpha, &agents[0]).await;
+    let beta_evaluation = site.evaluate(&beta, &agents[1]).await;
+    run_evaluation_slowly(&site, 60).await;
+    let mut pending = Vec::new();
+    for (team, path) in [(&alpha, &alpha_evaluation), (&beta, &beta_evaluation)] {
         let view = site.get(path, Some(&team.token)).await.json(200);
         let me = site.get("/api/v1/me", Some(&team.token)).await.json(200);
         assert_eq!(me["turn"]["queue"], view["queue"]);
         assert_eq!(me["turn"]["next"], view["next"]);
         if view["state"] != "finished" {
-            left.push((view, path.replace("/api/v1", "")));
+            pending.push((view, path.replace("/api/v1", "")));
         }
     }
-    let (view, page) = &left[0];
-    assert_eq!(left.len(), 1);
+    let (view, page) = &pending[0];
+    assert_eq!(pending.len(), 1);
     assert_eq!(
         (&view["queue"]["place"], &view["queue"]["of"]),
         (&json!(1), &json!(1))
     );
-    let expected: jiff::Timestamp = text(&view["queue"]["expected_at"]).parse().unwrap();
+    let expected: jiff::Timestamp = string(&view["queue"]["expected_at"]).parse().unwrap();
     assert!(expected > site.now());
-    let of_day = site.get("/api/v1/evaluations", Some(ADMIN)).await.json(200);
-    let listed = of_day
+    let day_evaluations = site.get("/api/v1/evaluations", Some(ADMIN)).await.json(200);
+    let listed = day_evaluations
         .as_array()
         .unwrap()
         .iter()
@@ -230,14 +230,14 @@ async fn what_waits_tells_its_place_its_time_and_what_comes_next() {
     assert_eq!(listed.unwrap()["queue"], view["queue"]);
     let page = site.get(page, None).await.body;
     assert!(
-        page.contains("Number 1 of 1 to be over; expected to be over <time datetime=\"2026-03-01"),
+        page.contains("Position 1 of 1 in the queue; expected end <time datetime=\"2026-03-01"),
         "{page}"
     );
     assert!(page.contains("What happens next"), "{page}");
 }
 
 #[tokio::test]
-async fn capacity_is_the_organisers_and_deadlines_are_checked() {
+async fn capacity_is_for_organisers_and_deadlines_are_validated() {
     let site = Site::start().await;
     let alpha = site.team("Alpha").await;
     let stage = site.stage().await.to_string();
@@ -277,102 +277,102 @@ async fn capacity_is_the_organisers_and_deadlines_are_checked() {
         .await
         .json(201);
     assert_eq!(made["day_deadline"], "never");
-    let is = site
+    let unchanged = site
         .get(&format!("/api/v1/stages/{stage}"), None)
         .await
         .json(200);
-    assert_eq!(is["day_deadline"], "next_cut");
+    assert_eq!(unchanged["day_deadline"], "next_cut");
 }
 
 #[tokio::test]
-async fn organisers_are_warned_once_of_each_day_that_does_not_fit() {
-    let site = Site::start_daily("12:00").await;
+async fn monitor_warns_once_of_each_day_that_does_not_fit() {
+    let site = Site::start_with_schedule("12:00").await;
     let alpha = site.team("Alpha").await;
     let stage = site.stage().await.to_string();
     let submission = site.valid_submission(&alpha, "a").await;
-    let mut watch = site.capacity_watch();
-    let plays = async |episodes: u32| {
+    let mut monitor = site.capacity_monitor();
+    let set_episodes = async |episodes: u32| {
         let rules = json!({ "episodes_per_task": episodes, "confirm": "Qualifying" });
         change(&site, &stage, rules).await.json(200)
     };
-    let lasts = async |hours: u32| {
+    let set_deadline = async |hours: u32| {
         let deadline = json!({ "day_deadline": { "hours": hours } });
         change(&site, &stage, deadline).await.json(200);
     };
-    lasts(1).await;
-    let changed = plays(1000).await;
-    // Nothing was measured: it says so, and nobody is warned.
+    set_deadline(1).await;
+    let changed = set_episodes(1000).await;
+    // Without a measured duration the summary says so, and there is no warning.
     let load = &changed["capacity"][0];
     assert_eq!(
         (&load["fit"], &load["expected_hours"]),
         (&json!("unknown"), &Value::Null)
     );
-    assert!(text(&load["summary"]).contains("nothing was measured"));
-    assert_eq!(watch.look().await.unwrap(), []);
+    assert!(string(&load["summary"]).contains("nothing measured"));
+    assert_eq!(monitor.check().await.unwrap(), []);
     let page = async |token: Option<&str>| site.get("/season", token).await.body;
     let shown = page(Some(ADMIN)).await;
     assert!(
-        shown.contains("nothing was measured") && !shown.contains("does not fit"),
+        shown.contains("nothing measured") && !shown.contains("does not fit"),
         "{shown}"
     );
 
-    plays(4).await;
+    set_episodes(4).await;
     site.evaluate(&alpha, &submission).await;
-    play_slowly(&site, 300).await;
+    run_evaluation_slowly(&site, 300).await;
     site.next_day();
-    assert_eq!(watch.look().await.unwrap(), [], "12 episodes fit");
-    plays(1000).await;
-    let warned = watch.look().await.unwrap();
-    let days = |warned: &[faceoff_http::Overflow]| -> Vec<(String, bool)> {
-        let days = warned.iter().map(|one| &one.load);
+    assert_eq!(monitor.check().await.unwrap(), [], "12 episodes fit");
+    set_episodes(1000).await;
+    let warnings = monitor.check().await.unwrap();
+    let days = |warnings: &[faceoff_http::CapacityWarning]| -> Vec<(String, bool)> {
+        let days = warnings.iter().map(|one| &one.load);
         days.map(|load| (load.day.to_string(), load.is_under_way))
             .collect()
     };
-    assert_eq!(days(&warned), [("2026-03-02".to_owned(), false)]);
-    assert_eq!(warned[0].stage.as_str(), "Qualifying");
-    assert!(warned[0].load.summary.contains("does not fit"));
-    assert_eq!(watch.look().await.unwrap(), [], "once");
+    assert_eq!(days(&warnings), [("2026-03-02".to_owned(), false)]);
+    assert_eq!(warnings[0].stage.as_str(), "Qualifying");
+    assert!(warnings[0].load.summary.contains("does not fit"));
+    assert_eq!(monitor.check().await.unwrap(), [], "a day is reported once");
 
-    // On the page and in the views of stages, for organisers alone.
+    // The forecast is on the page and in the views of stages, for organisers only.
     for path in [
         "/api/v1/stages".to_owned(),
         format!("/api/v1/stages/{stage}"),
         "/api/v1/season".to_owned(),
     ] {
-        let of_stage = |answer: Value| match path.as_str() {
+        let stage_view = |answer: Value| match path.as_str() {
             "/api/v1/stages" => answer[0].clone(),
             "/api/v1/season" => answer["stages"][0].clone(),
             _ => answer,
         };
-        let seen = of_stage(site.get(&path, Some(ADMIN)).await.json(200));
+        let seen = stage_view(site.get(&path, Some(ADMIN)).await.json(200));
         assert_eq!(seen["capacity"][0]["fit"], "not", "{path}");
         for token in [None, Some(alpha.token.as_str())] {
-            let seen = of_stage(site.get(&path, token).await.json(200));
+            let seen = stage_view(site.get(&path, token).await.json(200));
             assert_eq!(seen.get("capacity"), None, "{path}");
         }
     }
     let shown = page(Some(ADMIN)).await;
     assert!(
-        shown.contains("does not fit") && shown.contains(&warned[0].load.summary),
+        shown.contains("does not fit") && shown.contains(&warnings[0].load.summary),
         "{shown}"
     );
-    assert!(!page(None).await.contains("Do the days fit"));
+    assert!(!page(None).await.contains("id=\"capacity\""));
 
-    // Again at the cut, of the day that is under way now; the next one is another.
+    // After the cutoff the day is reported again, and the following day for the first time.
     site.evaluate(&alpha, &submission).await;
-    let warned = watch.look().await.unwrap();
+    let warnings = monitor.check().await.unwrap();
     let expected = [
         ("2026-03-02".to_owned(), true),
         ("2026-03-03".to_owned(), false),
     ];
-    assert_eq!(days(&warned), expected);
-    lasts(100).await;
-    assert_eq!(watch.look().await.unwrap(), []);
-    lasts(1).await;
+    assert_eq!(days(&warnings), expected);
+    set_deadline(100).await;
+    assert_eq!(monitor.check().await.unwrap(), []);
+    set_deadline(1).await;
     assert_eq!(
-        days(&watch.look().await.unwrap()),
+        days(&monitor.check().await.unwrap()),
         expected,
-        "it fitted in between"
+        "reported again after it fitted in between"
     );
-    assert_eq!(watch.look().await.unwrap(), []);
+    assert_eq!(monitor.check().await.unwrap(), []);
 }

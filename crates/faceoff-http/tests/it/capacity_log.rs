@@ -1,7 +1,7 @@
-//! What the server's log says of days that do not fit.
+//! Warnings in the log about days that do not fit.
 
 use crate::{
-    capacity::{change, play_slowly},
+    capacity::{change, run_evaluation_slowly},
     site::Site,
 };
 use serde_json::json;
@@ -15,27 +15,27 @@ use tracing::{
     span::{Attributes, Id, Record},
 };
 
-/// The warnings of this thread, a text each.
+/// The warnings that this thread logs, one text each.
 #[derive(Clone, Default)]
 struct Warnings(Arc<Mutex<Vec<String>>>);
 
 impl Warnings {
-    fn of_days(&self) -> Vec<String> {
+    fn about_days(&self) -> Vec<String> {
         let all = self.0.lock().unwrap();
-        let of_days = all.iter().filter(|line| line.contains("does not fit"));
-        of_days.cloned().collect()
+        let about_days = all.iter().filter(|line| line.contains("does not fit"));
+        about_days.cloned().collect()
     }
 
-    async fn until(&self, count: usize) {
-        while self.of_days().len() < count {
+    async fn wait_for(&self, count: usize) {
+        while self.about_days().len() < count {
             tokio::task::yield_now().await;
         }
     }
 }
 
-struct Words<'a>(&'a mut String);
+struct FieldWriter<'a>(&'a mut String);
 
-impl Visit for Words<'_> {
+impl Visit for FieldWriter<'_> {
     fn record_debug(&mut self, field: &Field, value: &dyn Debug) {
         write!(self.0, "{}={value:?} ", field.name()).unwrap();
     }
@@ -52,7 +52,7 @@ impl Subscriber for Warnings {
     fn record_follows_from(&self, _: &Id, _: &Id) {}
     fn event(&self, event: &Event<'_>) {
         let mut text = String::new();
-        event.record(&mut Words(&mut text));
+        event.record(&mut FieldWriter(&mut text));
         self.0.lock().unwrap().push(text);
     }
     fn enter(&self, _: &Id) {}
@@ -60,13 +60,13 @@ impl Subscriber for Warnings {
 }
 
 #[tokio::test]
-async fn a_day_that_does_not_fit_has_a_line_in_the_log_and_another_at_its_cut() {
-    let site = Site::start_daily("12:00").await;
+async fn overfull_day_is_logged_once_and_again_at_its_cutoff() {
+    let site = Site::start_with_schedule("12:00").await;
     let alpha = site.team("Alpha").await;
     let stage = site.stage().await.to_string();
     let submission = site.valid_submission(&alpha, "a").await;
     site.evaluate(&alpha, &submission).await;
-    play_slowly(&site, 300).await;
+    run_evaluation_slowly(&site, 300).await;
     site.next_day();
     let rules = json!({ "episodes_per_task": 1000, "day_deadline": { "hours": 1 }, "confirm": "Qualifying" });
     change(&site, &stage, rules).await.json(200);
@@ -74,17 +74,17 @@ async fn a_day_that_does_not_fit_has_a_line_in_the_log_and_another_at_its_cut() 
     let warnings = Warnings::default();
     let _guard = tracing::subscriber::set_default(warnings.clone());
     let (end, ended) = tokio::sync::oneshot::channel::<()>();
-    let asked_to_end = async {
+    let shutdown = async {
         let _ = ended.await;
     };
-    let watching = tokio::spawn(site.capacity_watch().run(asked_to_end));
-    warnings.until(1).await;
-    // The cut wakes it: of the day that is under way, and of the next one.
+    let watching = tokio::spawn(site.capacity_monitor().run(shutdown));
+    warnings.wait_for(1).await;
+    // The cutoff triggers a check: it warns of the started day and of the next one.
     site.evaluate(&alpha, &submission).await;
-    warnings.until(3).await;
+    warnings.wait_for(3).await;
     drop(end);
     watching.await.unwrap();
-    let lines = warnings.of_days();
+    let lines = warnings.about_days();
     assert_eq!(lines.len(), 3, "{lines:#?}");
     for (line, day) in lines.iter().zip(["2026-03-02", "2026-03-02", "2026-03-03"]) {
         for part in ["stage=Qualifying", &format!("day={day}"), "more slots"] {

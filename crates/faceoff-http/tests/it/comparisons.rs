@@ -1,37 +1,39 @@
+//! Comparisons of two evaluations, and rank groups on boards.
+
 use crate::{
     clips,
     html::texts,
-    site::{Played, Site, outcome},
+    site::{OutcomeFn, Site, outcome},
 };
 use faceoff_store::{Artifacts, EvaluationState};
 use faceoff_types::{EpisodeOutcome, EvaluationId, Task, Violations};
 use serde_json::json;
 
-/// An episode that was solved, or not, and broke the end effector's bounds, or not.
-fn played(task: Task, episode: u32, solved: bool, broken: bool) -> EpisodeOutcome {
+/// The outcome of an episode: solved or not, and with or without a foul of the end effector.
+fn episode_outcome(task: Task, episode: u32, solved: bool, has_foul: bool) -> EpisodeOutcome {
     EpisodeOutcome {
         success: solved,
         violations: Violations {
-            ee: broken,
+            ee: has_foul,
             ..Violations::default()
         },
         ..outcome(task, episode, false)
     }
 }
 
-fn compare(a: EvaluationId, b: EvaluationId) -> String {
+fn comparison_path(a: EvaluationId, b: EvaluationId) -> String {
     format!("/api/v1/evaluations/{a}/compare/{b}")
 }
 
 #[tokio::test]
-async fn two_evaluations_of_a_day_are_compared_episode_by_episode() {
+async fn evaluations_of_a_day_are_compared_by_episode() {
     let site = Site::start().await;
-    let alpha = |task, e| played(task, e, e < 60, false);
-    let beta = |task, e| played(task, e, e < if task == Task::Hit { 40 } else { 60 }, false);
+    let alpha = |task, e| episode_outcome(task, e, e < 60, false);
+    let beta = |task, e| episode_outcome(task, e, e < if task == Task::Hit { 40 } else { 60 }, false);
     let [a, b] = site
-        .played_day(100, [("Alpha", &alpha), ("Beta", &beta)])
+        .run_day(100, [("Alpha", &alpha), ("Beta", &beta)])
         .await;
-    let view = site.get(&compare(a, b), None).await.json(200);
+    let view = site.get(&comparison_path(a, b), None).await.json(200);
     assert_eq!(
         (&view["a"]["team"], &view["b"]["team"]),
         (&json!("Alpha"), &json!("Beta"))
@@ -46,7 +48,7 @@ async fn two_evaluations_of_a_day_are_compared_episode_by_episode() {
     assert_eq!(view["overall"]["score_a"], 60.0);
     assert_eq!(view["overall"]["score_b"], 52.0);
     assert!(view.get("episodes").is_none());
-    let path = format!("{}?episodes=true", compare(a, b));
+    let path = format!("{}?episodes=true", comparison_path(a, b));
     let with_episodes = site.get(&path, None).await.json(200);
     let hit = &with_episodes["episodes"]["hit"];
     assert_eq!(hit["both"], json!((0..40).collect::<Vec<_>>()));
@@ -54,18 +56,18 @@ async fn two_evaluations_of_a_day_are_compared_episode_by_episode() {
     assert_eq!(hit["only_b"], json!([]));
     assert_eq!(hit["neither"], json!((60..100).collect::<Vec<_>>()));
     assert_eq!(with_episodes["tasks"], view["tasks"]);
-    let back = site.get(&compare(b, a), None).await.json(200);
-    assert_eq!(back["tasks"]["hit"]["only_b"], 20);
-    assert_eq!(back["overall"]["p_value"], view["overall"]["p_value"]);
+    let swapped = site.get(&comparison_path(b, a), None).await.json(200);
+    assert_eq!(swapped["tasks"]["hit"]["only_b"], 20);
+    assert_eq!(swapped["overall"]["p_value"], view["overall"]["p_value"]);
 
-    let page = site.get(&compare(a, b).replace("/api/v1", ""), None).await;
+    let page = site.get(&comparison_path(a, b).replace("/api/v1", ""), None).await;
     assert_eq!(page.status, 200, "{}", page.body);
     assert!(!page.body.contains("<script>"));
     let html = scraper::Html::parse_document(&page.body);
     assert!(html.errors.is_empty(), "{:?}", html.errors);
     for part in [
         "Alpha is ahead",
-        "not told apart",
+        "statistically tied",
         "+8.0",
         "+20.0",
         "under 0.001",
@@ -81,12 +83,12 @@ async fn two_evaluations_of_a_day_are_compared_episode_by_episode() {
 }
 
 #[tokio::test]
-async fn an_episode_of_both_is_shown_side_by_side_and_in_step() {
+async fn episode_of_two_teams_is_replayed_side_by_side() {
     let site = Site::start().await;
-    let alpha = |task, e| played(task, e, e < 60, false);
-    let beta = |task, e| played(task, e, e >= 1, false);
+    let alpha = |task, e| episode_outcome(task, e, e < 60, false);
+    let beta = |task, e| episode_outcome(task, e, e >= 1, false);
     let [a, b] = site
-        .played_day(100, [("Alpha", &alpha), ("Beta", &beta)])
+        .run_day(100, [("Alpha", &alpha), ("Beta", &beta)])
         .await;
     let pair = |episode: u32| format!("/evaluations/{a}/compare/{b}/prepare/{episode}");
     let without = site.get(&pair(0), None).await;
@@ -94,14 +96,14 @@ async fn an_episode_of_both_is_shown_side_by_side_and_in_step() {
     assert!(without.body.contains("no replays"), "{}", without.body);
 
     let folder = tempfile::tempdir().unwrap();
-    let pack = clips::pack(folder.path());
+    let pack = clips::record_clips(folder.path());
     for id in [a, b] {
         let EvaluationState::Finished { dataset, .. } =
             site.store.evaluation(id).await.unwrap().state
         else {
             panic!("not finished");
         };
-        let key = Artifacts::clips_of(&dataset);
+        let key = Artifacts::clips_key(&dataset);
         site.store.artifacts().put_file(&key, &pack).await.unwrap();
     }
     let page = site.get(&pair(0), None).await;
@@ -117,28 +119,28 @@ async fn an_episode_of_both_is_shown_side_by_side_and_in_step() {
         assert_eq!(
             replay.attr("data-together"),
             Some("both"),
-            "they run in step"
+            "both replays are synchronised"
         );
-        assert_eq!(replay.attr("data-observed"), None, "that is their teams'");
+        assert_eq!(replay.attr("data-observed"), None, "observations are not public");
     }
     assert_ne!(replays[0].id(), replays[1].id());
-    assert!(page.body.contains(&pair(60)), "the next that differs");
+    assert!(page.body.contains(&pair(60)), "a link to the next episode that differs");
     let list = site
         .get(&format!("/evaluations/{a}/compare/{b}"), None)
         .await;
     assert!(list.body.contains(&pair(0)), "{}", list.body);
-    for nothing in [pair(1000), format!("/evaluations/{a}/compare/{b}/swim/0")] {
-        assert_eq!(site.get(&nothing, None).await.status, 404, "{nothing}");
+    for missing in [pair(1000), format!("/evaluations/{a}/compare/{b}/swim/0")] {
+        assert_eq!(site.get(&missing, None).await.status, 404, "{missing}");
     }
 }
 
 #[tokio::test]
-async fn what_does_not_pair_is_refused_by_field() {
+async fn unpaired_evaluations_are_refused_with_the_field() {
     let site = Site::start().await;
-    let fair = |task, e| played(task, e, e % 2 == 0, false);
-    let [a] = site.played_day(10, [("Alpha", &fair)]).await;
+    let every_second = |task, e| episode_outcome(task, e, e % 2 == 0, false);
+    let [a] = site.run_day(10, [("Alpha", &every_second)]).await;
     site.next_day();
-    let [tomorrow] = site.played_day(10, [("Tomorrow", &fair)]).await;
+    let [tomorrow] = site.run_day(10, [("Tomorrow", &every_second)]).await;
     site.next_day();
     let queued = {
         let team = site.team("Queued").await;
@@ -146,14 +148,14 @@ async fn what_does_not_pair_is_refused_by_field() {
         let path = site.evaluate(&team, &submission).await;
         path.rsplit('/').next().unwrap().parse().unwrap()
     };
-    let refused = site.get(&compare(a, tomorrow), None).await;
+    let refused = site.get(&comparison_path(a, tomorrow), None).await;
     let problem = refused.problem(409, "not-paired", &["2026-03-01", "2026-03-02"]);
     assert_eq!(problem["field"], "day");
-    site.get(&compare(a, queued), None)
+    site.get(&comparison_path(a, queued), None)
         .await
         .problem(409, "conflict", &["no result"]);
     let unknown = EvaluationId::new();
-    site.get(&compare(a, unknown), None)
+    site.get(&comparison_path(a, unknown), None)
         .await
         .problem(404, "not-found", &[&unknown.to_string()]);
     site.get("/api/v1/evaluations/1/compare/2", None)
@@ -167,24 +169,24 @@ async fn what_does_not_pair_is_refused_by_field() {
 }
 
 #[tokio::test]
-async fn the_boards_group_teams_that_the_episodes_cannot_tell_apart() {
+async fn statistically_tied_teams_share_a_rank_group() {
     let site = Site::start().await;
-    // Of 200 episodes per task: 150, 146, 100 solved; the last team is close to the first, but its
-    // tier is another, by luck: 36 broken episodes cost 108 of 100 points.
-    let best = |task, e| played(task, e, e < 150, false);
+    // Of 200 episodes per task they solve 150, 146 and 100. The last team solves as many as the first, but is in another
+    // tier by chance: its 36 fouls cost 108 points, and the bound is 100.
+    let best = |task, e| episode_outcome(task, e, e < 150, false);
     let close = |task, e| {
         let solved = if task == Task::Prepare { 3 } else { 2 }..150;
-        played(task, e, solved.contains(&e), false)
+        episode_outcome(task, e, solved.contains(&e), false)
     };
-    let behind = |task, e| played(task, e, e < 100, false);
-    let careless = |task, e| played(task, e, e < 150, task == Task::Hit && e < 36);
-    let teams: [(&str, Played<'_>); 4] = [
+    let behind = |task, e| episode_outcome(task, e, e < 100, false);
+    let careless = |task, e| episode_outcome(task, e, e < 150, task == Task::Hit && e < 36);
+    let teams: [(&str, OutcomeFn<'_>); 4] = [
         ("Best", &best),
         ("Close", &close),
         ("Behind", &behind),
         ("Careless", &careless),
     ];
-    let [best, ..] = site.played_day(200, teams).await;
+    let [best, ..] = site.run_day(200, teams).await;
     for path in ["/api/v1/board", "/api/v1/board/hit"] {
         let board = site.get(path, None).await.json(200);
         assert_eq!(board["significance"], 0.05);
@@ -212,7 +214,7 @@ async fn the_boards_group_teams_that_the_episodes_cannot_tell_apart() {
     let defend = site.get("/api/v1/board/defend", None).await.json(200);
     assert_eq!(defend["rows"][3]["tier_change_probability"], 0.0);
 
-    // What was computed once is kept, across restarts.
+    // The summary is stored, so it survives restarts.
     let run = site.store.evaluation(best).await.unwrap().run;
     let stored = site
         .store
@@ -226,15 +228,15 @@ async fn the_boards_group_teams_that_the_episodes_cannot_tell_apart() {
     let rules = include_str!("../../../../docs/rules.md");
     assert!(rules.contains(&format!("bootstrap: {resamples} times")));
     let page = site.get("/", None).await.body;
-    assert!(page.contains(&format!("from {resamples} random redraws")));
-    let of_hit = site.get("/tasks/hit", None).await.body;
-    assert!(of_hit.contains("not told apart from Best"), "{of_hit}");
-    // What says nothing is not said: overall all teams differ, and only one of the tiers is partly luck.
-    assert!(!page.contains("not told apart from"), "{page}");
+    assert!(page.contains(&format!("bootstrap with {resamples} resamples")));
+    let hit_board = site.get("/tasks/hit", None).await.body;
+    assert!(hit_board.contains("statistically tied with Best"), "{hit_board}");
+    // Labels without information are left out: overall all teams differ, and only one tier depends on chance.
+    assert!(!page.contains("statistically tied with"), "{page}");
     assert_eq!(page.matches("tier change</abbr>").count(), 1, "{page}");
     let evaluation = site.get(&format!("/evaluations/{best}"), None).await.body;
     assert!(
-        evaluation.contains("give another tier: under 0.05 %"),
+        evaluation.contains("another tier on other episodes: under 0.05 %"),
         "{evaluation}"
     );
 }

@@ -1,9 +1,11 @@
+//! Starting an evaluation day by hand.
+
 use crate::site::{ADMIN, Answer, Site};
 use reqwest::Method;
 use serde_json::json;
 
 #[tokio::test]
-async fn a_day_starts_once_with_what_is_active_and_names_who_is_left_out() {
+async fn day_starts_once_and_lists_teams_without_submission() {
     let site = Site::start().await;
     let (alpha, beta) = (site.team("Alpha").await, site.team("Beta").await);
     let gamma = site.team("Gamma").await;
@@ -29,9 +31,9 @@ async fn a_day_starts_once_with_what_is_active_and_names_who_is_left_out() {
     }
     assert_eq!(day["without_submission"][0]["name"], "Gamma");
 
-    // However often, with whatever body, and whoever has something to play now.
+    // Further attempts fail, with and without a body, although another team has a submission now.
     site.valid_submission(&gamma, "g").await;
-    site.later(3600);
+    site.advance(3600);
     for again in [Some(&body), None] {
         let mut request = site.request(Method::POST, "/api/v1/days", Some(ADMIN));
         if let Some(body) = again {
@@ -72,29 +74,29 @@ async fn a_day_starts_once_with_what_is_active_and_names_who_is_left_out() {
 }
 
 #[tokio::test]
-async fn the_next_cut_is_the_schedules_where_there_is_one() {
-    let site = Site::start_daily("12:00").await;
+async fn next_cutoff_follows_the_schedule() {
+    let site = Site::start_with_schedule("12:00").await;
     let team = site.team("Alpha").await;
     site.valid_submission(&team, "a").await;
-    let next_cut = async || {
+    let next_cutoff = async || {
         let me = site.get("/api/v1/me", Some(&team.token)).await.json(200);
         let season = site.get("/api/v1/season", None).await.json(200);
         assert_eq!(me["next_cut"], season["next_cut"]);
         me["next_cut"]["at"].clone()
     };
-    assert_eq!(next_cut().await, "2026-03-01T12:00:00Z");
-    // By hand, before the schedule would: the schedule's cut is the next day's.
+    assert_eq!(next_cutoff().await, "2026-03-01T12:00:00Z");
+    // Started by hand before the scheduled time: the next cutoff of the schedule is on the next day.
     site.post("/api/v1/days", Some(ADMIN), &json!({}))
         .await
         .json(200);
-    assert_eq!(next_cut().await, "2026-03-02T12:00:00Z");
+    assert_eq!(next_cutoff().await, "2026-03-02T12:00:00Z");
     site.post("/api/v1/days", Some(ADMIN), &json!({}))
         .await
         .problem(409, "day-has-cut", &["2026-03-02 at 12:00:00 UTC"]);
 }
 
 #[tokio::test]
-async fn a_day_without_anything_to_play_keeps_its_cut() {
+async fn day_without_submissions_can_still_be_started() {
     let site = Site::start().await;
     let team = site.team("Alpha").await;
     site.post("/api/v1/days", Some(ADMIN), &json!({}))
@@ -102,7 +104,7 @@ async fn a_day_without_anything_to_play_keeps_its_cut() {
         .problem(
             409,
             "conflict",
-            &["no team has a valid submission", "still has its cut"],
+            &["no team has a valid submission", "its cutoff is still available"],
         );
     let season = site.get("/api/v1/season", None).await.json(200);
     assert_eq!(season["days"], json!([]));
@@ -113,7 +115,7 @@ async fn a_day_without_anything_to_play_keeps_its_cut() {
 }
 
 #[tokio::test]
-async fn a_day_that_cannot_be_is_refused_and_nothing_starts() {
+async fn invalid_day_request_starts_nothing() {
     let site = Site::start().await;
     let team = site.team("Alpha").await;
     site.valid_submission(&team, "a").await;
@@ -127,7 +129,7 @@ async fn a_day_that_cannot_be_is_refused_and_nothing_starts() {
     start(json!({ "stage": uuid::Uuid::nil() }))
         .await
         .problem(404, "not-found", &["stage"]);
-    // Of a day's own there were episodes and a profile; now they are the stage's.
+    // A day once had its own episodes and profile. Now these are settings of the stage.
     start(json!({ "episodes_per_task": 5 })).await.problem(
         422,
         "invalid-content",

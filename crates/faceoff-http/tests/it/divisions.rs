@@ -1,4 +1,4 @@
-//! Divisions on boards: shown, and ranked among themselves where they are asked for.
+//! Divisions on boards: shown beside each team, and as boards of their own.
 
 use crate::site::{ADMIN, Site, result};
 use reqwest::Method;
@@ -12,7 +12,7 @@ async fn patch(site: &Site, path: &str, body: &Value) -> Value {
         .json(200)
 }
 
-/// Four teams of the board order A, B, C, D; A and C are students, B is open, D is in no division.
+/// Four teams in the board order A, B, C, D. A and C are students, B is open, D has no division.
 async fn season_with_divisions() -> Site {
     let site = Site::start().await;
     let teams = [
@@ -63,7 +63,7 @@ fn teams(places: &[(u64, u64, String)]) -> Vec<&str> {
 }
 
 #[tokio::test]
-async fn a_season_without_divisions_has_the_boards_that_it_had() {
+async fn board_without_divisions_is_unchanged() {
     let site = Site::start().await;
     let alpha = [("Alpha", result([0.9, 0.9, 0.9], 10.0))];
     site.ranked_teams(&alpha).await;
@@ -79,7 +79,7 @@ async fn a_season_without_divisions_has_the_boards_that_it_had() {
 }
 
 #[tokio::test]
-async fn a_board_shows_divisions_and_ranks_one_by_itself() {
+async fn board_of_a_division_ranks_its_teams() {
     let site = season_with_divisions().await;
     let whole = site.get("/api/v1/board", None).await.json(200);
     assert_eq!(teams(&places(&whole)), ["A", "B", "C", "D"]);
@@ -92,7 +92,7 @@ async fn a_board_shows_divisions_and_ranks_one_by_itself() {
         [Some(&students), Some(&open), Some(&students), None]
     );
 
-    // Whatever the case of its letters, overall and by task, of the stage and revision that are asked for.
+    // The name is not case-sensitive. It works on overall and task boards, with a stage and a revision.
     let stage = site.stage().await;
     for path in [
         "/api/v1/board?division=Bachelor%20students",
@@ -105,7 +105,7 @@ async fn a_board_shows_divisions_and_ranks_one_by_itself() {
         assert_eq!(teams(&places), ["A", "C"], "{path}");
         let ranks: Vec<_> = places.iter().map(|(rank, ..)| *rank).collect();
         assert_eq!(ranks, [1, 2], "{path}");
-        assert_eq!(places[0].1, 1, "{path}: groups are counted among them, too");
+        assert_eq!(places[0].1, 1, "{path}: rank groups are counted within the division");
     }
 
     let open = site.get("/api/v1/board?division=open", None).await;
@@ -122,7 +122,7 @@ async fn a_board_shows_divisions_and_ranks_one_by_itself() {
         }
     }
 
-    // Who is disqualified leaves the division's board, and is named on no other division's.
+    // A disqualified team leaves its division's board, and is listed on no other division's board.
     let id = team_id(&site, "C").await;
     let ruling = json!({ "reason": "two bundles", "confirm": "C" });
     let path = format!("/api/v1/teams/{id}/disqualify");
@@ -140,7 +140,7 @@ async fn a_board_shows_divisions_and_ranks_one_by_itself() {
 }
 
 #[tokio::test]
-async fn the_boards_pages_lead_to_the_divisions() {
+async fn board_pages_link_to_divisions() {
     let site = season_with_divisions().await;
     let page = async |path: &str| {
         let answer = site.get(path, None).await;
@@ -165,12 +165,12 @@ async fn the_boards_pages_lead_to_the_divisions() {
         }
         let links = Selector::parse(".lead a").unwrap();
         let links: Vec<_> = whole.select(&links).collect();
-        let leads_to = |name: &str| {
+        let link_target = |name: &str| {
             let link = links.iter().find(|link| link.text().eq([name]));
             let link = link.unwrap_or_else(|| panic!("no link {name:?}"));
             format!("{path}{}", link.attr("href").unwrap())
         };
-        let students = page(&leads_to("Bachelor students")).await;
+        let students = page(&link_target("Bachelor students")).await;
         assert_eq!(texts(&students, ".board th.team > a"), ["A", "C"]);
         assert_eq!(texts(&students, ".board td.rank"), ["1", "2"]);
         let lead = texts(&students, ".lead").join(" ");

@@ -1,11 +1,11 @@
-//! The documentation on the site: every page, every link of it, and the search.
+//! The documentation on the site: its pages, their links, and the search.
 
 use crate::site::{Answer, Site};
 use reqwest::Method;
 use scraper::{Html, Selector};
 use std::collections::{BTreeMap, BTreeSet};
-/// Bytes of a page before it is compressed; a phone on a slow line gets a quarter of them.
-const LARGEST_PAGE: usize = 150_000;
+/// Bytes of a page before compression. Compressed, a page has about a quarter of them.
+const MAX_PAGE_BYTES: usize = 150_000;
 
 fn all<'a>(page: &'a Html, selector: &str) -> Vec<scraper::ElementRef<'a>> {
     page.select(&Selector::parse(selector).unwrap()).collect()
@@ -17,28 +17,28 @@ fn attributes(page: &Html, selector: &str, name: &str) -> Vec<String> {
     values.map(str::to_owned).collect()
 }
 
-fn words(element: scraper::ElementRef<'_>) -> String {
+fn text_of(element: scraper::ElementRef<'_>) -> String {
     let texts = element.text().flat_map(str::split_whitespace);
     texts.collect::<Vec<_>>().join(" ")
 }
 
-async fn read(site: &Site, path: &str) -> Html {
+async fn fetch_page(site: &Site, path: &str) -> Html {
     let answer = site.get(path, None).await;
     assert_eq!(answer.status, 200, "{path}: {}", answer.body);
     assert_eq!(answer.header("content-type"), "text/html; charset=utf-8");
     Html::parse_document(&answer.body)
 }
 
-async fn search(site: &Site, question: &str) -> Html {
-    let query = [("q", question)];
+async fn search(site: &Site, query: &str) -> Html {
+    let parameters = [("q", query)];
     let request = site.request(Method::GET, "/docs/search", None);
-    let answer = Answer::of(request.query(&query).send().await.unwrap()).await;
+    let answer = Answer::of(request.query(&parameters).send().await.unwrap()).await;
     assert_eq!(answer.status, 200, "{}", answer.body);
     Html::parse_document(&answer.body)
 }
 
 #[tokio::test]
-async fn every_link_of_the_documentation_leads_somewhere() {
+async fn documentation_has_no_broken_links() {
     let site = Site::start().await;
     let mut open = vec!["/docs".to_owned()];
     let mut ids: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
@@ -54,21 +54,21 @@ async fn every_link_of_the_documentation_leads_somewhere() {
             continue;
         }
         assert!(
-            answer.body.len() < LARGEST_PAGE,
+            answer.body.len() < MAX_PAGE_BYTES,
             "{path}: {} bytes",
             answer.body.len()
         );
         let page = Html::parse_document(&answer.body);
         assert_eq!(all(&page, "h1").len(), 1, "{path}");
-        // What the pages' policy would not run or show, and what would be another's.
-        for never in [
+        // Elements that the content security policy blocks, or that load content of other sites.
+        for forbidden in [
             "script:not([src^='/static/live.js?'])",
             "style",
             "[style]",
             "[onclick]",
             "iframe",
         ] {
-            assert_eq!(all(&page, never).len(), 0, "{path}: {never}");
+            assert_eq!(all(&page, forbidden).len(), 0, "{path}: {forbidden}");
         }
         for picture in attributes(&page, "img", "src") {
             assert!(picture.starts_with('/'), "{path}: {picture}");
@@ -80,14 +80,14 @@ async fn every_link_of_the_documentation_leads_somewhere() {
         for labelled in attributes(&page, "[aria-labelledby]", "aria-labelledby") {
             assert!(unique.contains(&labelled), "{path}: {labelled}");
         }
-        // A table that is too wide scrolls in a region of its own, which the keyboard reaches.
+        // A wide table scrolls in its own region, which can be focused by keyboard.
         let tables = all(&page, "table").len();
         let regions = all(&page, r#".wide[role="region"][tabindex="0"] > table"#);
         assert_eq!(regions.len(), tables, "{path}");
         let mut names = attributes(&page, r#"[role="region"]"#, "aria-label");
         names.extend(attributes(&page, r#"[role="region"]"#, "aria-labelledby"));
-        let different: BTreeSet<&String> = names.iter().collect();
-        assert_eq!(different.len(), tables, "{path}: {names:?}");
+        let distinct: BTreeSet<&String> = names.iter().collect();
+        assert_eq!(distinct.len(), tables, "{path}: {names:?}");
         ids.insert(path.clone(), unique);
         for link in attributes(&page, "a", "href") {
             if link.starts_with("http://") || link.starts_with("https://") {
@@ -96,7 +96,7 @@ async fn every_link_of_the_documentation_leads_somewhere() {
             let (to, anchor) = link.split_once('#').unwrap_or((&link, ""));
             let to = if to.is_empty() { &path } else { to };
             assert!(to.starts_with('/'), "{path}: {link}");
-            // These ask who is there.
+            // This page requires a signed-in user.
             if to != "/account" {
                 open.push(to.to_owned());
             }
@@ -109,7 +109,7 @@ async fn every_link_of_the_documentation_leads_somewhere() {
         let (to, anchor) = link.split_once('#').unwrap();
         assert!(ids[to].contains(anchor), "{from}: nothing is at {link}");
     }
-    // Each file of the folder is on the site.
+    // Each file of the documentation folder is on the site.
     let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs");
     let mut documents = 0;
     for entry in std::fs::read_dir(folder).unwrap() {
@@ -127,79 +127,79 @@ async fn every_link_of_the_documentation_leads_somewhere() {
 }
 
 #[tokio::test]
-async fn the_reference_has_every_operation_and_every_type() {
+async fn api_reference_lists_all_operations_and_schemas() {
     let site = Site::start().await;
     let document = site.get("/api/v1/openapi.json", None).await.json(200);
     let mut shown = BTreeSet::new();
     for tag in document["tags"].as_array().unwrap() {
         let tag = tag["name"].as_str().unwrap();
-        let page = read(&site, &format!("/docs/api-reference/{tag}")).await;
-        shown.extend(all(&page, "h2").into_iter().map(words));
+        let page = fetch_page(&site, &format!("/docs/api-reference/{tag}")).await;
+        shown.extend(all(&page, "h2").into_iter().map(text_of));
     }
-    let mut told = BTreeSet::new();
+    let mut documented = BTreeSet::new();
     for (path, methods) in document["paths"].as_object().unwrap() {
         for method in methods.as_object().unwrap().keys() {
-            told.insert(format!("{} {path}", method.to_uppercase()));
+            documented.insert(format!("{} {path}", method.to_uppercase()));
         }
     }
-    assert_eq!(shown, told);
-    let page = read(&site, "/docs/api-reference/schemas").await;
-    let listed: BTreeSet<String> = all(&page, "dt").into_iter().map(words).collect();
+    assert_eq!(shown, documented);
+    let page = fetch_page(&site, "/docs/api-reference/schemas").await;
+    let listed: BTreeSet<String> = all(&page, "dt").into_iter().map(text_of).collect();
     let schemas = document["components"]["schemas"].as_object().unwrap();
     let schemas: BTreeSet<String> = schemas.keys().cloned().collect();
     assert_eq!(listed, schemas);
-    // An operation as somebody reads it.
-    let page = read(&site, "/docs/api-reference/public").await;
+    // The section of one operation.
+    let page = fetch_page(&site, "/docs/api-reference/public").await;
     let sections = all(&page, ".operation");
-    let board = sections.into_iter().map(words);
+    let board = sections.into_iter().map(text_of);
     let board = board
         .into_iter()
         .find(|section| section.starts_with("GET /api/v1/board #"))
         .unwrap();
-    for told in [
-        "The overall board.",
-        "Without a token, or with one of: team or organiser.",
-        "stage query StageId Whose;",
-        "200 as asked BoardView text/csv: string",
-        "404 no such stage, revision or division, or no result of that day Problem",
+    for expected in [
+        "Returns the overall board of a stage.",
+        "Token optional: team or organiser.",
+        "stage query StageId The board's stage.",
+        "200 success BoardView text/csv: string",
+        "404 no such stage, revision or division, or the day has no results Problem",
     ] {
-        assert!(board.contains(told), "{told}: {board}");
+        assert!(board.contains(expected), "{expected}: {board}");
     }
 }
 
 #[tokio::test]
-async fn a_search_finds_sections_and_marks_the_words() {
+async fn search_finds_sections_and_marks_words() {
     let site = Site::start().await;
     let page = search(&site, "Frozen BOARDS").await;
     let first = all(&page, ".found li a")[0];
     assert_eq!(first.attr("href"), Some("/docs/api#frozen-boards"));
-    assert_eq!(words(first), "Frozen boards");
+    assert_eq!(text_of(first), "Frozen boards");
     let marked: Vec<String> = first
         .select(&Selector::parse("mark").unwrap())
-        .map(words)
+        .map(text_of)
         .collect();
     assert_eq!(marked, ["Frozen", "boards"]);
-    // Operations and types, too.
+    // Operations and schemas are found, too.
     let page = search(&site, "BoardView").await;
     let links = attributes(&page, ".found li a", "href");
     assert_eq!(links[0], "/docs/api-reference/schemas/BoardView");
 
     let page = search(&site, "quidditch").await;
-    let said = words(all(&page, "main")[0]);
-    assert!(said.contains("Nothing was found for “quidditch”"), "{said}");
+    let message = text_of(all(&page, "main")[0]);
+    assert!(message.contains("No section contains all words of “quidditch”"), "{message}");
     let page = search(&site, "").await;
-    let said = words(all(&page, "main")[0]);
-    assert!(said.contains("Say what to look for"), "{said}");
+    let message = text_of(all(&page, "main")[0]);
+    assert!(message.contains("Enter one or more words"), "{message}");
 }
 
 #[tokio::test]
-async fn a_question_is_shown_as_text_and_is_bounded() {
+async fn search_query_is_escaped_and_limited() {
     let site = Site::start().await;
-    let question = "<script>alert(\"1\")</script>";
-    let page = search(&site, question).await;
+    let query = "<script>alert(\"1\")</script>";
+    let page = search(&site, query).await;
     assert_eq!(all(&page, "script:not([src])").len(), 0);
-    assert_eq!(attributes(&page, "#q", "value"), [question]);
-    assert!(words(all(&page, "main")[0]).contains(question));
+    assert_eq!(attributes(&page, "#q", "value"), [query]);
+    assert!(text_of(all(&page, "main")[0]).contains(query));
 
     let longest = "ä".repeat(200);
     search(&site, &longest).await;
@@ -207,28 +207,28 @@ async fn a_question_is_shown_as_text_and_is_bounded() {
     let answer = site.get(&longer, None).await;
     assert_eq!(answer.status, 400);
     assert_eq!(answer.header("content-type"), "text/html; charset=utf-8");
-    let said = "q: expected at most 200 characters to look for, got 201";
-    assert!(answer.body.contains(said), "{}", answer.body);
+    let message = "q: expected at most 200 characters, got 201";
+    assert!(answer.body.contains(message), "{}", answer.body);
 }
 
 #[tokio::test]
-async fn what_the_documentation_has_not_is_a_page_that_says_so() {
+async fn missing_documentation_page_is_not_found() {
     let site = Site::start().await;
-    for (path, said) in [
+    for (path, message) in [
         ("/docs/nothing", "the documentation has no page nothing"),
         ("/docs/start.md", "the documentation has no page start.md"),
-        ("/docs/api-reference/nobody", "no operations named nobody"),
+        ("/docs/api-reference/unknown", "no operations named unknown"),
         ("/docs/api-reference/schemas/Nothing", "no schema Nothing"),
         ("/docs/images/nothing.svg", "no picture nothing.svg"),
     ] {
         let answer = site.get(path, None).await;
         assert_eq!(answer.status, 404, "{path}");
-        assert!(answer.body.contains(said), "{path}: {}", answer.body);
+        assert!(answer.body.contains(message), "{path}: {}", answer.body);
     }
 }
 
 #[tokio::test]
-async fn who_has_a_page_is_told_so() {
+async fn unchanged_documentation_answers_not_modified() {
     let site = Site::start().await;
     for path in [
         "/docs",
@@ -250,25 +250,25 @@ async fn who_has_a_page_is_told_so() {
 }
 
 #[tokio::test]
-async fn a_link_that_is_shared_has_a_title_and_the_board() {
+async fn pages_have_metadata_for_link_previews() {
     let site = Site::start().await;
-    let of = |page: &Html, property: &str| {
+    let metadata = |page: &Html, property: &str| {
         attributes(page, &format!(r#"meta[property="{property}"]"#), "content")
     };
-    let page = read(&site, "/docs/robot").await;
-    assert_eq!(of(&page, "og:title"), ["The robot and the table · Faceoff"]);
-    assert_eq!(of(&page, "og:type"), ["website"]);
+    let page = fetch_page(&site, "/docs/robot").await;
+    assert_eq!(metadata(&page, "og:title"), ["The robot and the table · Faceoff"]);
+    assert_eq!(metadata(&page, "og:type"), ["website"]);
     assert_eq!(
-        of(&page, "og:description"),
+        metadata(&page, "og:description"),
         attributes(&page, r#"meta[name="description"]"#, "content")
     );
-    // Its address is none that previews could use: the server does not know its own.
-    assert_eq!(of(&page, "og:image"), [""; 0]);
+    // Without a public URL the server cannot give the address of a picture.
+    assert_eq!(metadata(&page, "og:image"), [""; 0]);
 
-    let site = site.at("https://faceoff.example.org").await;
+    let site = site.with_public_url("https://faceoff.example.org").await;
     for path in ["/", "/docs", "/season"] {
-        let page = read(&site, path).await;
-        let [picture] = &of(&page, "og:image")[..] else {
+        let page = fetch_page(&site, path).await;
+        let [picture] = &metadata(&page, "og:image")[..] else {
             panic!("{path} has one picture");
         };
         let at = picture.strip_prefix("https://faceoff.example.org").unwrap();
@@ -279,7 +279,7 @@ async fn a_link_that_is_shared_has_a_title_and_the_board() {
 }
 
 #[tokio::test]
-async fn robots_read_pages_and_documentation_alone() {
+async fn robots_may_read_pages_and_documentation_only() {
     let site = Site::start().await;
     let answer = site.get("/robots.txt", None).await;
     assert_eq!(answer.status, 200);

@@ -1,24 +1,24 @@
-//! Downloads in part, and downloads of what the client has.
+//! Range requests and conditional requests of downloads.
 
 use crate::site::{ADMIN, Answer, GZIP, Site, TestTeam, result};
 use reqwest::Method;
 
 const FILE: &str = "PK the recorded dataset";
 
-struct Recorded {
+struct FinishedEvaluation {
     site: Site,
     team: TestTeam,
     dataset: String,
     archive: String,
 }
 
-impl Recorded {
-    async fn one() -> Self {
+impl FinishedEvaluation {
+    async fn start() -> Self {
         let site = Site::start().await;
         let team = site.team("Alpha").await;
         let submission = site.valid_submission(&team, "striker").await;
         let path = site.evaluate(&team, &submission).await;
-        site.finish(&result([0.5, 0.6, 0.7], 100.0)).await;
+        site.finish_evaluation(&result([0.5, 0.6, 0.7], 100.0)).await;
         Self {
             dataset: format!("{path}/dataset"),
             archive: format!("{submission}/archive"),
@@ -27,7 +27,7 @@ impl Recorded {
         }
     }
 
-    async fn ask(&self, method: Method, path: &str, headers: &[(&str, &str)]) -> Answer {
+    async fn request(&self, method: Method, path: &str, headers: &[(&str, &str)]) -> Answer {
         let mut request = self.site.request(method, path, Some(&self.team.token));
         for (name, value) in headers {
             request = request.header(*name, *value);
@@ -36,14 +36,14 @@ impl Recorded {
     }
 
     async fn get(&self, headers: &[(&str, &str)]) -> Answer {
-        self.ask(Method::GET, &self.dataset, headers).await
+        self.request(Method::GET, &self.dataset, headers).await
     }
 }
 
 #[tokio::test]
-async fn a_download_goes_on_where_it_was_broken_off() {
-    let recorded = Recorded::one().await;
-    let whole = recorded.get(&[]).await;
+async fn download_resumes_with_range_requests() {
+    let evaluation = FinishedEvaluation::start().await;
+    let whole = evaluation.get(&[]).await;
     assert_eq!((whole.status.as_u16(), whole.body.as_str()), (200, FILE));
     let hash = blake3::hash(FILE.as_bytes()).to_string();
     let tag = format!("\"blake3-{hash}\"");
@@ -52,7 +52,7 @@ async fn a_download_goes_on_where_it_was_broken_off() {
     assert_eq!(whole.header("accept-ranges"), "bytes");
     assert_eq!(whole.header("cache-control"), "private, no-cache");
     assert_eq!(whole.header("vary"), "authorization, cookie");
-    for (range, expected, told) in [
+    for (range, expected, content_range) in [
         ("bytes=0-0", "P", "bytes 0-0/23"),
         ("bytes=3-5", "the", "bytes 3-5/23"),
         ("bytes=16-", "dataset", "bytes 16-22/23"),
@@ -60,16 +60,16 @@ async fn a_download_goes_on_where_it_was_broken_off() {
         ("bytes=-7", "dataset", "bytes 16-22/23"),
         ("bytes=-999", FILE, "bytes 0-22/23"),
     ] {
-        let part = recorded.get(&[("range", range), ("if-range", &tag)]).await;
+        let part = evaluation.get(&[("range", range), ("if-range", &tag)]).await;
         assert_eq!(
             (part.status.as_u16(), part.body.as_str()),
             (206, expected),
             "{range}"
         );
-        assert_eq!(part.header("content-range"), told);
+        assert_eq!(part.header("content-range"), content_range);
         assert_eq!(part.header("content-length"), expected.len().to_string());
         assert_eq!(part.header("etag"), tag);
-        // Of the whole file, to be held against what the parts make.
+        // The hash of the whole file, to check the assembled parts.
         assert_eq!(part.header("x-content-blake3"), hash);
         assert_eq!(
             part.header("content-disposition"),
@@ -77,16 +77,16 @@ async fn a_download_goes_on_where_it_was_broken_off() {
         );
     }
     for range in ["bytes=23-", "bytes=99-100", "bytes=-0"] {
-        let behind = recorded.get(&[("range", range)]).await;
-        assert_eq!(behind.header("content-range"), "bytes */23", "{range}");
-        let problem = behind.problem(416, "range-not-satisfiable", &["has 23 bytes"]);
+        let beyond_end = evaluation.get(&[("range", range)]).await;
+        assert_eq!(beyond_end.header("content-range"), "bytes */23", "{range}");
+        let problem = beyond_end.problem(416, "range-not-satisfiable", &["within 23 bytes"]);
         assert_eq!(problem["bytes"], 23);
     }
 }
 
 #[tokio::test]
-async fn what_is_no_single_range_of_this_file_is_answered_with_all_of_it() {
-    let recorded = Recorded::one().await;
+async fn invalid_or_outdated_range_gets_the_whole_file() {
+    let evaluation = FinishedEvaluation::start().await;
     for headers in [
         [("range", "bytes=0-1,4-5"), ("accept", "*/*")],
         [("range", "bytes=5-2"), ("accept", "*/*")],
@@ -98,7 +98,7 @@ async fn what_is_no_single_range_of_this_file_is_answered_with_all_of_it() {
             ("if-range", "Sun, 01 Mar 2026 10:00:00 GMT"),
         ],
     ] {
-        let answer = recorded.get(&headers).await;
+        let answer = evaluation.get(&headers).await;
         assert_eq!(
             (answer.status.as_u16(), answer.body.as_str()),
             (200, FILE),
@@ -108,32 +108,32 @@ async fn what_is_no_single_range_of_this_file_is_answered_with_all_of_it() {
 }
 
 #[tokio::test]
-async fn who_has_the_file_is_sent_nothing() {
-    let recorded = Recorded::one().await;
-    let tag = recorded.get(&[]).await.header("etag").to_owned();
+async fn download_with_known_etag_answers_not_modified() {
+    let evaluation = FinishedEvaluation::start().await;
+    let tag = evaluation.get(&[]).await.header("etag").to_owned();
     for known in [tag.clone(), format!("\"other\", W/{tag}"), "*".to_owned()] {
-        let answer = recorded.get(&[("if-none-match", &known)]).await;
+        let answer = evaluation.get(&[("if-none-match", &known)]).await;
         assert_eq!((answer.status.as_u16(), answer.body.as_str()), (304, ""));
         assert_eq!(answer.header("etag"), tag);
         assert_eq!(answer.header("cache-control"), "private, no-cache");
     }
-    let answer = recorded.get(&[("if-none-match", "\"other\"")]).await;
+    let answer = evaluation.get(&[("if-none-match", "\"other\"")]).await;
     assert_eq!(answer.status, 200);
-    // Nobody learns by a tag what is not theirs to have.
-    let dataset = recorded.dataset.as_str();
-    let request = recorded.site.request(Method::GET, dataset, None);
+    // A known ETag gives no access to the file.
+    let dataset = evaluation.dataset.as_str();
+    let request = evaluation.site.request(Method::GET, dataset, None);
     let visitor = request.header("if-none-match", &tag).send().await.unwrap();
     assert_eq!(visitor.status(), 401);
 }
 
 #[tokio::test]
-async fn the_headers_alone_are_those_of_the_file() {
-    let recorded = Recorded::one().await;
-    for path in [&recorded.dataset, &recorded.archive] {
-        let whole = recorded.ask(Method::GET, path, &[]).await;
-        // A range is of a GET alone.
+async fn head_request_has_the_headers_of_the_file() {
+    let evaluation = FinishedEvaluation::start().await;
+    for path in [&evaluation.dataset, &evaluation.archive] {
+        let whole = evaluation.request(Method::GET, path, &[]).await;
+        // Ranges apply to GET requests only.
         let headers = [("range", "bytes=3-5")];
-        let head = recorded.ask(Method::HEAD, path, &headers).await;
+        let head = evaluation.request(Method::HEAD, path, &headers).await;
         assert_eq!((head.status.as_u16(), head.body.as_str()), (200, ""));
         for name in [
             "content-length",
@@ -150,14 +150,14 @@ async fn the_headers_alone_are_those_of_the_file() {
             whole.headers["content-length"].to_str().unwrap()
         );
     }
-    let archive = recorded.ask(Method::GET, &recorded.archive, &[]).await;
+    let archive = evaluation.request(Method::GET, &evaluation.archive, &[]).await;
     let hash = blake3::hash(&GZIP).to_string();
     assert_eq!(archive.header("x-content-blake3"), hash);
     let part = [("range", "bytes=2-2")];
-    let part = recorded.ask(Method::GET, &recorded.archive, &part).await;
+    let part = evaluation.request(Method::GET, &evaluation.archive, &part).await;
     assert_eq!((part.status.as_u16(), part.body.as_str()), (206, "\u{8}"));
-    let host = recorded
+    let organiser = evaluation
         .site
-        .request(Method::HEAD, &recorded.dataset, Some(ADMIN));
-    assert_eq!(host.send().await.unwrap().status(), 200);
+        .request(Method::HEAD, &evaluation.dataset, Some(ADMIN));
+    assert_eq!(organiser.send().await.unwrap().status(), 200);
 }

@@ -1,8 +1,10 @@
-use crate::site::{ADMIN, Site, result, text};
+//! Evaluations in the API: progress, results, faults, cancelling and re-running.
+
+use crate::site::{ADMIN, Site, result, string};
 use serde_json::json;
 
 #[tokio::test]
-async fn an_evaluation_is_followed_from_the_queue_to_the_dataset() {
+async fn evaluation_shows_progress_result_and_dataset() {
     let site = Site::start().await;
     let team = site.team("Alpha").await;
     let submission = site.valid_submission(&team, "striker").await;
@@ -35,7 +37,7 @@ async fn an_evaluation_is_followed_from_the_queue_to_the_dataset() {
     site.store.release(&claim, site.now()).await.unwrap();
 
     let score = result([0.5, 0.6, 0.7], 100.0);
-    site.finish(&score).await;
+    site.finish_evaluation(&score).await;
     let finished = site.get(&path, token).await.json(200);
     assert_eq!(finished["state"], "finished");
     assert_eq!(
@@ -43,7 +45,7 @@ async fn an_evaluation_is_followed_from_the_queue_to_the_dataset() {
         json!({ "episodes_done": 12, "episodes_total": 12 })
     );
     let published = serde_json::to_value(&score).unwrap();
-    assert_eq!(finished["result"], published, "it was the day's last");
+    assert_eq!(finished["result"], published, "the day's last evaluation releases the day");
     assert_eq!(finished["released_at"], "2026-03-01T10:00:00Z");
     assert_eq!(finished["dataset"], format!("{path}/dataset"));
     let hash = blake3::hash(b"PK the recorded dataset").to_string();
@@ -66,7 +68,7 @@ async fn an_evaluation_is_followed_from_the_queue_to_the_dataset() {
 }
 
 #[tokio::test]
-async fn nobody_starts_a_single_evaluation() {
+async fn single_evaluation_cannot_be_started() {
     let site = Site::start().await;
     let (team, other) = (site.team("Alpha").await, site.team("Beta").await);
     let submission = site.valid_submission(&team, "striker").await;
@@ -101,12 +103,12 @@ async fn nobody_starts_a_single_evaluation() {
 }
 
 #[tokio::test]
-async fn an_agent_that_failed_sees_every_fault_and_its_log() {
+async fn failed_evaluation_shows_its_faults_and_log() {
     let site = Site::start().await;
     let team = site.team("Alpha").await;
     let submission = site.valid_submission(&team, "striker").await;
     let path = site.evaluate(&team, &submission).await;
-    site.play_shards(2).await;
+    site.run_shards(2).await;
     let failed = site.get(&path, Some(&team.token)).await.json(200);
     assert_eq!(failed["state"], "agent_failed", "{failed:#}");
     let fault = &failed["faults"][0];
@@ -116,7 +118,7 @@ async fn an_agent_that_failed_sees_every_fault_and_its_log() {
     );
     assert_eq!((&fault["task"], &fault["step"]), (&json!("hit"), &json!(3)));
     assert_eq!(fault["line"], "{\"type\":\"act\"}");
-    assert!(text(&failed["log"]).contains("log of hit"));
+    assert!(string(&failed["log"]).contains("log of hit"));
     assert!(failed.get("result").is_none());
     let list = site.get("/api/v1/evaluations", Some(&team.token)).await;
     let listed = &list.json(200)[0];
@@ -128,7 +130,7 @@ async fn an_agent_that_failed_sees_every_fault_and_its_log() {
     let me = site.get("/api/v1/me", Some(&team.token)).await.json(200);
     assert_eq!(
         me["turn"]["evaluation"], failed["id"],
-        "the agent's own failure counts"
+        "an evaluation that the agent failed counts"
     );
 
     let page = site.get(&path.replace("/api/v1", ""), None).await;
@@ -138,7 +140,7 @@ async fn an_agent_that_failed_sees_every_fault_and_its_log() {
 }
 
 #[tokio::test]
-async fn a_cancelled_evaluation_tells_why_and_is_played_again_when_the_organiser_says_so() {
+async fn cancelled_evaluation_shows_reason_and_can_be_rerun() {
     let site = Site::start().await;
     let team = site.team("Alpha").await;
     let submission = site.valid_submission(&team, "striker").await;
@@ -181,23 +183,23 @@ async fn a_cancelled_evaluation_tells_why_and_is_played_again_when_the_organiser
     site.post(missing, Some(ADMIN), &json!({}))
         .await
         .problem(404, "not-found", &[]);
-    site.finish(&result([0.5, 0.6, 0.7], 100.0)).await;
+    site.finish_evaluation(&result([0.5, 0.6, 0.7], 100.0)).await;
     let me = site.get("/api/v1/me", Some(&team.token)).await.json(200);
     assert_eq!(me["turn"]["evaluation"], again["id"]);
 }
 
 #[tokio::test]
-async fn another_teams_evaluation_looks_like_none() {
+async fn evaluation_of_another_team_is_not_found() {
     let site = Site::start().await;
     let (owner, other) = (site.team("Owner").await, site.team("Other").await);
     let submission = site.valid_submission(&owner, "striker").await;
     let path = site.evaluate(&owner, &submission).await;
-    site.finish(&result([0.5, 0.6, 0.7], 100.0)).await;
+    site.finish_evaluation(&result([0.5, 0.6, 0.7], 100.0)).await;
     let dataset = format!("{path}/dataset");
     for path in [&path, &dataset] {
-        let foreign = site.get(path, Some(&other.token)).await;
-        foreign.problem(404, "not-found", &["evaluation"]);
-        assert!(!foreign.body.contains("Owner"));
+        let refused = site.get(path, Some(&other.token)).await;
+        refused.problem(404, "not-found", &["evaluation"]);
+        assert!(!refused.body.contains("Owner"));
         site.get(path, None)
             .await
             .problem(401, "unauthenticated", &[]);

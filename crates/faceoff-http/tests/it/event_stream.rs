@@ -1,7 +1,7 @@
-//! The stream of what changes, over real connections: who is told what, and what a reader that comes again gets.
+//! The event stream over real connections: visibility of events, topics and resumption.
 
 use crate::{
-    site::{ADMIN, Answer, Site, TestTeam, patient, result, text},
+    site::{ADMIN, Answer, Site, TestTeam, generous_limits, result, string},
     sse::{Event, Stream},
 };
 use faceoff_http::HttpLimits;
@@ -11,9 +11,9 @@ use serde_json::{Value, json};
 const PATH: &str = "/api/v1/events/stream";
 
 async fn announce(site: &Site) {
-    let told = json!({ "title": "The end", "text": "of this test" });
+    let announcement = json!({ "title": "The end", "text": "of this test" });
     let path = "/api/v1/announcements";
-    site.post(path, Some(ADMIN), &told).await.json(201);
+    site.post(path, Some(ADMIN), &announcement).await.json(201);
 }
 
 async fn change_stage(site: &Site, body: Value) {
@@ -22,18 +22,18 @@ async fn change_stage(site: &Site, body: Value) {
     Answer::of(request.send().await.unwrap()).await.json(200);
 }
 
-/// All changes until the announcement, from the beginning of the season.
-async fn until_the_end(site: &Site, query: &str, token: Option<&str>) -> Vec<Event> {
+/// All events from the beginning of the season until the announcement.
+async fn events_until_announcement(site: &Site, query: &str, token: Option<&str>) -> Vec<Event> {
     let mut stream = Stream::open(site, &format!("{PATH}{query}"), token, Some("0")).await;
-    let mut told = Vec::new();
+    let mut events = Vec::new();
     loop {
         let event = stream.next().await.unwrap();
         assert_eq!(event.name, "change");
         assert_eq!(event.id, Some(event.data["id"].to_string()));
         if event.data["kind"] == "announced" {
-            return told;
+            return events;
         }
-        told.push(event);
+        events.push(event);
     }
 }
 
@@ -42,9 +42,9 @@ fn kinds(events: &[Event]) -> Vec<&str> {
     kinds.map(Option::unwrap).collect()
 }
 
-/// A day of two teams that are played to their scores; the path of the first one's evaluation.
-async fn played_day(site: &Site, teams: &[TestTeam; 2]) -> String {
-    let mut of_first = None;
+/// Runs a day of two teams. Returns the path of the first team's evaluation.
+async fn run_day(site: &Site, teams: &[TestTeam; 2]) -> String {
+    let mut first_evaluation = None;
     for team in teams {
         site.valid_submission(team, "agent").await;
     }
@@ -52,11 +52,11 @@ async fn played_day(site: &Site, teams: &[TestTeam; 2]) -> String {
         let submission = site.store.submissions_of(team.id.parse().unwrap());
         let submission = submission.await.unwrap()[0].id.to_string();
         let evaluation = site.evaluate(team, &submission).await;
-        of_first.get_or_insert(evaluation);
+        first_evaluation.get_or_insert(evaluation);
     }
-    site.finish(&result([0.5; 3], 10.0)).await;
-    site.finish(&result([0.7; 3], 20.0)).await;
-    of_first.unwrap()
+    site.finish_evaluation(&result([0.5; 3], 10.0)).await;
+    site.finish_evaluation(&result([0.7; 3], 20.0)).await;
+    first_evaluation.unwrap()
 }
 
 async fn two_teams(site: &Site) -> [TestTeam; 2] {
@@ -64,14 +64,14 @@ async fn two_teams(site: &Site) -> [TestTeam; 2] {
 }
 
 #[tokio::test]
-async fn a_reader_that_comes_again_and_again_gets_each_change_once_and_in_order() {
+async fn resumed_stream_has_each_event_once_in_order() {
     let site = Site::start().await;
     let mut live = Stream::open(&site, PATH, Some(ADMIN), None).await;
     let now = live.next().await.unwrap();
     assert_eq!(now.name, "now");
     assert_eq!(now.id, Some(now.data["id"].to_string()));
     let teams = two_teams(&site).await;
-    played_day(&site, &teams).await;
+    run_day(&site, &teams).await;
 
     let log = site
         .get("/api/v1/events?limit=1000", Some(ADMIN))
@@ -80,18 +80,18 @@ async fn a_reader_that_comes_again_and_again_gets_each_change_once_and_in_order(
     let logged = log["events"].as_array().unwrap().iter().rev();
     let ids: Vec<i64> = logged.map(|event| event["id"].as_i64().unwrap()).collect();
     assert!(ids.len() > 20, "{ids:?}");
-    // Three at a time, by a connection each.
-    let (mut told, mut last) = (Vec::new(), "0".to_owned());
-    while told.len() < ids.len() {
+    // Three events on each connection.
+    let (mut received, mut last) = (Vec::new(), "0".to_owned());
+    while received.len() < ids.len() {
         let mut stream = Stream::open(&site, PATH, Some(ADMIN), Some(&last)).await;
-        for _ in 0..3.min(ids.len() - told.len()) {
+        for _ in 0..3.min(ids.len() - received.len()) {
             let event = stream.next().await.unwrap();
             last = event.id.unwrap();
-            told.push(last.parse::<i64>().unwrap());
+            received.push(last.parse::<i64>().unwrap());
         }
     }
-    assert_eq!(told, ids);
-    // Who stayed has what came after the first word.
+    assert_eq!(received, ids);
+    // The open stream has all events since its first one.
     let since = ids
         .iter()
         .filter(|id| **id > now.data["id"].as_i64().unwrap());
@@ -99,28 +99,28 @@ async fn a_reader_that_comes_again_and_again_gets_each_change_once_and_in_order(
         assert_eq!(live.next().await.unwrap().id, Some(id.to_string()));
     }
     announce(&site).await;
-    let told = live.next().await.unwrap().data;
-    assert_eq!(told["kind"], "announced");
-    assert_eq!(told["at"], site.now().to_string());
-    assert!(text(&told["subject"]).starts_with("announcement:"));
-    assert!(told.get("title").is_none(), "what it says is asked for");
+    let announced = live.next().await.unwrap().data;
+    assert_eq!(announced["kind"], "announced");
+    assert_eq!(announced["at"], site.now().to_string());
+    assert!(string(&announced["subject"]).starts_with("announcement:"));
+    assert!(announced.get("title").is_none(), "the event has no content");
 }
 
 #[tokio::test]
-async fn everybody_is_told_what_they_may_know_and_no_score() {
+async fn stream_shows_visible_events_without_scores() {
     let site = Site::start().await;
     let teams = two_teams(&site).await;
     let [alpha, beta] = &teams;
-    let evaluation = played_day(&site, &teams).await;
+    let evaluation = run_day(&site, &teams).await;
     let id = evaluation.rsplit('/').next().unwrap();
-    let asked = json!({ "text": "?" });
-    site.post("/api/v1/questions", Some(&alpha.token), &asked)
+    let question = json!({ "text": "?" });
+    site.post("/api/v1/questions", Some(&alpha.token), &question)
         .await
         .json(201);
     announce(&site).await;
 
-    let by_visitor = until_the_end(&site, "", None).await;
-    let seen = kinds(&by_visitor);
+    let visitor_events = events_until_announcement(&site, "", None).await;
+    let seen = kinds(&visitor_events);
     for kind in [
         "team_created",
         "day_started",
@@ -140,14 +140,14 @@ async fn everybody_is_told_what_they_may_know_and_no_score() {
     ] {
         assert!(!seen.contains(&hidden), "{hidden} in {seen:?}");
     }
-    let finished = by_visitor
+    let finished = visitor_events
         .iter()
         .find(|event| event.data["subject"] == format!("evaluation:{id}"))
         .unwrap();
     assert_eq!(finished.data["teams"], json!([alpha.id]));
     assert_eq!(finished.data["stage"], site.stage().await.to_string());
     assert_eq!(finished.data["day"], "2026-03-01");
-    for event in &by_visitor {
+    for event in &visitor_events {
         let data = event.data.as_object().unwrap();
         let known = [
             "id",
@@ -164,8 +164,8 @@ async fn everybody_is_told_what_they_may_know_and_no_score() {
         }
     }
 
-    let by_alpha = until_the_end(&site, "", Some(&alpha.token)).await;
-    let seen = kinds(&by_alpha);
+    let alpha_events = events_until_announcement(&site, "", Some(&alpha.token)).await;
+    let seen = kinds(&alpha_events);
     for kind in [
         "submission_valid",
         "shard_committed",
@@ -174,49 +174,49 @@ async fn everybody_is_told_what_they_may_know_and_no_score() {
     ] {
         assert!(seen.contains(&kind), "{kind} is not in {seen:?}");
     }
-    let of_beta = format!("team:{}", beta.id);
-    let others = by_alpha
+    let beta_subject = format!("team:{}", beta.id);
+    let beta_events = alpha_events
         .iter()
         .filter(|event| event.data["teams"] == json!([beta.id]));
-    let others: Vec<&str> = others
+    let beta_events: Vec<&str> = beta_events
         .map(|event| event.data["kind"].as_str().unwrap())
         .collect();
-    assert_eq!(others, ["team_created", "evaluation_finished"], "{of_beta}");
+    assert_eq!(beta_events, ["team_created", "evaluation_finished"], "{beta_subject}");
 }
 
 #[tokio::test]
-async fn of_a_blind_stage_only_its_team_and_the_organiser_learn_what_became_of_an_evaluation() {
+async fn stream_of_a_blind_stage_hides_evaluations_of_others() {
     let site = Site::start().await;
     let teams = two_teams(&site).await;
     change_stage(&site, json!({ "blind": true })).await;
-    let evaluation = played_day(&site, &teams).await;
+    let evaluation = run_day(&site, &teams).await;
     let id = evaluation.rsplit('/').next().unwrap();
     announce(&site).await;
 
-    let by_visitor = until_the_end(&site, "", None).await;
-    let about_evaluations = |events: &[Event]| -> Vec<Value> {
+    let visitor_events = events_until_announcement(&site, "", None).await;
+    let evaluation_subjects = |events: &[Event]| -> Vec<Value> {
         let subjects = events.iter().map(|event| &event.data["subject"]);
-        let subjects = subjects.filter(|subject| text(subject).starts_with("evaluation:"));
+        let subjects = subjects.filter(|subject| string(subject).starts_with("evaluation:"));
         subjects.cloned().collect()
     };
-    assert_eq!(about_evaluations(&by_visitor), [json!(null); 0]);
+    assert_eq!(evaluation_subjects(&visitor_events), [json!(null); 0]);
     assert!(
-        !kinds(&by_visitor)
+        !kinds(&visitor_events)
             .iter()
             .any(|kind| kind.starts_with("evaluation_"))
     );
-    assert!(kinds(&by_visitor).contains(&"day_released"));
-    let by_alpha = until_the_end(
+    assert!(kinds(&visitor_events).contains(&"day_released"));
+    let alpha_events = events_until_announcement(
         &site,
         "?about=evaluations,announcements",
         Some(&teams[0].token),
     )
     .await;
-    assert!(kinds(&by_alpha).contains(&"evaluation_finished"));
-    for subject in about_evaluations(&by_alpha) {
+    assert!(kinds(&alpha_events).contains(&"evaluation_finished"));
+    for subject in evaluation_subjects(&alpha_events) {
         assert_eq!(subject, format!("evaluation:{id}"));
     }
-    let finished = until_the_end(
+    let finished = events_until_announcement(
         &site,
         "?about=evaluation_finished,announcements",
         Some(ADMIN),
@@ -226,37 +226,37 @@ async fn of_a_blind_stage_only_its_team_and_the_organiser_learn_what_became_of_a
 }
 
 #[tokio::test]
-async fn what_frozen_boards_leave_out_is_told_to_its_team_alone() {
+async fn stream_hides_evaluations_after_a_freeze_from_others() {
     let site = Site::start().await;
     let teams = two_teams(&site).await;
     let freeze = format!("/api/v1/stages/{}/freeze", site.stage().await);
-    let why = json!({ "reason": "the last week is a surprise" });
-    site.post(&freeze, Some(ADMIN), &why).await.json(200);
-    site.later(60);
-    played_day(&site, &teams).await;
+    let reason = json!({ "reason": "the last week is a surprise" });
+    site.post(&freeze, Some(ADMIN), &reason).await.json(200);
+    site.advance(60);
+    run_day(&site, &teams).await;
     announce(&site).await;
     let query = "?about=evaluation_finished,announcements";
     let [alpha, beta] = &teams;
-    for (token, told) in [
+    for (token, count) in [
         (None, 0),
         (Some(alpha.token.as_str()), 1),
         (Some(beta.token.as_str()), 1),
         (Some(ADMIN), 2),
     ] {
-        let events = until_the_end(&site, query, token).await;
-        assert_eq!(events.len(), told, "{events:?}");
+        let events = events_until_announcement(&site, query, token).await;
+        assert_eq!(events.len(), count, "{events:?}");
     }
 }
 
 #[tokio::test]
-async fn one_stream_tells_all_that_a_page_shows_and_nothing_else() {
+async fn stream_is_filtered_by_topics() {
     let site = Site::start().await;
     let teams = two_teams(&site).await;
-    played_day(&site, &teams).await;
+    run_day(&site, &teams).await;
     announce(&site).await;
-    let of_board = until_the_end(&site, "?about=board,announcements", None).await;
+    let board_events = events_until_announcement(&site, "?about=board,announcements", None).await;
     assert_eq!(
-        kinds(&of_board),
+        kinds(&board_events),
         [
             "stage_created",
             "evaluation_finished",
@@ -265,12 +265,12 @@ async fn one_stream_tells_all_that_a_page_shows_and_nothing_else() {
         ]
     );
     let query = format!("?about=team:{},announcements", teams[1].id);
-    let of_beta = until_the_end(&site, &query, None).await;
-    assert_eq!(kinds(&of_beta), ["team_created", "evaluation_finished"]);
+    let beta_events = events_until_announcement(&site, &query, None).await;
+    assert_eq!(kinds(&beta_events), ["team_created", "evaluation_finished"]);
     let stage = site.stage().await;
-    let of_stage = until_the_end(&site, &format!("?about=stage:{stage},announced"), None).await;
+    let stage_events = events_until_announcement(&site, &format!("?about=stage:{stage},announced"), None).await;
     assert_eq!(
-        kinds(&of_stage),
+        kinds(&stage_events),
         [
             "stage_created",
             "day_started",
@@ -282,7 +282,7 @@ async fn one_stream_tells_all_that_a_page_shows_and_nothing_else() {
 }
 
 #[tokio::test]
-async fn what_is_no_id_and_no_topic_is_said_in_words() {
+async fn unknown_topic_or_event_id_is_refused() {
     let site = Site::start().await;
     let path = format!("{PATH}?about=board,nothing");
     site.get(&path, None)
@@ -297,7 +297,7 @@ async fn what_is_no_id_and_no_topic_is_said_in_words() {
             &["Last-Event-ID", wrong],
         );
     }
-    // Of a folder that a backup has taken the place of.
+    // An id that is too high comes from data that was replaced by a backup.
     let mut stream = Stream::open(&site, PATH, None, Some("4711000")).await;
     let reset = stream.next().await.unwrap();
     assert_eq!(reset.name, "reset");
@@ -309,10 +309,10 @@ async fn what_is_no_id_and_no_topic_is_said_in_words() {
 }
 
 #[tokio::test]
-async fn so_many_follow_at_a_time_and_whoever_leaves_makes_room() {
+async fn number_of_event_readers_is_limited() {
     let limits = HttpLimits {
         event_readers: 1,
-        ..patient()
+        ..generous_limits()
     };
     let mut site = Site::start_with(limits).await;
     let mut stream = Stream::open(&site, PATH, None, None).await;
@@ -320,21 +320,21 @@ async fn so_many_follow_at_a_time_and_whoever_leaves_makes_room() {
     let busy = site.get(PATH, None).await;
     busy.problem(503, "busy", &["1 readers"]);
     assert_eq!(busy.header("retry-after"), "2");
-    site.end().await;
-    assert_eq!(stream.next().await, None, "whole, and not cut off");
+    site.shut_down().await;
+    assert_eq!(stream.next().await, None, "the stream ends without an error");
 }
 
 #[tokio::test]
-async fn a_stream_ends_with_its_token() {
+async fn stream_ends_when_its_token_is_replaced() {
     let site = Site::start().await;
     let [alpha, beta] = two_teams(&site).await;
-    let mut of_alpha = Stream::open(&site, PATH, Some(&alpha.token), None).await;
-    let mut of_beta = Stream::open(&site, PATH, Some(&beta.token), None).await;
-    assert_eq!(of_alpha.next().await.unwrap().name, "now");
-    assert_eq!(of_beta.next().await.unwrap().name, "now");
+    let mut alpha_stream = Stream::open(&site, PATH, Some(&alpha.token), None).await;
+    let mut beta_stream = Stream::open(&site, PATH, Some(&beta.token), None).await;
+    assert_eq!(alpha_stream.next().await.unwrap().name, "now");
+    assert_eq!(beta_stream.next().await.unwrap().name, "now");
     let replace = format!("/api/v1/teams/{}/token", alpha.id);
     site.post(&replace, Some(ADMIN), &json!({})).await.json(200);
-    assert_eq!(of_alpha.next().await, None, "nothing more, and no error");
+    assert_eq!(alpha_stream.next().await, None, "the stream ends without an error");
     announce(&site).await;
-    assert_eq!(of_beta.next().await.unwrap().data["kind"], "announced");
+    assert_eq!(beta_stream.next().await.unwrap().data["kind"], "announced");
 }

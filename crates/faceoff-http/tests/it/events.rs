@@ -1,10 +1,12 @@
-use crate::site::{ADMIN, Site, text};
+//! The event log.
+
+use crate::site::{ADMIN, Site, string};
 use serde_json::{Value, json};
 
 /// The kinds of a page's events.
 fn kinds(page: &Value) -> Vec<String> {
     let events = page["events"].as_array().unwrap();
-    events.iter().map(|event| text(&event["kind"])).collect()
+    events.iter().map(|event| string(&event["kind"])).collect()
 }
 
 async fn page(site: &Site, query: &str) -> Value {
@@ -13,7 +15,7 @@ async fn page(site: &Site, query: &str) -> Value {
 }
 
 #[tokio::test]
-async fn every_change_has_an_author_and_is_found_by_all_that_it_has() {
+async fn events_are_filtered_by_actor_subject_and_kind() {
     let site = Site::start().await;
     let (alpha, beta) = (site.team("Alpha").await, site.team("Beta").await);
     site.valid_submission(&alpha, "a").await;
@@ -29,13 +31,13 @@ async fn every_change_has_an_author_and_is_found_by_all_that_it_has() {
     assert_eq!(
         found.last().map(String::as_str),
         Some("token_created"),
-        "the host's"
+        "the host's token"
     );
     assert_eq!(found[found.len() - 2], "season_named");
     for kind in ["submission_uploaded", "token_replaced", "day_started"] {
         assert_eq!(found.iter().filter(|found| *found == kind).count(), 1);
     }
-    // By who, by what about, by what.
+    // By actor, by subject, by kind.
     assert_eq!(
         kinds(&page(&site, &format!("?actor=team:{}", alpha.id)).await),
         ["submission_uploaded"]
@@ -44,9 +46,9 @@ async fn every_change_has_an_author_and_is_found_by_all_that_it_has() {
         kinds(&page(&site, "?actor=team").await),
         ["submission_uploaded"]
     );
-    let of_beta = page(&site, &format!("?subject=team:{}", beta.id)).await;
+    let beta_events = page(&site, &format!("?subject=team:{}", beta.id)).await;
     assert_eq!(
-        kinds(&of_beta),
+        kinds(&beta_events),
         [
             "token_replaced",
             "token_created",
@@ -54,7 +56,7 @@ async fn every_change_has_an_author_and_is_found_by_all_that_it_has() {
             "team_created"
         ]
     );
-    let created = &of_beta["events"][3];
+    let created = &beta_events["events"][3];
     assert_eq!(created["actor"], "organiser");
     assert_eq!(created["details"], json!({ "name": "Beta" }));
     assert_eq!(created["subject"], format!("team:{}", beta.id));
@@ -65,7 +67,7 @@ async fn every_change_has_an_author_and_is_found_by_all_that_it_has() {
         ["team_created"]
     );
 
-    // Page by page the same.
+    // Paging returns the same events.
     let (mut paged, mut query) = (Vec::new(), "?limit=2".to_owned());
     loop {
         let page = page(&site, &query).await;
@@ -80,7 +82,7 @@ async fn every_change_has_an_author_and_is_found_by_all_that_it_has() {
 }
 
 #[tokio::test]
-async fn the_log_is_the_organisers_and_its_words_are_checked() {
+async fn event_log_is_for_organisers_and_filters_are_validated() {
     let site = Site::start().await;
     let team = site.team("Alpha").await;
     let path = "/api/v1/events";

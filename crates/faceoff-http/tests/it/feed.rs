@@ -1,4 +1,4 @@
-//! The feed of news, read back by a feed reader.
+//! The Atom feed of news, parsed by a feed reader's library.
 
 use crate::site::{ADMIN, Answer, Site, result};
 use atom_syndication::Feed;
@@ -7,7 +7,7 @@ use serde_json::json;
 
 const PATH: &str = "/feed.atom";
 
-async fn read(site: &Site) -> (Answer, Feed) {
+async fn fetch_feed(site: &Site) -> (Answer, Feed) {
     let answer = site.get(PATH, None).await;
     assert_eq!(answer.status, 200, "{}", answer.body);
     assert_eq!(
@@ -26,32 +26,32 @@ fn titles(feed: &Feed) -> Vec<String> {
 }
 
 #[tokio::test]
-async fn news_is_told_the_newest_first_by_ids_that_stay() {
+async fn feed_lists_news_newest_first_with_stable_ids() {
     let site = Site::start().await;
-    let (_, before) = read(&site).await;
+    let (_, before) = fetch_feed(&site).await;
     assert_eq!(before.title().as_str(), "Test season · Faceoff");
     assert_eq!(titles(&before), ["Qualifying is open"]);
-    site.later(60);
+    site.advance(60);
     site.ranked_teams(&[
         ("Alpha", result([0.511; 3], 10.0)),
         ("Beta", result([0.7; 3], 20.0)),
     ])
     .await;
-    site.later(60);
+    site.advance(60);
     let odd = "<b>odd</b> & \"more\" ]]> 🙂";
-    let told = json!({ "title": odd, "text": format!("{odd}\n\nand so on") });
+    let announcement = json!({ "title": odd, "text": format!("{odd}\n\nand so on") });
     let path = "/api/v1/announcements";
-    site.post(path, Some(ADMIN), &told).await.json(201);
-    site.later(60);
+    site.post(path, Some(ADMIN), &announcement).await.json(201);
+    site.advance(60);
     let cup = json!({ "name": "Cup", "teams": ["Alpha", "Beta"] });
     let cup = site.post("/api/v1/tournaments", Some(ADMIN), &cup).await;
     assert_eq!(cup.status, 201, "{}", cup.body);
-    site.later(60);
+    site.advance(60);
     let rounds = format!("{}/rounds", cup.header("location"));
     let started = site.post(&rounds, Some(ADMIN), &json!({})).await;
     assert!(started.status.is_success(), "{}", started.body);
 
-    let (answer, feed) = read(&site).await;
+    let (answer, feed) = fetch_feed(&site).await;
     assert_eq!(
         titles(&feed),
         [
@@ -83,19 +83,19 @@ async fn news_is_told_the_newest_first_by_ids_that_stay() {
     ids.sort_unstable();
     ids.dedup();
     assert_eq!(ids.len(), 5);
-    // Pages lead there.
+    // Pages link to the feed.
     let page = site.get("/announcements", None).await.body;
     let link = r#"<link rel="alternate" type="application/atom+xml""#;
     assert!(page.contains(link), "{page}");
 }
 
 #[tokio::test]
-async fn who_has_it_is_told_so() {
+async fn unchanged_feed_answers_not_modified() {
     let site = Site::start().await;
-    let (answer, _) = read(&site).await;
+    let (answer, _) = fetch_feed(&site).await;
     let (tag, modified) = (answer.header("etag"), answer.header("last-modified"));
     assert_eq!(modified, "Sun, 01 Mar 2026 10:00:00 GMT");
-    let ask = async |name: &str, value: &str| {
+    let get_with_header = async |name: &str, value: &str| {
         let request = site.request(Method::GET, PATH, None).header(name, value);
         Answer::of(request.send().await.unwrap()).await
     };
@@ -104,21 +104,21 @@ async fn who_has_it_is_told_so() {
         ("if-none-match", format!("\"other\", W/{tag}")),
         ("if-modified-since", modified.to_owned()),
     ] {
-        let known = ask(name, &value).await;
-        assert_eq!((known.status.as_u16(), known.body.as_str()), (304, ""));
-        assert_eq!(known.header("etag"), tag);
+        let unchanged = get_with_header(name, &value).await;
+        assert_eq!((unchanged.status.as_u16(), unchanged.body.as_str()), (304, ""));
+        assert_eq!(unchanged.header("etag"), tag);
     }
     for (name, value) in [
         ("if-none-match", "\"other\""),
         ("if-modified-since", "Sun, 01 Mar 2026 09:59:59 GMT"),
         ("if-modified-since", "yesterday"),
     ] {
-        assert_eq!(ask(name, value).await.status, 200, "{value}");
+        assert_eq!(get_with_header(name, value).await.status, 200, "{value}");
     }
-    site.later(60);
-    let told = json!({ "title": "News", "text": "of this test" });
+    site.advance(60);
+    let announcement = json!({ "title": "News", "text": "of this test" });
     let path = "/api/v1/announcements";
-    site.post(path, Some(ADMIN), &told).await.json(201);
-    assert_eq!(ask("if-none-match", tag).await.status, 200);
-    assert_eq!(ask("if-modified-since", modified).await.status, 200);
+    site.post(path, Some(ADMIN), &announcement).await.json(201);
+    assert_eq!(get_with_header("if-none-match", tag).await.status, 200);
+    assert_eq!(get_with_header("if-modified-since", modified).await.status, 200);
 }

@@ -1,14 +1,14 @@
-//! Pages as a browser reads them.
+//! Pages, parsed as a browser parses them.
 
 use crate::site::Site;
 use scraper::{Html, Selector};
 
-/// The page, which must be valid HTML.
+/// Fetches a page, which must be valid HTML without inline styles or scripts.
 pub async fn page(site: &Site, path: &str) -> Html {
     let answer = site.get(path, None).await;
     assert_eq!(answer.status, 200, "{}", answer.body);
     assert!(!answer.body.contains("style="));
-    // The policy lets no other script run.
+    // The content security policy allows no other script.
     for (at, _) in answer.body.match_indices("<script") {
         let script = &answer.body[at..];
         assert!(script.starts_with("<script type=\"module\" src=\"/static/live.js?"));
@@ -23,7 +23,7 @@ pub async fn page(site: &Site, path: &str) -> Html {
     html
 }
 
-/// The words of what a selector finds, one by one.
+/// The text of each element that the selector finds, with single spaces between words.
 pub fn texts(html: &Html, selector: &str) -> Vec<String> {
     html.select(&Selector::parse(selector).unwrap())
         .map(|element| {
@@ -37,7 +37,7 @@ pub fn texts(html: &Html, selector: &str) -> Vec<String> {
         .collect()
 }
 
-/// Rows of tables, each as the words of its cells, one space between.
+/// The text of each table row that the selector finds: its cells with one space between.
 pub fn rows(html: &Html, selector: &str) -> Vec<String> {
     let cell = Selector::parse("th, td").unwrap();
     html.select(&Selector::parse(selector).unwrap())

@@ -1,25 +1,25 @@
 //! The API and the pages over real HTTP, on a real store in a temporary folder.
 #![expect(
     clippy::unwrap_used,
-    reason = "helpers of tests fail as tests do: by panicking"
+    reason = "test helpers fail as tests do: by panicking"
 )]
 
 mod ablations;
-mod acts;
+mod decisions;
 mod archive;
 mod baselines;
-mod blind;
+mod blind_stages;
 mod board;
 mod board_data;
 mod board_load;
-mod board_page;
+mod board_pages;
 mod browser;
 mod capacity;
 mod capacity_log;
 mod clips;
 mod comparisons;
 mod days;
-mod desk;
+mod team_dashboard;
 mod divisions;
 mod docs;
 mod downloads;
@@ -27,24 +27,24 @@ mod evaluations;
 mod event_stream;
 mod events;
 mod feed;
-mod frozen;
+mod frozen_boards;
 mod html;
-mod limits;
-mod links;
-mod lists;
+mod stage_limits;
+mod download_links;
+mod pagination;
 mod openapi;
-mod organiser_desk;
-mod people;
+mod organiser_dashboard;
+mod users;
 mod probes;
 mod problems;
 mod proposals;
 mod publication;
-mod rates;
-mod receiver;
+mod rate_limits;
+mod webhook_receiver;
 mod retention;
 mod roles;
-mod room;
-mod rulings;
+mod free_space;
+mod confirmations;
 mod runtimes;
 mod season;
 mod seeds;
@@ -53,15 +53,15 @@ mod sign_off;
 mod site;
 mod sse;
 mod stages;
-mod standings;
+mod counting_evaluations;
 mod submissions;
 mod team_page;
 mod teams;
 mod tournament;
-mod uploads;
-mod variation;
-mod watched;
+mod upload_quotas;
+mod scoring_settings;
+mod request_log;
 mod webhooks;
 mod whole_season;
-mod work_files;
+mod worker_files;
 mod workers;

@@ -1,9 +1,11 @@
+//! The OpenAPI document.
+
 use crate::site::{ADMIN, Answer, GZIP, Site};
 use reqwest::Method;
 use serde_json::{Value, json};
 
 #[tokio::test]
-async fn the_document_lists_what_is_there_and_nothing_else() {
+async fn document_lists_all_operations() {
     let site = Site::start().await;
     let document = site.get("/api/v1/openapi.json", None).await.json(200);
     assert!(document["openapi"].as_str().unwrap().starts_with("3."));
@@ -170,7 +172,7 @@ async fn the_document_lists_what_is_there_and_nothing_else() {
         let line = line.replace("/api/v1", "");
         assert!(
             documentation.contains(&line),
-            "docs/api.md does not tell of {line}"
+            "docs/api.md does not mention {line}"
         );
     }
     let text = document.to_string();
@@ -194,38 +196,38 @@ async fn the_document_lists_what_is_there_and_nothing_else() {
 }
 
 #[tokio::test]
-async fn every_operation_tells_what_any_of_its_kind_answers() {
+async fn operations_list_the_responses_of_their_kind() {
     let site = Site::start().await;
     let document = site.get("/api/v1/openapi.json", None).await.json(200);
-    let answers = |method: &str, path: &str| -> Vec<String> {
+    let statuses = |method: &str, path: &str| -> Vec<String> {
         let pointer = format!("/paths/{}/{method}/responses", path.replace('/', "~1"));
         let responses = document.pointer(&pointer).unwrap().as_object().unwrap();
         responses.keys().cloned().collect()
     };
     assert_eq!(
-        answers("get", "/api/v1/health/live"),
+        statuses("get", "/api/v1/health/live"),
         ["200", "429", "500", "503"]
     );
-    // It comes page by page.
+    // A paginated list.
     assert_eq!(
-        answers("get", "/api/v1/announcements"),
+        statuses("get", "/api/v1/announcements"),
         ["200", "400", "422", "429", "500", "503"]
     );
     let page = "/paths/~1api~1v1~1announcements/get/responses/200/headers/Link";
     assert!(document.pointer(page).is_some());
-    // It shows more to whom it knows, takes a query, and says by itself what is the organiser's.
+    // The board takes a query and conditions. With a token it shows more, and parts of it are for organisers only.
     assert_eq!(
-        answers("get", "/api/v1/board"),
+        statuses("get", "/api/v1/board"),
         [
             "200", "304", "400", "401", "403", "404", "429", "500", "503"
         ]
     );
-    let dataset = answers("get", "/api/v1/evaluations/{id}/dataset");
+    let dataset = statuses("get", "/api/v1/evaluations/{id}/dataset");
     for status in ["200", "206", "304", "416"] {
-        assert!(dataset.iter().any(|told| told == status), "{status}");
+        assert!(dataset.iter().any(|listed| listed == status), "{status}");
     }
     assert_eq!(
-        answers("post", "/api/v1/stages/{id}/freeze"),
+        statuses("post", "/api/v1/stages/{id}/freeze"),
         [
             "200", "400", "401", "403", "404", "409", "413", "415", "422", "429", "500", "503",
             "507"
@@ -244,9 +246,9 @@ async fn every_operation_tells_what_any_of_its_kind_answers() {
             for (status, response) in operation["responses"].as_object().unwrap() {
                 let target = response["$ref"].as_str().map(|text| &text[1..]);
                 let response = target.map_or(response, |at| document.pointer(at).unwrap());
-                let told = response["description"].as_str();
+                let description = response["description"].as_str();
                 assert!(
-                    told.is_some_and(|told| !told.is_empty()),
+                    description.is_some_and(|description| !description.is_empty()),
                     "{method} {path} {status}: {response}"
                 );
             }
@@ -255,7 +257,7 @@ async fn every_operation_tells_what_any_of_its_kind_answers() {
 }
 
 #[tokio::test]
-async fn an_upload_takes_every_media_type_that_the_document_names() {
+async fn upload_accepts_all_documented_media_types() {
     let site = Site::start().await;
     let document = site.get("/api/v1/openapi.json", None).await.json(200);
     let upload = &document["paths"]["/api/v1/submissions"]["post"];
@@ -271,9 +273,9 @@ async fn an_upload_takes_every_media_type_that_the_document_names() {
     }
 }
 
-/// Derived types read arrays by position, so that `[null, null]` was a change of the season that was answered as done.
+/// Serde also reads structs from arrays, by position. `[null, null]` was once accepted as a change of the season.
 #[tokio::test]
-async fn an_array_in_the_place_of_an_object_is_refused() {
+async fn array_instead_of_an_object_is_refused() {
     let site = Site::start().await;
     for (method, path, body) in [
         (Method::PATCH, "/api/v1/season", json!([null, null])),

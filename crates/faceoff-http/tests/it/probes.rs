@@ -1,11 +1,11 @@
-//! What watches the server: alive, ready, and its numbers.
+//! Probes: liveness, readiness and metrics.
 
 use crate::site::*;
 use faceoff_http::HttpLimits;
-use faceoff_store::Room;
+use faceoff_store::FreeSpace;
 
-/// A number of the text by its name and labels.
-fn number(text: &str, name: &str) -> f64 {
+/// The value of a metric, by name and labels.
+fn metric(text: &str, name: &str) -> f64 {
     let line = text
         .lines()
         .find_map(|line| line.strip_prefix(name)?.strip_prefix(' '));
@@ -14,41 +14,41 @@ fn number(text: &str, name: &str) -> f64 {
 }
 
 #[tokio::test]
-async fn a_server_that_is_not_ready_is_alive() {
+async fn server_that_is_not_ready_is_live() {
     let mut site = Site::start().await;
     assert_eq!(site.get("/livez", None).await.json(200)["status"], "alive");
     assert_eq!(site.get("/readyz", None).await.json(200)["status"], "ok");
-    let room = Room::new(vec![site.folder.path().to_owned()], u64::MAX);
-    site.store = site.store.clone().with_room(room);
+    let free_space = FreeSpace::new(vec![site.folder.path().to_owned()], u64::MAX);
+    site.store = site.store.clone().with_free_space(free_space);
     site.restart().await;
     let ready = site.get("/readyz", None).await;
     let problem = ready.problem(503, "not-ready", &["bytes are free"]);
     assert_eq!(problem["room"], "short");
     site.get("/livez", None).await.json(200);
     site.store.close().await;
-    site.later(1); // one probe a second
+    site.advance(1); // one probe a second
     let ready = site.get("/readyz", None).await;
     ready.problem(503, "not-ready", &["the database cannot be written"]);
     site.get("/livez", None).await.json(200);
 }
 
 #[tokio::test]
-async fn slot_that_stands_still_is_named() {
+async fn stalled_slot_is_named() {
     let site = Site::start().await;
     let slots = site.metrics().slots();
     site.get("/readyz", None).await.json(200);
-    slots.set_standing_still(vec!["faceoff-slot-1".to_owned()]);
+    slots.set_stuck(vec!["faceoff-slot-1".to_owned()]);
     let ready = site.get("/readyz", None).await;
-    ready.problem(503, "not-ready", &["faceoff-slot-1 stands still"]);
-    slots.set_standing_still(Vec::new());
+    ready.problem(503, "not-ready", &["faceoff-slot-1 is stuck"]);
+    slots.set_stuck(Vec::new());
     site.get("/readyz", None).await.json(200);
 }
 
 #[tokio::test]
-async fn a_server_at_its_limit_is_alive() {
+async fn server_at_its_limit_is_live() {
     let limits = HttpLimits {
         requests: 0,
-        ..patient()
+        ..generous_limits()
     };
     let site = Site::start_with(limits).await;
     site.get("/readyz", None).await.problem(503, "busy", &[]);
@@ -56,7 +56,7 @@ async fn a_server_at_its_limit_is_alive() {
 }
 
 #[tokio::test]
-async fn the_numbers_are_the_organisers() {
+async fn metrics_are_for_organisers_only() {
     let site = Site::start().await;
     let team = site.team("Alpha").await;
     site.get("/metrics", None)
@@ -76,40 +76,40 @@ async fn the_numbers_are_the_organisers() {
 }
 
 #[tokio::test]
-async fn the_numbers_follow_what_happens() {
+async fn metrics_follow_events() {
     let site = Site::start().await;
     let team = site.team("Alpha").await;
-    let numbers = async || site.get("/metrics", Some(ADMIN)).await.body;
-    let before = numbers().await;
-    assert_eq!(number(&before, "faceoff_evaluations_open"), 0.0);
-    assert_eq!(number(&before, "faceoff_slots"), 2.0);
-    assert_eq!(number(&before, "faceoff_database_writable"), 1.0);
+    let metrics = async || site.get("/metrics", Some(ADMIN)).await.body;
+    let before = metrics().await;
+    assert_eq!(metric(&before, "faceoff_evaluations_open"), 0.0);
+    assert_eq!(metric(&before, "faceoff_slots"), 2.0);
+    assert_eq!(metric(&before, "faceoff_database_writable"), 1.0);
     assert!(
-        number(
+        metric(
             &before,
             "faceoff_http_requests_total{method=\"POST\",route=\"/api/v1/teams\",status=\"201\"}"
         ) >= 1.0
     );
 
-    assert_eq!(number(&before, "faceoff_queue_expected_seconds"), 0.0);
+    assert_eq!(metric(&before, "faceoff_queue_expected_seconds"), 0.0);
     let submission = site.valid_submission(&team, "striker").await;
     site.evaluate(&team, &submission).await;
-    site.later(90);
-    let during = numbers().await;
-    // Nothing of the kind was played before.
-    assert!(number(&during, "faceoff_queue_expected_seconds").is_nan());
-    assert_eq!(number(&during, "faceoff_remote_long_units"), 0.0);
-    assert_eq!(number(&during, "faceoff_evaluations_open"), 1.0);
+    site.advance(90);
+    let during = metrics().await;
+    // No such job was run before, so the duration is unknown.
+    assert!(metric(&during, "faceoff_queue_expected_seconds").is_nan());
+    assert_eq!(metric(&during, "faceoff_remote_long_units"), 0.0);
+    assert_eq!(metric(&during, "faceoff_evaluations_open"), 1.0);
     let waiting = "faceoff_queue_units{state=\"waiting\"}";
-    assert!(number(&during, waiting) >= 1.0);
-    assert_eq!(number(&during, "faceoff_queue_oldest_wait_seconds"), 90.0);
-    assert_eq!(number(&during, "faceoff_queue_paused"), 0.0);
+    assert!(metric(&during, waiting) >= 1.0);
+    assert_eq!(metric(&during, "faceoff_queue_oldest_wait_seconds"), 90.0);
+    assert_eq!(metric(&during, "faceoff_queue_paused"), 0.0);
     let pause = serde_json::json!({ "reason": "a test" });
     site.post("/api/v1/queue/pause", Some(ADMIN), &pause).await;
-    assert_eq!(number(&numbers().await, "faceoff_queue_paused"), 1.0);
-    // Nobody's name is in it, nor anybody's id.
-    let after = numbers().await;
-    for secret in ["Alpha", team.id.as_str()] {
-        assert!(!after.contains(secret), "{secret} is in\n{after}");
+    assert_eq!(metric(&metrics().await, "faceoff_queue_paused"), 1.0);
+    // The metrics contain no names and no ids.
+    let after = metrics().await;
+    for private in ["Alpha", team.id.as_str()] {
+        assert!(!after.contains(private), "{private} is in\n{after}");
     }
 }

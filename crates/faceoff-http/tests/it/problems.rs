@@ -1,4 +1,6 @@
-use crate::site::{ADMIN, Answer, Site, patient};
+//! Problem documents and error pages.
+
+use crate::site::{ADMIN, Answer, Site, generous_limits};
 use faceoff_http::HttpLimits;
 use reqwest::Method;
 use std::time::Duration;
@@ -9,7 +11,7 @@ async fn send(site: &Site, method: Method, path: &str, accept: &str) -> Answer {
 }
 
 #[tokio::test]
-async fn unknown_paths_and_methods_are_problems_for_programs_and_pages_for_people() {
+async fn unknown_paths_answer_problems_or_pages() {
     let site = Site::start().await;
     site.get("/api/v1/nothing", None)
         .await
@@ -44,7 +46,7 @@ async fn unknown_paths_and_methods_are_problems_for_programs_and_pages_for_peopl
 }
 
 #[tokio::test]
-async fn bad_json_is_a_problem_that_names_the_place() {
+async fn invalid_json_is_refused_with_its_position() {
     let site = Site::start().await;
     let post = |content_type: &'static str, body: String| {
         let request = site
@@ -78,7 +80,7 @@ async fn bad_json_is_a_problem_that_names_the_place() {
 }
 
 #[tokio::test]
-async fn every_answer_carries_its_id_and_the_security_headers() {
+async fn responses_have_a_request_id_and_security_headers() {
     let site = Site::start().await;
     for path in [
         "/",
@@ -96,33 +98,33 @@ async fn every_answer_carries_its_id_and_the_security_headers() {
         );
         assert!(
             policy.contains("script-src 'self'; connect-src 'self';"),
-            "no script but the server's own: {policy}"
+            "only scripts of the server may run: {policy}"
         );
     }
-    let imitated = site
+    let response = site
         .request(Method::GET, "/", None)
-        .header("x-request-id", "somebody-elses")
+        .header("x-request-id", "forged-id")
         .send()
         .await
         .unwrap();
-    assert_ne!(imitated.headers()["x-request-id"], "somebody-elses");
+    assert_ne!(response.headers()["x-request-id"], "forged-id");
 }
 
 #[tokio::test]
-async fn a_server_at_its_limit_says_when_to_come_back() {
+async fn busy_response_has_retry_after() {
     let site = Site::start_with(HttpLimits {
         requests: 0,
-        ..patient()
+        ..generous_limits()
     })
     .await;
     let busy = site.get("/api/v1/health", None).await;
     busy.problem(503, "busy", &["try again"]);
     assert_eq!(busy.header("retry-after"), "2");
 
-    // A body that never ends keeps the handler waiting.
+    // The handler waits for a body that never ends.
     let limits = HttpLimits {
-        answer: Duration::from_millis(50),
-        ..patient()
+        request_timeout: Duration::from_millis(50),
+        ..generous_limits()
     };
     let site = Site::start_with(limits).await;
     let endless = futures::stream::pending::<Result<bytes::Bytes, std::io::Error>>();
@@ -139,13 +141,13 @@ async fn a_server_at_its_limit_says_when_to_come_back() {
 }
 
 #[tokio::test]
-async fn a_broken_store_is_our_fault_and_keeps_its_cause_to_itself() {
+async fn store_failure_is_internal_and_hides_its_cause() {
     let site = Site::start().await;
     site.get("/api/v1/health", None).await.json(200);
     site.store.close().await;
     let broken = site.get("/api/v1/season", None).await;
     broken.problem(500, "internal", &["x-request-id"]);
-    site.later(1); // one probe a second
+    site.advance(1); // one probe a second
     let not_ready = site.get("/api/v1/health", None).await;
     not_ready.problem(503, "not-ready", &["the database cannot be written"]);
     for answer in [&broken, &not_ready] {
@@ -155,7 +157,7 @@ async fn a_broken_store_is_our_fault_and_keeps_its_cause_to_itself() {
 }
 
 #[tokio::test]
-async fn every_kind_of_problem_is_explained_where_its_type_points() {
+async fn problem_types_are_explained_on_their_page() {
     let site = Site::start().await;
     let page = site.get("/problems", None).await;
     assert_eq!(page.status, 200);

@@ -1,6 +1,6 @@
-//! What is kept: said by the organiser, asked for when it has gone, deleted by teams, and how much room it takes.
+//! Retention of datasets, deleted submissions, and storage usage.
 
-use crate::site::{ADMIN, Answer, GZIP, Site, TestTeam, result, text};
+use crate::site::{ADMIN, Answer, GZIP, Site, TestTeam, result, string};
 use reqwest::Method;
 use serde_json::{Value, json};
 
@@ -15,10 +15,10 @@ async fn stage(site: &Site) -> Value {
     site.get(&path, None).await.json(200)
 }
 
-/// Plays a day by a submission; the path of its evaluation.
-async fn play(site: &Site, team: &TestTeam, submission: &str, rates: [f64; 3]) -> String {
+/// Runs a day with this submission. Returns the path of its evaluation.
+async fn run_day(site: &Site, team: &TestTeam, submission: &str, rates: [f64; 3]) -> String {
     let evaluation = site.evaluate(team, submission).await;
-    site.finish(&result(rates, 10.0)).await;
+    site.finish_evaluation(&result(rates, 10.0)).await;
     site.next_day();
     evaluation
 }
@@ -29,25 +29,25 @@ async fn delete(site: &Site, submission: &str, token: Option<&str>, body: Value)
 }
 
 #[tokio::test]
-async fn a_retention_is_confirmed_applied_and_told() {
+async fn retention_is_confirmed_applied_and_reported() {
     let site = Site::start().await;
     let team = site.team("Alpha").await;
     let submission = site.valid_submission(&team, "a").await;
     let mut played = Vec::new();
     for rate in [0.9, 0.1, 0.2] {
-        played.push(play(&site, &team, &submission, [rate; 3]).await);
+        played.push(run_day(&site, &team, &submission, [rate; 3]).await);
     }
     let before = stage(&site).await;
     assert_eq!(before["retention"], json!({}));
-    let wanted = json!({ "retention": { "last": 1 } });
-    let told = change(&site, wanted).await;
-    let problem = told.problem(
+    let request = json!({ "retention": { "last": 1 } });
+    let unconfirmed = change(&site, request).await;
+    let problem = unconfirmed.problem(
         409,
         "not-confirmed",
         &[
             "nothing is done yet",
             "the last 1 and the best of each team",
-            "1 datasets of 1 teams and 0 archives",
+            "1 datasets of 1 teams and 0 bundles",
             "23 bytes",
         ],
     );
@@ -58,7 +58,7 @@ async fn a_retention_is_confirmed_applied_and_told() {
     assert_eq!(changed["retention"], json!({ "last": 1 }));
     assert_eq!(
         changed["revision"], before["revision"],
-        "no rule is another"
+        "retention is not a rule"
     );
     let dataset = format!("{}/dataset", played[1]);
     site.get(&dataset, Some(&team.token)).await;
@@ -76,19 +76,19 @@ async fn a_retention_is_confirmed_applied_and_told() {
                 "the last 1 and the best of each team",
             ],
         );
-        assert!(text(&problem["removed_at"]).starts_with("2026-03-04"));
+        assert!(string(&problem["removed_at"]).starts_with("2026-03-04"));
     };
     for path in [&dataset, &violations] {
         check_removed(path, &team.token).await;
     }
-    // It may be evidence: as long as the file is there.
+    // Organisers can still download it while the file exists, since it may be evidence.
     assert_eq!(site.get(&dataset, Some(ADMIN)).await.status, 200);
-    for kept in [&played[0], &played[2]] {
-        let path = format!("{kept}/dataset");
+    for retained in [&played[0], &played[2]] {
+        let path = format!("{retained}/dataset");
         let answer = site.get(&path, Some(&team.token)).await;
         assert_eq!(answer.status, 200, "{}", answer.body);
     }
-    // Whoever may not have it does not learn that it was there.
+    // Callers without access do not learn that the dataset existed.
     site.get(&dataset, None)
         .await
         .problem(401, "unauthenticated", &[]);
@@ -96,8 +96,8 @@ async fn a_retention_is_confirmed_applied_and_told() {
     assert_eq!(view["state"], "finished");
     assert_eq!(view["dataset"], Value::Null);
     assert!(view["result"]["score"].is_number(), "its result stays");
-    assert!(text(&view["dataset_removed"]["reason"]).contains("the last 1"));
-    assert!(text(&view["next"]).contains("its dataset was removed"));
+    assert!(string(&view["dataset_removed"]["reason"]).contains("the last 1"));
+    assert!(string(&view["next"]).contains("the dataset was removed"));
     let page = played[1].replace("/api/v1", "");
     let page = site.get(&page, None).await;
     assert_eq!(page.status, 200);
@@ -106,9 +106,9 @@ async fn a_retention_is_confirmed_applied_and_told() {
         "{}",
         page.body
     );
-    assert!(!page.body.contains("/dataset\""), "no link to nothing");
+    assert!(!page.body.contains("/dataset\""), "the removed dataset is not linked");
 
-    // Nothing goes by keeping more: nothing is to be confirmed.
+    // Keeping more removes nothing, so no confirmation is needed.
     let all = change(&site, json!({ "retention": {} })).await.json(200);
     assert_eq!(all["retention"], json!({}));
 
@@ -119,7 +119,7 @@ async fn a_retention_is_confirmed_applied_and_told() {
 }
 
 #[tokio::test]
-async fn a_retention_is_a_stages_from_its_making_until_after_its_sign_off() {
+async fn retention_is_set_at_creation_and_after_sign_off() {
     let site = Site::start().await;
     let made = site
         .post(
@@ -132,24 +132,24 @@ async fn a_retention_is_a_stages_from_its_making_until_after_its_sign_off() {
     assert_eq!(made["retention"], json!({ "last": 2 }));
     let team = site.team("Alpha").await;
     let submission = site.valid_submission(&team, "a").await;
-    let evaluation = play(&site, &team, &submission, [0.5; 3]).await;
+    let evaluation = run_day(&site, &team, &submission, [0.5; 3]).await;
     let closes_at = site.now() + jiff::SignedDuration::from_hours(1);
     change(&site, json!({ "closes_at": closes_at }))
         .await
         .json(200);
-    site.later(3600);
+    site.advance(3600);
     let path = format!("/api/v1/stages/{}/finalise", site.stage().await);
     site.post(&path, Some(ADMIN), &json!({ "confirm": "Qualifying" }))
         .await
         .json(200);
-    let mut wanted = json!({ "retention": { "days_after_sign_off": 2 } });
-    change(&site, wanted.clone()).await.problem(
+    let mut request = json!({ "retention": { "days_after_sign_off": 2 } });
+    change(&site, request.clone()).await.problem(
         409,
         "not-confirmed",
         &["1 datasets", "not before 2026-03-04 at 11:00 UTC"],
     );
-    wanted["confirm"] = json!("Qualifying");
-    let signed_off = change(&site, wanted).await.json(200);
+    request["confirm"] = json!("Qualifying");
+    let signed_off = change(&site, request).await.json(200);
     assert_eq!(signed_off["retention"], json!({ "days_after_sign_off": 2 }));
     change(&site, json!({ "name": "Other", "retention": {} }))
         .await
@@ -168,7 +168,7 @@ async fn a_retention_is_a_stages_from_its_making_until_after_its_sign_off() {
 }
 
 #[tokio::test]
-async fn what_is_no_retention_is_refused_with_what_is_one() {
+async fn invalid_retention_is_refused_with_valid_values() {
     let site = Site::start().await;
     for (wrong, words) in [
         (json!({ "last": 0 }), "expected 1 to 1000, got 0"),
@@ -199,18 +199,18 @@ async fn what_is_no_retention_is_refused_with_what_is_one() {
 }
 
 #[tokio::test]
-async fn a_team_deletes_a_submission_and_its_results_stay() {
+async fn deleted_submission_keeps_its_results() {
     let site = Site::start().await;
     let (team, other) = (site.team("Alpha").await, site.team("Beta").await);
     let submission = site.valid_submission(&team, "a").await;
-    let evaluation = play(&site, &team, &submission, [0.5; 3]).await;
+    let evaluation = run_day(&site, &team, &submission, [0.5; 3]).await;
     let own = Some(team.token.as_str());
     let archive = format!("{submission}/archive");
     let downloaded = site.get(&archive, own).await;
     assert_eq!(downloaded.status, 200);
     assert_eq!(downloaded.body.len(), String::from_utf8_lossy(&GZIP).len());
-    let named = downloaded.header("content-disposition");
-    assert!(named.ends_with(".tar.gz\""), "{named}");
+    let disposition = downloaded.header("content-disposition");
+    assert!(disposition.ends_with(".tar.gz\""), "{disposition}");
 
     delete(&site, &submission, own, json!({})).await.problem(
         409,
@@ -229,7 +229,7 @@ async fn a_team_deletes_a_submission_and_its_results_stay() {
             json!({ "confirm": "Alpha" }),
             409,
             "not-confirmed",
-            ["striker.tar.gz", "all that it has played"],
+            ["striker.tar.gz", "results would stay"],
         ),
         (
             json!({ "confirm": 7 }),
@@ -269,14 +269,14 @@ async fn a_team_deletes_a_submission_and_its_results_stay() {
     assert_eq!(deleted["deleted"]["by"], format!("team:{}", team.id));
     assert_eq!(deleted["archive_removed"]["reason"], "by its team");
     assert_eq!(deleted["log"], "ready\n");
-    assert!(text(&deleted["blake3"]).len() == 64);
-    assert!(text(&deleted["next"]).contains("upload it again"));
+    assert!(string(&deleted["blake3"]).len() == 64);
+    assert!(string(&deleted["next"]).contains("upload it again"));
     assert_eq!(site.get(&submission, own).await.json(200), deleted);
     site.get(&archive, own).await.problem(
         410,
         "removed",
         &[
-            "the archive of the submission was removed on",
+            "the bundle of the submission was removed on",
             "by its team",
         ],
     );
@@ -285,7 +285,7 @@ async fn a_team_deletes_a_submission_and_its_results_stay() {
         .problem(409, "conflict", &["was deleted on"]);
     site.post(&format!("{submission}/activate"), own, &json!({}))
         .await
-        .problem(409, "conflict", &["was removed", "cannot be played"]);
+        .problem(409, "conflict", &["was removed", "cannot be evaluated again"]);
     let view = site.get(&evaluation, own).await.json(200);
     assert_eq!(view["state"], "finished");
     let board = site.get("/api/v1/board", None).await.json(200);
@@ -295,15 +295,15 @@ async fn a_team_deletes_a_submission_and_its_results_stay() {
 }
 
 #[tokio::test]
-async fn an_organiser_deletes_with_a_reason_and_evidence_is_deleted_by_nobody() {
+async fn organiser_deletes_with_a_reason_but_not_evidence() {
     let site = Site::start().await;
     let team = site.team("Alpha").await;
     let own = Some(team.token.as_str());
     let first = site.valid_submission(&team, "a").await;
     let second = site.valid_submission(&team, "b").await;
     site.valid_submission(&team, "c").await;
-    let wanted = json!({ "confirm": "striker.tar.gz", "reason": "it holds a virus" });
-    let deleted = delete(&site, &first, Some(ADMIN), wanted.clone())
+    let request = json!({ "confirm": "striker.tar.gz", "reason": "it holds a virus" });
+    let deleted = delete(&site, &first, Some(ADMIN), request.clone())
         .await
         .json(200);
     let reason = &deleted["archive_removed"]["reason"];
@@ -311,16 +311,16 @@ async fn an_organiser_deletes_with_a_reason_and_evidence_is_deleted_by_nobody() 
     assert_eq!(deleted["deleted"]["by"], "organiser");
 
     let disqualify = format!("/api/v1/teams/{}/disqualify", team.id);
-    let why = json!({ "reason": "it spied", "confirm": "Alpha" });
-    site.post(&disqualify, Some(ADMIN), &why).await.json(200);
+    let ruling = json!({ "reason": "it spied", "confirm": "Alpha" });
+    site.post(&disqualify, Some(ADMIN), &ruling).await.json(200);
     for token in [own, Some(ADMIN)] {
-        delete(&site, &second, token, wanted.clone()).await.problem(
+        delete(&site, &second, token, request.clone()).await.problem(
             409,
             "conflict",
             &["it spied", "kept as evidence"],
         );
     }
-    // An organiser gets at what was deleted just before; the team does not.
+    // An organiser can still download a recently deleted archive; its team cannot.
     let archive = format!("{first}/archive");
     site.get(&archive, own).await.problem(410, "removed", &[]);
     for path in [archive, format!("{second}/archive")] {
@@ -337,11 +337,11 @@ async fn an_organiser_deletes_with_a_reason_and_evidence_is_deleted_by_nobody() 
 }
 
 #[tokio::test]
-async fn storage_is_told_to_the_team_and_of_all_teams_to_the_organiser() {
+async fn storage_is_shown_to_its_team_and_organisers() {
     let site = Site::start().await;
     let (team, other) = (site.team("Alpha").await, site.team("Beta").await);
     let submission = site.valid_submission(&team, "a").await;
-    play(&site, &team, &submission, [0.5; 3]).await;
+    run_day(&site, &team, &submission, [0.5; 3]).await;
     let path = format!("/api/v1/teams/{}/storage", team.id);
     let own = site.get(&path, Some(&team.token)).await.json(200);
     assert_eq!(own["team_name"], "Alpha");
@@ -362,7 +362,7 @@ async fn storage_is_told_to_the_team_and_of_all_teams_to_the_organiser() {
     assert_eq!(all[0]["dataset_bytes"], 23);
     assert_eq!(all[0]["proposal_bytes"], 0);
     assert_eq!(all[1]["archives"], 0);
-    // The stage's own quota is what counts.
+    // The quota of the stage applies.
     change(&site, json!({ "uploads": { "stored_bytes": 5 } }))
         .await
         .json(200);

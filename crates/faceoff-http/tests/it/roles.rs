@@ -1,28 +1,28 @@
-//! Every route for every role: who may, who may not, and for whom there is nothing to see.
+//! Access control: every route of the API with every role.
 
 use crate::{
-    site::{ADMIN, Answer, GZIP, Site, TestTeam, text},
-    tournament::slot::{self, Went},
+    site::{ADMIN, Answer, GZIP, Site, TestTeam, string},
+    tournament::fake_slot::{self, GameOutcome},
 };
 use reqwest::Method;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 
-/// Who calls, in the order of the table's columns.
+/// The roles, in the order of the table's columns.
 const ROLES: [&str; 7] = [
     "visitor",
-    "another team's program",
+    "another team's token",
     "another team's member",
-    "the team's program",
-    "its member",
+    "the team's token",
+    "the team's member",
     "an organiser",
     "the host",
 ];
 
-/// What a request answers, as far as its role decides it: `+` it is for them (done, or refused for what it asks), `?`
-/// no token, `-` not with this one, `0` there is nothing for them to see.
+/// The result of a request by role: `+` allowed (done, or refused for its content), `?` a token is required, `-` forbidden,
+/// `0` not found.
 ///
-/// The ids in paths are those of the team, of its member, and of what it uploaded and played.
+/// The ids in paths are those of the team, its member, its submission, its evaluation, and so on.
 const TABLE: &[(&str, &str)] = &[
     ("GET /announcements", "+++++++"),
     ("POST /announcements", "?----++"),
@@ -145,7 +145,7 @@ const TABLE: &[(&str, &str)] = &[
     ("POST /webhooks/{id}/rotate", "?00-+--"),
     ("POST /webhooks/{id}/test", "?00-+++"),
     ("GET /whoami", "?++++++"),
-    // The game of these is one that does not count: the team's, against an agent of no team of the table.
+    // The game of these routes is a test game of the team against the organisers' baseline.
     ("DELETE /games/{id}", "?00++++"),
     ("DELETE /tournaments/{id}/replays", "?----++"),
     ("GET /games/{id}", "000++++"),
@@ -181,7 +181,7 @@ const TABLE: &[(&str, &str)] = &[
     ("POST /tournaments/{id}/withdrawal", "?-+-+--"),
 ];
 
-/// A body that gets past parsing, and does nothing that the next role would trip over.
+/// A body that can be parsed, but changes nothing that affects the requests of the next role.
 fn body(route: &str) -> Value {
     match route {
         "POST /announcements" => json!({ "title": "", "text": "" }),
@@ -224,13 +224,13 @@ fn body(route: &str) -> Value {
             json!({ "team": "Alpha", "as": "withdrawn", "reason": "" })
         }
         "POST /tournaments/{id}/entrants" => json!({ "teams": [] }),
-        "POST /tournaments/{id}/friendly-games" => json!({ "opponent": "Nobody" }),
+        "POST /tournaments/{id}/friendly-games" => json!({ "opponent": "Unknown" }),
         "POST /tournaments/{id}/replays" => json!({ "times": 0 }),
         _ => json!({}),
     }
 }
 
-/// A tournament, and a game in it of the team against an agent of the organisers', which is played.
+/// Plays a test game of the team against the organisers' baseline. Returns the ids of tournament and game.
 async fn played_test_game(site: &Site, team: &TestTeam) -> [String; 2] {
     let host = site.team("Organisers").await;
     let baseline = site.valid_submission(&host, "baseline").await;
@@ -242,26 +242,26 @@ async fn played_test_game(site: &Site, team: &TestTeam) -> [String; 2] {
         .request(Method::PATCH, &path, Some(ADMIN))
         .json(&baseline);
     Answer::of(change.send().await.unwrap()).await.json(200);
-    let ordered = site
+    let created = site
         .post(&format!("{path}/test-games"), Some(&team.token), &json!({}))
         .await
         .json(201);
-    let played = slot::play_next(site, |_, _| Went::goals(1, 0)).await;
+    let played = fake_slot::play_next(site, |_, _| GameOutcome::goals(1, 0)).await;
     assert!(played.is_some());
     let id = path.rsplit('/').next().unwrap().to_owned();
-    [id, text(&ordered["ordered"][0]["id"])]
+    [id, string(&created["ordered"][0]["id"])]
 }
 
-struct Cast {
+struct RoleFixture {
     site: Site,
     /// In the order of [`ROLES`].
     tokens: Vec<Option<String>>,
-    /// What stands in a path's `{id}`, by the word before it.
+    /// The values of `{id}` in paths, by the first part of the path.
     ids: BTreeMap<&'static str, String>,
 }
 
-impl Cast {
-    async fn gather() -> Self {
+impl RoleFixture {
+    async fn create() -> Self {
         let site = Site::start().await;
         let (alpha, beta) = (site.team("Alpha").await, site.team("Beta").await);
         let mut invited = Vec::new();
@@ -276,7 +276,7 @@ impl Cast {
             ),
             ("Grace", json!({ "role": "organiser", "note": "Grace" })),
             (
-                "nobody yet",
+                "not joined",
                 json!({ "role": "member", "team": alpha.id, "note": "Carl" }),
             ),
         ] {
@@ -284,8 +284,8 @@ impl Cast {
                 .post("/api/v1/invitations", Some(ADMIN), &role)
                 .await
                 .json(201);
-            if name == "nobody yet" {
-                invited.push(("invitations", text(&made["id"])));
+            if name == "not joined" {
+                invited.push(("invitations", string(&made["id"])));
                 continue;
             }
             let join = json!({ "code": made["code"], "name": name });
@@ -293,18 +293,18 @@ impl Cast {
                 .post("/api/v1/invitations/accept", None, &join)
                 .await
                 .json(201);
-            invited.push((name, text(&joined["secret"])));
+            invited.push((name, string(&joined["secret"])));
             if name == "Ada" {
-                invited.push(("people", text(&joined["person"]["id"])));
+                invited.push(("people", string(&joined["person"]["id"])));
             }
         }
-        let of = |who: &str| {
-            let found = invited.iter().find(|(name, _)| *name == who);
+        let value_of = |key: &str| {
+            let found = invited.iter().find(|(name, _)| *name == key);
             found.unwrap().1.clone()
         };
         let submission = site.valid_submission(&alpha, "a").await;
         let evaluation = site.evaluate(&alpha, &submission).await;
-        site.finish(&crate::site::result([0.5; 3], 10.0)).await;
+        site.finish_evaluation(&crate::site::result([0.5; 3], 10.0)).await;
         let game = played_test_game(&site, &alpha).await;
         let question = site
             .post(
@@ -320,9 +320,9 @@ impl Cast {
             .unwrap()
             .iter()
             .find(|token| token["team"] == json!(alpha.id));
-        let hook = json!({ "name": "ours", "url": "https://example.org/faceoff" });
+        let hook = json!({ "name": "test hook", "url": "https://example.org/faceoff" });
         let hook = site
-            .post("/api/v1/webhooks", Some(&of("Ada")), &hook)
+            .post("/api/v1/webhooks", Some(&value_of("Ada")), &hook)
             .await
             .json(201);
         let last = |path: &str| path.rsplit('/').next().unwrap().to_owned();
@@ -331,26 +331,26 @@ impl Cast {
             ("submissions", last(&submission)),
             ("teams", alpha.id.clone()),
             ("stages", site.stage().await.to_string()),
-            ("questions", text(&question["id"])),
-            ("tokens", text(&own.unwrap()["id"])),
-            ("people", of("people")),
-            ("invitations", of("invitations")),
+            ("questions", string(&question["id"])),
+            ("tokens", string(&own.unwrap()["id"])),
+            ("people", value_of("people")),
+            ("invitations", value_of("invitations")),
             (
                 "registrations",
                 "00000000-0000-7000-8000-000000000000".into(),
             ),
             ("proposals", "00000000-0000-7000-8000-000000000000".into()),
-            ("webhooks", text(&hook["id"])),
+            ("webhooks", string(&hook["id"])),
             ("tournaments", game[0].clone()),
             ("games", game[1].clone()),
         ]);
         let tokens = vec![
             None,
             Some(beta.token),
-            Some(of("Bob")),
+            Some(value_of("Bob")),
             Some(alpha.token),
-            Some(of("Ada")),
-            Some(of("Grace")),
+            Some(value_of("Ada")),
+            Some(value_of("Grace")),
             Some(ADMIN.to_owned()),
         ];
         Self { site, tokens, ids }
@@ -367,7 +367,7 @@ impl Cast {
             .replace("{task}", "hit")
             .replace("{day}", "2020-01-01")
             .replace("{side}", "1")
-            .replace("{name}", "nobody")
+            .replace("{name}", "unknown")
             .replace("{episode}", "0")
             .replace("{profile}", "ideal")
             .replace("{chunk}", "0")
@@ -389,7 +389,7 @@ impl Cast {
         };
         let response = request.send().await.unwrap();
         if route == "GET /events/stream" {
-            // It has no end.
+            // The stream has no end, so the body is not read.
             let (status, headers) = (response.status(), response.headers().clone());
             let body = String::new();
             return Answer {
@@ -402,13 +402,13 @@ impl Cast {
     }
 }
 
-fn seen(route: &str, answer: &Answer) -> char {
+fn access(route: &str, answer: &Answer) -> char {
     let problem: Value = serde_json::from_str(&answer.body).unwrap_or_default();
     match (answer.status.as_u16(), problem["type"].as_str()) {
         (401, Some("/problems#unauthenticated")) => '?',
         (403, Some("/problems#forbidden")) => '-',
         (404, Some("/problems#not-found")) => '0',
-        // The dataset of this test is none that could be read; whoever gets so far may read it.
+        // The dataset of this test cannot be read: a caller that gets this error has access.
         (500, _) if route.ends_with("/violations") => '+',
         (500.., _) => panic!("{route}: {answer:?}"),
         _ => '+',
@@ -416,7 +416,7 @@ fn seen(route: &str, answer: &Answer) -> char {
 }
 
 #[tokio::test]
-async fn every_route_answers_each_role_as_the_table_says() {
+async fn access_to_routes_follows_the_table() {
     let site = Site::start().await;
     let document = site.get("/api/v1/openapi.json", None).await.json(200);
     let mut routes: Vec<String> = Vec::new();
@@ -427,58 +427,58 @@ async fn every_route_answers_each_role_as_the_table_says() {
         }
     }
     routes.sort();
-    let mut told: Vec<&str> = TABLE.iter().map(|(route, _)| *route).collect();
-    told.sort_unstable();
-    assert_eq!(routes, told, "the table has a row for every route");
+    let mut listed: Vec<&str> = TABLE.iter().map(|(route, _)| *route).collect();
+    listed.sort_unstable();
+    assert_eq!(routes, listed, "the table has a row for every route");
 
     let mut wrong = Vec::new();
-    // Reading changes nothing: all such routes ask the same people, for whom much has to be done.
-    let mut unchanged: Option<Cast> = None;
+    // Reading changes nothing, so all such routes share one fixture, which is slow to create.
+    let mut unchanged: Option<RoleFixture> = None;
     for (route, expected) in TABLE {
-        // Who signs out, rotates or revokes is somebody else afterwards.
-        let is_drastic = ["DELETE", "rotate", "/token", "accept", "withdraw", "retire"]
+        // After signing out, rotating or revoking, the next role needs a new fixture.
+        let is_destructive = ["DELETE", "rotate", "/token", "accept", "withdraw", "retire"]
             .iter()
             .any(|word| route.contains(word));
         let only_reads = route.starts_with("GET ");
-        let mut cast = match unchanged.take() {
-            Some(cast) if only_reads => cast,
+        let mut fixture = match unchanged.take() {
+            Some(fixture) if only_reads => fixture,
             other => {
                 unchanged = other;
-                Cast::gather().await
+                RoleFixture::create().await
             }
         };
         for (role, expected) in expected.chars().enumerate() {
-            if is_drastic && role > 0 {
-                cast = Cast::gather().await;
+            if is_destructive && role > 0 {
+                fixture = RoleFixture::create().await;
             }
-            let answer = cast.ask(route, role).await;
-            let mut seen = seen(route, &answer);
-            // There is none of these; who may ask learns so.
-            if seen == '0' && expected == '+' && answer.body.contains("there is no such") {
-                let whole = [
+            let answer = fixture.ask(route, role).await;
+            let mut access = access(route, &answer);
+            // The fixture has none of these resources; a caller with access gets 404.
+            if access == '0' && expected == '+' && answer.body.contains("there is no such") {
+                let missing_resources = [
                     "registrations",
                     "proposals/",
                     "POST /days",
                     "days/{day}/void",
                     "/ablation",
                 ];
-                if whole.iter().any(|part| route.contains(part)) {
-                    seen = '+';
+                if missing_resources.iter().any(|part| route.contains(part)) {
+                    access = '+';
                 }
             }
-            // Sign-in refuses what it does not know as everybody's.
-            if seen == '?' && *route == "POST /sessions" {
-                seen = '+';
+            // Sign-in is allowed for all, and answers 401 to a wrong password.
+            if access == '?' && *route == "POST /sessions" {
+                access = '+';
             }
-            if seen != expected {
+            if access != expected {
                 wrong.push(format!(
-                    "{route} for {}: expected {expected}, got {seen}: {} {}",
+                    "{route} for {}: expected {expected}, got {access}: {} {}",
                     ROLES[role], answer.status, answer.body
                 ));
             }
         }
         if only_reads {
-            unchanged = Some(cast);
+            unchanged = Some(fixture);
         }
     }
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));

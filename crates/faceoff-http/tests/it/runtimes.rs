@@ -1,8 +1,8 @@
-//! What agents find on a server, and stages that take agents of some runtimes only.
+//! Runtimes: the environment of agents on this server, and stages that accept some runtimes only.
 
-use crate::site::{ADMIN, Answer, GZIP, Site, TestTeam, result, text};
-use faceoff_store::Work;
-use faceoff_types::SmokeOutcome;
+use crate::site::{ADMIN, Answer, GZIP, Site, TestTeam, result, string};
+use faceoff_store::Job;
+use faceoff_types::ValidationOutcome;
 use reqwest::Method;
 use serde_json::{Value, json};
 
@@ -12,90 +12,90 @@ async fn change(site: &Site, body: Value) -> Answer {
     Answer::of(request.json(&body).send().await.unwrap()).await
 }
 
-/// Has the first stage take these only; null: all.
-async fn takes(site: &Site, runtimes: Value) -> Value {
+/// Limits the first stage to these runtimes; null allows all.
+async fn set_runtimes(site: &Site, runtimes: Value) -> Value {
     let body = json!({ "runtimes": runtimes, "confirm": "Qualifying" });
     change(site, body).await.json(200)
 }
 
-/// A submission that was found valid, of an agent of this runtime; its path in the API.
-async fn valid(site: &Site, team: &TestTeam, runtime: &str) -> String {
+/// Uploads a submission that is valid and uses this runtime. Returns its path in the API.
+async fn valid_submission(site: &Site, team: &TestTeam, runtime: &str) -> String {
     let uploaded = site.upload(&team.token, GZIP.to_vec()).await.json(201);
-    site.smoke(SmokeOutcome::Valid {
+    site.finish_validation(ValidationOutcome::Valid {
         agent_name: "a".into(),
         runtime: runtime.into(),
         timing: Vec::new(),
         log: String::new(),
     })
     .await;
-    format!("/api/v1/submissions/{}", text(&uploaded["id"]))
+    format!("/api/v1/submissions/{}", string(&uploaded["id"]))
 }
 
 #[tokio::test]
-async fn runtimes_are_rules_which_the_smoke_run_of_an_upload_is_told() {
+async fn runtimes_of_open_stages_are_sent_to_validation_runs() {
     let site = Site::start().await;
     let team = site.team("Alpha").await;
-    let told = async || {
+    let sent_runtimes = async || {
         site.upload(&team.token, GZIP.to_vec()).await.json(201);
-        let Work::Smoke { runtimes, .. } = site.claim().await.work else {
-            panic!("expected a smoke run");
+        let Job::Validation { runtimes, .. } = site.claim().await.job else {
+            panic!("expected a validation run");
         };
-        let told = runtimes
+        let texts = runtimes
             .iter()
             .map(|one| format!("{}: {}", one.stage, one.runtimes));
-        told.collect::<Vec<_>>()
+        texts.collect::<Vec<_>>()
     };
-    assert_eq!(told().await, [""; 0]);
+    assert_eq!(sent_runtimes().await, [""; 0]);
     change(&site, json!({ "runtimes": ["python3"] }))
         .await
         .problem(409, "not-confirmed", &["revision 2"]);
-    let changed = takes(&site, json!(["python3", "native", "python3"])).await;
+    let changed = set_runtimes(&site, json!(["python3", "native", "python3"])).await;
     assert_eq!(changed["runtimes"], json!(["native", "python3"]));
     assert_eq!(changed["revision"], 2);
     assert_eq!(changed["revisions"][0].get("runtimes"), None);
-    assert_eq!(told().await, ["Qualifying: native or python3"]);
+    assert_eq!(sent_runtimes().await, ["Qualifying: native or python3"]);
     let page = site.get("/season", None).await.body;
-    assert!(page.contains("agents of the runtime native or python3 only"));
+    assert!(page.contains("only agents with the runtime native or python3"));
 
-    // A stage is made like the one that is open, unless it says otherwise; one that opens later counts for nothing yet.
-    let make = async |body: Value| {
+    // A new stage copies the settings of the open one, unless it sets others. A stage that is not open yet has no effect.
+    let create_stage = async |body: Value| {
         site.post("/api/v1/stages", Some(ADMIN), &body)
             .await
             .json(201)
     };
     let later = json!({ "name": "Late", "opens_at": "2026-05-01T00:00:00Z", "runtimes": null });
-    assert_eq!(make(later).await.get("runtimes"), None);
-    let like = json!({ "name": "Like", "opens_at": "2026-05-01T00:00:00Z" });
-    assert_eq!(make(like).await["runtimes"], changed["runtimes"]);
-    assert_eq!(told().await.len(), 1);
-    let beside = json!({ "name": "Beside", "runtimes": ["native"] });
-    make(beside).await;
-    assert_eq!(told().await.len(), 2, "either may take it");
-    make(json!({ "name": "Open", "runtimes": null })).await;
-    assert_eq!(told().await, [""; 0], "one of the open ones takes all");
+    assert_eq!(create_stage(later).await.get("runtimes"), None);
+    let copied = json!({ "name": "Like", "opens_at": "2026-05-01T00:00:00Z" });
+    assert_eq!(create_stage(copied).await["runtimes"], changed["runtimes"]);
+    assert_eq!(sent_runtimes().await.len(), 1);
+    let second_open = json!({ "name": "Beside", "runtimes": ["native"] });
+    create_stage(second_open).await;
+    assert_eq!(sent_runtimes().await.len(), 2, "one of the two stages may accept it");
+    create_stage(json!({ "name": "Open", "runtimes": null })).await;
+    assert_eq!(sent_runtimes().await, [""; 0], "one of the open stages accepts all runtimes");
 
-    let all = takes(&site, Value::Null).await;
+    let all = set_runtimes(&site, Value::Null).await;
     assert_eq!((all.get("runtimes"), &all["revision"]), (None, &json!(3)));
 }
 
 #[tokio::test]
-async fn what_a_stage_does_not_take_is_not_played_there_and_says_why() {
+async fn excluded_runtime_is_not_evaluated_and_says_why() {
     let site = Site::start().await;
     let (alpha, beta) = (site.team("Alpha").await, site.team("Beta").await);
     site.team("Gamma").await;
-    let native = valid(&site, &alpha, "native").await;
-    valid(&site, &beta, "python3").await;
+    let native = valid_submission(&site, &alpha, "native").await;
+    valid_submission(&site, &beta, "python3").await;
     let stage = site.stage().await;
-    let seen = site.get(&native, Some(&alpha.token)).await.json(200);
+    let view = site.get(&native, Some(&alpha.token)).await.json(200);
     assert_eq!(
-        (&seen["runtime"], seen.get("not_taken")),
+        (&view["runtime"], view.get("not_taken")),
         (&json!("native"), None)
     );
-    takes(&site, json!(["python3"])).await;
+    set_runtimes(&site, json!(["python3"])).await;
     let why = "the stage “Qualifying” takes agents of the runtime python3 only, and this one names native in agent.toml";
     let not_taken = json!([{ "stage": stage, "stage_name": "Qualifying", "reason": why }]);
 
-    // It may be active: the stage may take it again, or another.
+    // It may stay active: this stage may accept it later, or another stage does.
     let activate = format!("{native}/activate");
     let active = site
         .post(&activate, Some(&alpha.token), &json!({}))
@@ -105,17 +105,17 @@ async fn what_a_stage_does_not_take_is_not_played_there_and_says_why() {
         (&active["active"], &active["not_taken"]),
         (&json!(true), &not_taken)
     );
-    assert!(text(&active["next"]).contains(why), "{active}");
+    assert!(string(&active["next"]).contains(why), "{active}");
     let me = site.get("/api/v1/me", Some(&alpha.token)).await.json(200);
     assert_eq!(me["not_taken"], not_taken);
     let me = site.get("/api/v1/me", Some(&beta.token)).await.json(200);
     assert_eq!(me.get("not_taken"), None);
 
-    // The trial of what is active leaves it out; asked for by itself it is refused.
+    // A trial of all active submissions skips it. A trial of this submission alone is refused.
     let trial = format!("/api/v1/stages/{stage}/trial");
     let id = native.rsplit('/').next().unwrap();
-    let wanted = json!({ "reason": "?", "submission": id });
-    site.post(&trial, Some(ADMIN), &wanted)
+    let request = json!({ "reason": "?", "submission": id });
+    site.post(&trial, Some(ADMIN), &request)
         .await
         .problem(409, "conflict", &[why]);
     let tried = site
@@ -123,11 +123,11 @@ async fn what_a_stage_does_not_take_is_not_played_there_and_says_why() {
         .await
         .json(201);
     assert_eq!(tried["evaluations"].as_array().unwrap().len(), 1);
-    let drop = format!("/api/v1/proposals/{}/drop", text(&tried["id"]));
+    let drop = format!("/api/v1/proposals/{}/drop", string(&tried["id"]));
     let confirm = json!({ "confirm": "Qualifying" });
     site.post(&drop, Some(ADMIN), &confirm).await.json(200);
 
-    // The forecast counts whom the stage takes, and so does the cut.
+    // The forecast and the cutoff count accepted submissions only.
     let capacity = format!("/api/v1/stages/{stage}/capacity");
     let capacity = site.get(&capacity, Some(ADMIN)).await.json(200);
     assert_eq!(capacity["days"][0]["teams"], 1);
@@ -139,7 +139,7 @@ async fn what_a_stage_does_not_take_is_not_played_there_and_says_why() {
         list.as_array()
             .unwrap()
             .iter()
-            .map(|one| text(&one[key]))
+            .map(|one| string(&one[key]))
             .collect()
     };
     assert_eq!(names(&day["created"], "team_name"), ["Beta"]);
@@ -156,22 +156,22 @@ async fn what_a_stage_does_not_take_is_not_played_there_and_says_why() {
         json!({ "stage": stage, "day": "2026-03-01", "reason": why })
     );
     let extra = format!("/api/v1/stages/{stage}/days/2026-03-01/extra-turn");
-    let wanted = json!({ "team": alpha.id, "reason": "?" });
-    site.post(&extra, Some(ADMIN), &wanted)
+    let request = json!({ "team": alpha.id, "reason": "?" });
+    site.post(&extra, Some(ADMIN), &request)
         .await
         .problem(409, "conflict", &[why]);
-    site.finish(&result([0.5; 3], 10.0)).await;
+    site.finish_evaluation(&result([0.5; 3], 10.0)).await;
     let me = site.get("/api/v1/me", Some(&alpha.token)).await.json(200);
-    assert_eq!(me["turn"]["evaluation"], Value::Null, "no turn was taken");
+    assert_eq!(me["turn"]["evaluation"], Value::Null, "no evaluation was created");
 
-    // By rules that take none of the day's agents nothing is evaluated again.
-    takes(&site, json!(["native"])).await;
+    // Rules that accept none of the day's agents allow no re-evaluation.
+    set_runtimes(&site, json!(["native"])).await;
     let again = format!("/api/v1/stages/{stage}/proposals");
-    let wanted = json!({ "day": "2026-03-01", "new_rules": true, "reason": "?" });
-    site.post(&again, Some(ADMIN), &wanted).await.problem(
+    let request = json!({ "day": "2026-03-01", "new_rules": true, "reason": "?" });
+    site.post(&again, Some(ADMIN), &request).await.problem(
         409,
         "conflict",
-        &["agents that these do not take"],
+        &["not accepted by these rules"],
     );
     site.next_day();
     let day = site
@@ -182,24 +182,24 @@ async fn what_a_stage_does_not_take_is_not_played_there_and_says_why() {
 }
 
 #[tokio::test]
-async fn a_day_that_nobody_could_play_keeps_its_cut() {
+async fn day_without_accepted_submission_can_still_be_started() {
     let site = Site::start().await;
     let team = site.team("Alpha").await;
-    valid(&site, &team, "native").await;
-    takes(&site, json!(["python3"])).await;
-    for _ in ["nothing is done", "so it is the same again"] {
+    valid_submission(&site, &team, "native").await;
+    set_runtimes(&site, json!(["python3"])).await;
+    for _ in ["first attempt", "second attempt"] {
         site.post("/api/v1/days", Some(ADMIN), &json!({}))
             .await
             .problem(
                 409,
                 "conflict",
-                &["that the stage takes", "still has its cut"],
+                &["that the stage accepts", "its cutoff is still available"],
             );
     }
     let logged = "/api/v1/events?kind=submission_not_taken";
     let logged = site.get(logged, Some(ADMIN)).await.json(200);
     assert_eq!(logged["events"], json!([]));
-    takes(&site, json!(null)).await;
+    set_runtimes(&site, json!(null)).await;
     let day = site
         .post("/api/v1/days", Some(ADMIN), &json!({}))
         .await
@@ -208,7 +208,7 @@ async fn a_day_that_nobody_could_play_keeps_its_cut() {
 }
 
 #[tokio::test]
-async fn wrong_runtimes_are_refused_by_name() {
+async fn invalid_runtimes_are_refused_by_name() {
     let site = Site::start().await;
     let before = site.get("/api/v1/stages", None).await.json(200);
     for (runtimes, words) in [
@@ -238,49 +238,49 @@ async fn wrong_runtimes_are_refused_by_name() {
 }
 
 #[tokio::test]
-async fn everybody_may_know_what_agents_find_here() {
+async fn agent_environment_is_public() {
     let site = Site::start().await;
-    let told = site.get("/api/v1/runtimes", None).await.json(200);
-    assert_eq!(told["gpu"], "none");
-    assert_eq!(told["network"], "none");
+    let view = site.get("/api/v1/runtimes", None).await.json(200);
+    assert_eq!(view["gpu"], "none");
+    assert_eq!(view["network"], "none");
     assert_eq!(
-        told["machine"],
+        view["machine"],
         json!({ "architecture": "x86_64", "cpu_model": "A CPU", "cpus_per_agent": 1 })
     );
     assert_eq!(
-        told["runtimes"][0],
+        view["runtimes"][0],
         json!({ "name": "native", "kind": "native", "libc": null })
     );
-    assert_eq!(told["runtimes"][1]["version"], "3.11.2");
-    assert_eq!(told["runtimes"][1]["packages"]["numpy"], "2.4.6");
-    assert_eq!(told["runtimes"][2]["kind"], "broken");
-    assert!(!told.to_string().contains("secret"), "{told}");
-    assert_eq!(told["limits"]["resources"]["memory_bytes"], 2_u64 << 30);
-    assert_eq!(told["stages"][0]["limits"], told["limits"]);
+    assert_eq!(view["runtimes"][1]["version"], "3.11.2");
+    assert_eq!(view["runtimes"][1]["packages"]["numpy"], "2.4.6");
+    assert_eq!(view["runtimes"][2]["kind"], "broken");
+    assert!(!view.to_string().contains("secret"), "{view}");
+    assert_eq!(view["limits"]["resources"]["memory_bytes"], 2_u64 << 30);
+    assert_eq!(view["stages"][0]["limits"], view["limits"]);
     assert_eq!(
-        told["stages"][0]["runtimes"],
+        view["stages"][0]["runtimes"],
         json!(["native", "python3", "wrong"])
     );
 
-    // A stage has limits and runtimes of its own, and so has a tournament.
-    let own = json!({
+    // Stages and tournaments have limits and runtimes of their own.
+    let settings = json!({
         "runtimes": ["python3"], "limits": { "memory_bytes": 536_870_912, "step_s": 0.25 },
         "confirm": "Qualifying",
     });
-    change(&site, own).await.json(200);
+    change(&site, settings).await.json(200);
     site.team("Alpha").await;
     let rules = json!({ "runtimes": ["native"], "limits": { "pids": 16 } });
     let cup = json!({ "name": "Cup", "teams": ["Alpha"], "rules": rules });
     site.post("/api/v1/tournaments", Some(ADMIN), &cup)
         .await
         .json(201);
-    let told = site.get("/api/v1/runtimes", None).await.json(200);
-    let (stage, cup) = (&told["stages"][0], &told["tournaments"][0]);
+    let view = site.get("/api/v1/runtimes", None).await.json(200);
+    let (stage, cup) = (&view["stages"][0], &view["tournaments"][0]);
     assert_eq!(stage["runtimes"], json!(["python3"]));
     assert_eq!(stage["limits"]["resources"]["memory_bytes"], 536_870_912);
     assert_eq!(stage["limits"]["time"]["step_s"], 0.25);
     assert_eq!(stage["limits"]["time"]["reset_s"], 10.0);
-    assert_eq!(told["limits"]["time"]["step_s"], 1.0);
+    assert_eq!(view["limits"]["time"]["step_s"], 1.0);
     assert_eq!(cup["runtimes"], json!(["native"]));
     assert_eq!(cup["limits"]["resources"]["pids"], 16);
     assert_eq!(cup["game_limits"]["in_time_s"], 0.02);
@@ -307,11 +307,11 @@ async fn everybody_may_know_what_agents_find_here() {
 }
 
 #[tokio::test]
-async fn a_stage_that_is_over_offers_nothing() {
+async fn closed_stage_lists_no_runtimes() {
     let site = Site::start().await;
     let stages = async || {
-        let told = site.get("/api/v1/runtimes", None).await.json(200);
-        told["stages"].as_array().unwrap().len()
+        let view = site.get("/api/v1/runtimes", None).await.json(200);
+        view["stages"].as_array().unwrap().len()
     };
     assert_eq!(stages().await, 1);
     let over = json!({ "closes_at": "2026-03-01T23:00:00Z" });

@@ -1,10 +1,12 @@
-use crate::site::{ADMIN, GZIP, Site, result, text};
+//! The season: closing it, and the page to verify its seeds.
+
+use crate::site::{ADMIN, GZIP, Site, result, string};
 use serde_json::{Value, json};
 
 const CLOSE: &str = "/api/v1/season/close";
 
 #[tokio::test]
-async fn closing_the_season_reveals_the_secret_and_ends_it_for_good() {
+async fn closing_the_season_reveals_its_secret() {
     let site = Site::start().await;
     let team = site.team("Alpha").await;
     let submission = site.valid_submission(&team, "a").await;
@@ -25,53 +27,53 @@ async fn closing_the_season_reveals_the_secret_and_ends_it_for_good() {
         "conflict",
         &["1 evaluations", "cancel"],
     );
-    site.finish(&result([0.5, 0.6, 0.7], 100.0)).await;
+    site.finish_evaluation(&result([0.5, 0.6, 0.7], 100.0)).await;
 
     let closed = site.post(CLOSE, Some(ADMIN), &confirm).await.json(200);
     let season = site.get("/api/v1/season", Some(ADMIN)).await.json(200);
     assert_eq!(closed, season);
     assert_eq!(season["closed_at"], "2026-03-01T10:00:00Z");
-    // The secret is the one that was committed to, and everything follows from it as documented.
-    let secret: [u8; 32] = hex::decode(text(&season["secret"]))
+    // The secret matches the commitment, and all seeds are derived from it as documented.
+    let secret: [u8; 32] = hex::decode(string(&season["secret"]))
         .unwrap()
         .try_into()
         .unwrap();
     assert_eq!(
         blake3::hash(&secret).to_hex().as_str(),
-        text(&open["commitment"])
+        string(&open["commitment"])
     );
     let child = |parent: &[u8; 32], label: &str, data: &[u8]| {
         let message = [label.as_bytes(), &[0], data].concat();
         blake3::keyed_hash(parent, &message)
     };
     let stage = site.stage().await;
-    let of_stage = child(&secret, "stage", stage.as_uuid().as_bytes());
-    let of_day = child(of_stage.as_bytes(), "day", b"2026-03-01");
+    let stage_seed = child(&secret, "stage", stage.as_uuid().as_bytes());
+    let day_seed = child(stage_seed.as_bytes(), "day", b"2026-03-01");
     assert_eq!(season["days"][0]["day"], "2026-03-01");
     assert_eq!(season["days"][0]["finished"], 1);
     assert_eq!(season["days"][0]["cut_at"], "2026-03-01T10:00:00Z");
     assert_eq!(season["days"][0]["released_at"], "2026-03-01T10:00:00Z");
     assert_eq!(season["next_cut"], json!(null));
-    assert_eq!(season["days"][0]["seed"], of_day.to_hex().as_str());
+    assert_eq!(season["days"][0]["seed"], day_seed.to_hex().as_str());
     let mismatch = child(&secret, "model_mismatch", b"");
     assert_eq!(season["mismatch_seed"], mismatch.to_hex().as_str());
 
-    let over = ["2026-03-01 at 10:00 UTC"];
+    let closed_words = ["2026-03-01 at 10:00 UTC"];
     site.post(CLOSE, Some(ADMIN), &confirm)
         .await
-        .problem(409, "season-closed", &over);
+        .problem(409, "season-closed", &closed_words);
     site.upload(&team.token, GZIP.to_vec())
         .await
-        .problem(409, "season-closed", &over);
+        .problem(409, "season-closed", &closed_words);
     site.post("/api/v1/days", Some(ADMIN), &json!({}))
         .await
-        .problem(409, "season-closed", &over);
+        .problem(409, "season-closed", &closed_words);
     site.next_day();
     let choice = format!("{submission}/activate");
     site.post(&choice, Some(&team.token), &json!({}))
         .await
-        .problem(409, "season-closed", &over);
-    // What was reached stays.
+        .problem(409, "season-closed", &closed_words);
+    // Results and datasets stay available.
     assert_eq!(
         site.get(&format!("{path}/dataset"), Some(&team.token))
             .await
@@ -83,40 +85,40 @@ async fn closing_the_season_reveals_the_secret_and_ends_it_for_good() {
 }
 
 #[tokio::test]
-async fn the_seasons_page_tells_a_sceptic_how_to_check() {
+async fn season_page_explains_how_to_verify_seeds() {
     let site = Site::start().await;
     let (early, late) = (site.team("Early").await, site.team("Late").await);
     let submission = site.valid_submission(&early, "e").await;
     site.valid_submission(&late, "l").await;
     site.evaluate(&early, &submission).await;
-    site.finish(&result([0.5, 0.6, 0.7], 100.0)).await;
+    site.finish_evaluation(&result([0.5, 0.6, 0.7], 100.0)).await;
     let season: Value = site.get("/api/v1/season", None).await.json(200);
-    let commitment = text(&season["commitment"]);
-    let page = |body: &str| {
+    let commitment = string(&season["commitment"]);
+    let check_html = |body: &str| {
         let html = scraper::Html::parse_document(body);
         assert!(html.errors.is_empty(), "{:?}\n{body}", html.errors);
     };
     let open = site.get("/season", None).await;
     assert_eq!(open.status, 200);
-    page(&open.body);
+    check_html(&open.body);
     let verify = format!(
         "faceoff verify DATASET --secret SECRET --stage STAGE --day DAY --commitment {commitment}"
     );
     for part in [
         "Test season",
         "not yet",
-        "held back",
+        "published at release",
         "model_mismatch",
         &verify,
     ] {
         assert!(open.body.contains(part), "{part:?} is not in {}", open.body);
     }
-    site.finish(&result([0.5, 0.6, 0.7], 100.0)).await;
+    site.finish_evaluation(&result([0.5, 0.6, 0.7], 100.0)).await;
     site.post(CLOSE, Some(ADMIN), &json!({ "confirm": "Test season" }))
         .await
         .json(200);
     let closed = site.get("/season", None).await;
-    page(&closed.body);
+    check_html(&closed.body);
     let secret = site.store.season().await.unwrap().secret;
     let day = secret
         .stage(site.stage().await)

@@ -1,11 +1,11 @@
-//! Nobody learns a day's seed while it could help: the one rule, over HTTP.
+//! A day's seed stays secret until its release.
 
 use crate::site::{ADMIN, Site, TestTeam, result};
 use reqwest::Method;
 use serde_json::{Value, json};
 
-/// Everything that a visitor or the team itself can read.
-async fn shown(site: &Site, team: &TestTeam, evaluation: &str) -> String {
+/// Everything that a visitor, the team or the organiser can read.
+async fn visible_text(site: &Site, team: &TestTeam, evaluation: &str) -> String {
     let mut all = String::new();
     let public = [
         "/",
@@ -28,9 +28,9 @@ async fn shown(site: &Site, team: &TestTeam, evaluation: &str) -> String {
     all
 }
 
-/// Asks for a dataset in every way; the statuses.
-async fn asked_for(site: &Site, dataset: &str, token: &str) -> [u16; 3] {
-    let ask = async |method: Method, range: bool| {
+/// Requests a dataset by HEAD, GET and a range. Returns the statuses.
+async fn dataset_statuses(site: &Site, dataset: &str, token: &str) -> [u16; 3] {
+    let request_status = async |method: Method, range: bool| {
         let mut request = site.request(method, dataset, Some(token));
         if range {
             request = request.header("range", "bytes=0-0");
@@ -38,14 +38,14 @@ async fn asked_for(site: &Site, dataset: &str, token: &str) -> [u16; 3] {
         request.send().await.unwrap().status().as_u16()
     };
     [
-        ask(Method::HEAD, false).await,
-        ask(Method::GET, false).await,
-        ask(Method::GET, true).await,
+        request_status(Method::HEAD, false).await,
+        request_status(Method::GET, false).await,
+        request_status(Method::GET, true).await,
     ]
 }
 
 #[tokio::test]
-async fn a_team_that_finishes_early_learns_nothing_of_the_episodes_while_others_play() {
+async fn seed_and_dataset_stay_secret_until_the_day_ends() {
     let site = Site::start().await;
     let teams = [site.team("First").await, site.team("Second").await];
     let submissions = [
@@ -60,7 +60,7 @@ async fn a_team_that_finishes_early_learns_nothing_of_the_episodes_while_others_
     let seed = secret.stage(site.stage().await).day(today);
     let mut score = result([0.5, 0.6, 0.7], 100.0);
     score.seed = seed;
-    site.finish(&score).await;
+    site.finish_evaluation(&score).await;
     let dataset = format!("{early}/dataset");
 
     // The other team's evaluation is queued, then running.
@@ -71,36 +71,36 @@ async fn a_team_that_finishes_early_learns_nothing_of_the_episodes_while_others_
             let problem = refused.problem(409, "not-yet", &["1 evaluations of 2026-03-01"]);
             assert_eq!(problem["under_way"], 1);
             assert_eq!(refused.header("retry-after"), "30");
-            assert_eq!(asked_for(&site, &dataset, token).await, [409; 3]);
+            assert_eq!(dataset_statuses(&site, &dataset, token).await, [409; 3]);
         }
-        let shown = shown(&site, first, &early).await;
+        let visible_text = visible_text(&site, first, &early).await;
         for part in [
             seed.to_string().as_str(),
             "computation_time_s",
             "violations\"",
             "host_noise_reruns",
         ] {
-            assert!(!shown.contains(part), "{part}");
+            assert!(!visible_text.contains(part), "{part}");
         }
         let after = site.store.events_after(0, 1000).await.unwrap();
         assert_eq!(after, events, "asking changes nothing");
         let (claim, ..) = site.claim_shard().await;
         site.store.release(&claim, site.now()).await.unwrap();
     }
-    site.finish(&score).await;
-    // Released by its end, not by a request.
+    site.finish_evaluation(&score).await;
+    // The day is released by the end of its last evaluation, not by a request.
     let finished = site.get(&early, Some(&first.token)).await.json(200);
     assert_eq!(finished["result"]["seed"], seed.to_string());
     let board = site.get("/api/v1/board", None).await.json(200);
     assert_eq!(board["rows"][0]["seed"], seed.to_string());
     assert_eq!(
-        asked_for(&site, &dataset, &first.token).await,
+        dataset_statuses(&site, &dataset, &first.token).await,
         [200, 200, 206]
     );
     let compare = format!("{early}/compare/{}", other.rsplit('/').next().unwrap());
     assert_eq!(site.get(&compare, None).await.status, 200);
 
-    // What is uploaded now could know the episodes: it plays the next day, with other seeds.
+    // A later upload could use the known episodes, so it is evaluated on the next day, with other seeds.
     let late = site.team("Late").await;
     let submission = site.valid_submission(&late, "l").await;
     site.post("/api/v1/days", Some(ADMIN), &json!({}))
@@ -112,16 +112,16 @@ async fn a_team_that_finishes_early_learns_nothing_of_the_episodes_while_others_
         .stage(site.stage().await)
         .day(today.tomorrow().unwrap())
         .to_string();
-    assert!(!shown(&site, first, &early).await.contains(&tomorrow));
-    // Yesterday's dataset stays free while today's evaluations run.
+    assert!(!visible_text(&site, first, &early).await.contains(&tomorrow));
+    // Yesterday's dataset stays available while today's evaluations run.
     assert_eq!(
-        asked_for(&site, &dataset, &first.token).await,
+        dataset_statuses(&site, &dataset, &first.token).await,
         [200, 200, 206]
     );
 }
 
 #[tokio::test]
-async fn faults_log_and_comparison_come_out_with_the_day() {
+async fn faults_log_and_comparison_appear_with_the_release() {
     let site = Site::start().await;
     let mut paths = Vec::new();
     let teams = [
@@ -139,8 +139,8 @@ async fn faults_log_and_comparison_come_out_with_the_day() {
     let [failing, early, late] = &paths[..] else {
         panic!("three evaluations")
     };
-    site.play_shards(2).await;
-    site.finish(&result([0.5, 0.6, 0.7], 100.0)).await;
+    site.run_shards(2).await;
+    site.finish_evaluation(&result([0.5, 0.6, 0.7], 100.0)).await;
     let compare = format!("{early}/compare/{}", late.rsplit('/').next().unwrap());
     for token in [&*teams[0].token, ADMIN] {
         let failed = site.get(failing, Some(token)).await;
@@ -150,7 +150,7 @@ async fn faults_log_and_comparison_come_out_with_the_day() {
         assert_eq!(failed["released_at"], json!(null));
         assert!(failed.get("faults").is_none() && failed.get("log").is_none());
     }
-    site.finish(&result([0.1, 0.1, 0.1], 0.0)).await;
+    site.finish_evaluation(&result([0.1, 0.1, 0.1], 0.0)).await;
     let failed = site.get(failing, Some(&teams[0].token)).await.json(200);
     assert_eq!(failed["faults"][0]["line"], "{\"type\":\"act\"}");
     assert!(failed["log"].as_str().unwrap().contains("log of hit"));
@@ -158,7 +158,7 @@ async fn faults_log_and_comparison_come_out_with_the_day() {
 }
 
 #[tokio::test]
-async fn two_that_are_finished_are_not_compared_while_a_third_plays() {
+async fn comparison_is_refused_while_the_day_is_open() {
     let site = Site::start().await;
     let mut paths = Vec::new();
     let teams = [
@@ -174,7 +174,7 @@ async fn two_that_are_finished_are_not_compared_while_a_third_plays() {
         paths.push(site.evaluate(team, submission).await);
     }
     for _ in 0..2 {
-        site.finish(&result([0.5, 0.6, 0.7], 100.0)).await;
+        site.finish_evaluation(&result([0.5, 0.6, 0.7], 100.0)).await;
     }
     let compare = format!(
         "{}/compare/{}",
@@ -186,7 +186,7 @@ async fn two_that_are_finished_are_not_compared_while_a_third_plays() {
         .problem(409, "not-yet", &["1 evaluations of 2026-03-01"]);
     let page = site.get(&paths[0].replace("/api/v1", ""), None).await;
     assert!(!page.body.contains("/compare/"), "{}", page.body);
-    // The organiser gives up on the third: that is the end of the day.
+    // The organiser cancels the last evaluation, which ends the day.
     let cancel = format!("{}/cancel", paths[2]);
     let reason = json!({ "reason": "it hangs" });
     site.post(&cancel, Some(ADMIN), &reason).await.json(200);
@@ -194,17 +194,17 @@ async fn two_that_are_finished_are_not_compared_while_a_third_plays() {
 }
 
 #[tokio::test]
-async fn the_mismatch_seed_is_on_no_page_before_the_close() {
+async fn mismatch_seed_is_hidden_until_the_season_closes() {
     let site = Site::start().await;
     let team = site.team("Alpha").await;
     let submission = site.valid_submission(&team, "a").await;
     let path = site.evaluate(&team, &submission).await;
-    site.finish(&result([0.5, 0.6, 0.7], 100.0)).await;
+    site.finish_evaluation(&result([0.5, 0.6, 0.7], 100.0)).await;
     site.next_day();
     let secret = site.store.season().await.unwrap().secret;
-    let shown = shown(&site, &team, &path).await;
-    assert!(!shown.contains(&secret.model_mismatch().to_string()));
-    assert!(!shown.contains(&secret.to_string()));
+    let visible_text = visible_text(&site, &team, &path).await;
+    assert!(!visible_text.contains(&secret.model_mismatch().to_string()));
+    assert!(!visible_text.contains(&secret.to_string()));
     let season: Value = site.get("/api/v1/season", None).await.json(200);
     assert_eq!(season["mismatch_seed"], json!(null));
     let yesterday = jiff::civil::date(2026, 3, 1);

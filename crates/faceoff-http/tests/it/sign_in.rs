@@ -1,18 +1,18 @@
-//! The pages on which people join, register and sign in, as a browser uses them.
+//! The pages to join, register and sign in, as a browser uses them.
 
 use crate::{
-    browser::{Browser, PASSWORD, first, invited},
-    site::{ADMIN, Site, text},
+    browser::{Browser, PASSWORD, first_text, invite},
+    site::{ADMIN, Site, string},
 };
 use reqwest::Method;
 use scraper::{Html, Selector};
 use serde_json::json;
 
 #[tokio::test]
-async fn somebody_follows_a_link_signs_out_and_signs_in_again() {
+async fn user_joins_by_link_signs_out_and_signs_in() {
     let site = Site::start().await;
     let team = site.team("Alpha").await;
-    let link = invited(
+    let link = invite(
         &site,
         json!({ "role": "member", "team": team.id, "note": "Ada" }),
     )
@@ -20,20 +20,20 @@ async fn somebody_follows_a_link_signs_out_and_signs_in_again() {
     let mut browser = Browser::new(&site);
     let page = browser.open(&link).await;
     assert_eq!(
-        (page.status.as_u16(), first(&page, "h1")),
+        (page.status.as_u16(), first_text(&page, "h1")),
         (200, "Join the team Alpha".into())
     );
     let short = [("name", "Ada"), ("password", "short")];
     let refused = browser.submit(&link, &short).await;
     assert_eq!(refused.status, 422);
     assert!(
-        first(&refused, "[role=alert]").contains("12 or more"),
+        first_text(&refused, "[role=alert]").contains("12 or more"),
         "{}",
         refused.body
     );
     assert!(
         refused.body.contains("value=\"Ada\""),
-        "what was filled in is still there"
+        "the form keeps the name"
     );
     assert!(!refused.body.contains("value=\"short\""));
     let fields = [("name", "Ada"), ("password", PASSWORD)];
@@ -43,15 +43,15 @@ async fn somebody_follows_a_link_signs_out_and_signs_in_again() {
         (303, "/account")
     );
     let account = browser.open("/account").await;
-    assert_eq!(first(&account, "h1"), "Ada");
+    assert_eq!(first_text(&account, "h1"), "Ada");
     assert!(account.body.contains("Alpha"));
     assert!(
         !account.body.contains("/organiser"),
-        "that is for organisers"
+        "a member sees no organiser pages"
     );
-    let spent = browser.submit(&link, &fields).await;
-    assert_eq!(spent.status, 409);
-    assert!(spent.body.contains("was accepted"), "{}", spent.body);
+    let used = browser.submit(&link, &fields).await;
+    assert_eq!(used.status, 409);
+    assert!(used.body.contains("was accepted"), "{}", used.body);
 
     let out = browser.submit("/sign-out", &[]).await;
     assert_eq!(out.header("location"), "/");
@@ -64,18 +64,18 @@ async fn somebody_follows_a_link_signs_out_and_signs_in_again() {
         .submit("/sign-in", &[("name", "Ada"), ("password", "wrong")])
         .await;
     assert_eq!(wrong.status, 401);
-    assert!(first(&wrong, "[role=alert]").contains("do not belong together"));
-    let in_again = browser
+    assert!(first_text(&wrong, "[role=alert]").contains("name or password"));
+    let signed_in = browser
         .submit("/sign-in", &[("name", "ada"), ("password", PASSWORD)])
         .await;
-    assert_eq!(in_again.header("location"), "/account");
+    assert_eq!(signed_in.header("location"), "/account");
     assert_eq!(browser.open("/organiser/log").await.status, 403);
 }
 
 #[tokio::test]
-async fn an_organiser_reads_the_log_on_its_page() {
+async fn log_page_is_for_organisers_and_paginated() {
     let site = Site::start().await;
-    let link = invited(&site, json!({ "role": "organiser", "note": "Grace" })).await;
+    let link = invite(&site, json!({ "role": "organiser", "note": "Grace" })).await;
     let mut browser = Browser::new(&site);
     assert_eq!(
         browser.open("/log").await.header("location"),
@@ -107,17 +107,17 @@ async fn an_organiser_reads_the_log_on_its_page() {
         .next();
     let older = older.unwrap().attr("href").unwrap().to_owned();
     assert_eq!(browser.open(&older).await.status, 200);
-    let nonsense = browser.open("/organiser/log?actor=nobody").await;
-    assert_eq!(nonsense.status, 422);
+    let invalid = browser.open("/organiser/log?actor=unknown").await;
+    assert_eq!(invalid.status, 422);
     assert!(
-        nonsense.body.contains("expected organiser"),
+        invalid.body.contains("expected organiser"),
         "{}",
-        nonsense.body
+        invalid.body
     );
 }
 
 #[tokio::test]
-async fn a_team_registers_on_the_page_and_its_link_says_where_it_stands() {
+async fn registration_link_shows_its_status() {
     let site = Site::start().await;
     let mut browser = Browser::new(&site);
     let closed = browser.open("/register").await;
@@ -135,21 +135,21 @@ async fn a_team_registers_on_the_page_and_its_link_says_where_it_stands() {
     let fields = [("team_name", "Alpha"), ("contact", "ada at example.org")];
     let refused = browser.submit("/register", &fields).await;
     assert_eq!(refused.status, 409);
-    assert!(first(&refused, "[role=alert]").contains("version 1"));
-    let consenting = [fields[0], fields[1], ("accepted_terms", "1")];
-    let done = browser.submit("/register", &consenting).await;
+    assert!(first_text(&refused, "[role=alert]").contains("version 1"));
+    let with_terms = [fields[0], fields[1], ("accepted_terms", "1")];
+    let done = browser.submit("/register", &with_terms).await;
     assert_eq!(done.status, 201);
-    let link = first(&done, "section a");
-    let waiting = browser.open(&link).await;
-    assert_eq!(first(&waiting, "h1"), "Alpha waits for the organisers");
+    let link = first_text(&done, "section a");
+    let registered = browser.open(&link).await;
+    assert_eq!(first_text(&registered, "h1"), "Alpha is waiting for approval");
     let listed = site
         .get("/api/v1/registrations", Some(ADMIN))
         .await
         .json(200);
-    let approve = format!("/api/v1/registrations/{}/approve", text(&listed[0]["id"]));
+    let approve = format!("/api/v1/registrations/{}/approve", string(&listed[0]["id"]));
     site.post(&approve, Some(ADMIN), &json!({})).await.json(200);
     assert_eq!(
-        first(&browser.open(&link).await, "h1"),
+        first_text(&browser.open(&link).await, "h1"),
         "Join the team Alpha"
     );
     let fields = [
@@ -164,13 +164,13 @@ async fn a_team_registers_on_the_page_and_its_link_says_where_it_stands() {
 }
 
 #[tokio::test]
-async fn a_founder_names_the_team_and_a_foreign_page_signs_nobody_in() {
+async fn founder_names_the_team_and_foreign_forms_are_refused() {
     let site = Site::start().await;
-    let link = invited(&site, json!({ "role": "founder", "note": "Ada" })).await;
+    let link = invite(&site, json!({ "role": "founder", "note": "Ada" })).await;
     let mut browser = Browser::new(&site);
     let fields = [("name", "Ada"), ("password", PASSWORD)];
     let without = browser.submit(&link, &fields).await;
-    assert!(first(&without, "[role=alert]").contains("team's name"));
+    assert!(first_text(&without, "[role=alert]").contains("team's name"));
     let foreign = browser
         .http
         .post(format!("{}{link}", site.url))
@@ -179,21 +179,21 @@ async fn a_founder_names_the_team_and_a_foreign_page_signs_nobody_in() {
         .body("name=Eve");
     let foreign = browser.send(foreign).await;
     assert_eq!(foreign.status, 403);
-    let bad = [
+    let invalid = [
         fields[0],
         fields[1],
         ("team_name", "Alpha"),
         ("link", "ftp://x"),
     ];
-    let refused = browser.submit(&link, &bad).await;
-    assert!(first(&refused, "[role=alert]").contains("https://"));
-    let good = [
+    let refused = browser.submit(&link, &invalid).await;
+    assert!(first_text(&refused, "[role=alert]").contains("https://"));
+    let valid = [
         fields[0],
         fields[1],
         ("team_name", "Alpha"),
         ("affiliation", "TU"),
     ];
-    assert_eq!(browser.submit(&link, &good).await.status, 303);
+    assert_eq!(browser.submit(&link, &valid).await.status, 303);
     let account = browser.open("/account").await;
     assert!(account.body.contains("Alpha"));
 }

@@ -14,7 +14,7 @@ async fn change(site: &Site, stage: &str, body: Value) -> Answer {
 }
 
 #[tokio::test]
-async fn a_closed_stage_is_signed_off_by_name_and_then_nothing_of_it_changes() {
+async fn signed_off_stage_does_not_change() {
     let site = Site::start().await;
     let (alpha, beta) = (site.team("Alpha").await, site.team("Beta").await);
     let submission = site.valid_submission(&alpha, "a").await;
@@ -22,9 +22,9 @@ async fn a_closed_stage_is_signed_off_by_name_and_then_nothing_of_it_changes() {
     let path = site.evaluate(&alpha, &submission).await;
     let stage = site.stage().await.to_string();
     let sign = format!("/api/v1/stages/{stage}/finalise");
-    let ask = async |body: Value| site.post(&sign, Some(ADMIN), &body).await;
+    let post_sign_off = async |body: Value| site.post(&sign, Some(ADMIN), &body).await;
     let confirmed = json!({ "confirm": "Qualifying" });
-    ask(confirmed.clone())
+    post_sign_off(confirmed.clone())
         .await
         .problem(409, "conflict", &["has not closed", "no end yet"]);
     change(
@@ -34,29 +34,29 @@ async fn a_closed_stage_is_signed_off_by_name_and_then_nothing_of_it_changes() {
     )
     .await
     .json(200);
-    ask(confirmed.clone())
+    post_sign_off(confirmed.clone())
         .await
         .problem(409, "conflict", &["2026-03-01 at 12:00:00 UTC"]);
-    site.later(3 * 3600);
-    ask(confirmed.clone()).await.problem(
+    site.advance(3 * 3600);
+    post_sign_off(confirmed.clone()).await.problem(
         409,
         "conflict",
         &["2 evaluations", "wait until they are over"],
     );
     for score in [0.5, 0.6] {
-        site.finish(&result([score, 0.6, 0.7], 100.0)).await;
+        site.finish_evaluation(&result([score, 0.6, 0.7], 100.0)).await;
     }
     for body in [json!({}), json!({ "confirm": "qualifying" })] {
         let problem =
-            ask(body)
+            post_sign_off(body)
                 .await
                 .problem(409, "not-confirmed", &["Qualifying", "for good", "confirm"]);
         assert_eq!(problem["confirm"], "Qualifying");
     }
-    ask(json!({ "confirm": 7 }))
+    post_sign_off(json!({ "confirm": 7 }))
         .await
         .problem(422, "invalid-content", &["confirm"]);
-    ask(json!({ "name": "Qualifying" }))
+    post_sign_off(json!({ "name": "Qualifying" }))
         .await
         .problem(422, "invalid-content", &["name"]);
     for (token, status) in [(None, 401), (Some(alpha.token.as_str()), 403)] {
@@ -75,7 +75,7 @@ async fn a_closed_stage_is_signed_off_by_name_and_then_nothing_of_it_changes() {
         (&json!(true), &json!(null))
     );
 
-    let done = ask(confirmed.clone()).await.json(200);
+    let done = post_sign_off(confirmed.clone()).await.json(200);
     let signed = json!({ "at": "2026-03-01T13:00:00Z", "by": "organiser" });
     assert_eq!(done["finalised"], signed);
     let board = site.get("/api/v1/board", None).await.json(200);
@@ -91,14 +91,14 @@ async fn a_closed_stage_is_signed_off_by_name_and_then_nothing_of_it_changes() {
     assert!(site.get("/season", None).await.body.contains("signed off"));
 
     let words = ["signed off on 2026-03-01 at 13:00:00 UTC"];
-    ask(confirmed).await.problem(409, "conflict", &words);
+    post_sign_off(confirmed).await.problem(409, "conflict", &words);
     let void = json!({ "reason": "why", "confirm": "Alpha" });
     site.post(&format!("{path}/void"), Some(ADMIN), &void)
         .await
         .problem(409, "conflict", &words);
     let void = json!({ "reason": "why", "confirm": "2026-03-01" });
-    let of_day = format!("/api/v1/stages/{stage}/days/2026-03-01/void");
-    site.post(&of_day, Some(ADMIN), &void)
+    let void_day = format!("/api/v1/stages/{stage}/days/2026-03-01/void");
+    site.post(&void_day, Some(ADMIN), &void)
         .await
         .problem(409, "conflict", &words);
     for body in [
@@ -110,16 +110,16 @@ async fn a_closed_stage_is_signed_off_by_name_and_then_nothing_of_it_changes() {
             .await
             .problem(409, "conflict", &words);
     }
-    let out = json!({ "reason": "why", "confirm": "Beta" });
+    let disqualification = json!({ "reason": "why", "confirm": "Beta" });
     site.post(
         &format!("/api/v1/teams/{}/disqualify", beta.id),
         Some(ADMIN),
-        &out,
+        &disqualification,
     )
     .await
     .json(200);
     let after = site.get("/api/v1/board", None).await.json(200);
-    assert_eq!(after["rows"], board["rows"], "it stays as it was signed");
+    assert_eq!(after["rows"], board["rows"], "the signed-off board does not change");
     assert_eq!(after["disqualified"], json!([]));
     let log = site
         .get("/api/v1/events?kind=stage_finalised", Some(ADMIN))
@@ -129,7 +129,7 @@ async fn a_closed_stage_is_signed_off_by_name_and_then_nothing_of_it_changes() {
 }
 
 #[tokio::test]
-async fn the_season_is_not_closed_over_a_blind_stage() {
+async fn season_with_a_blind_stage_cannot_be_closed() {
     let site = Site::start().await;
     let stage = site.stage().await.to_string();
     change(&site, &stage, json!({ "blind": true }))
@@ -147,7 +147,7 @@ async fn the_season_is_not_closed_over_a_blind_stage() {
         .json(200);
     let sign = format!("/api/v1/stages/{stage}/finalise");
     let confirmed = json!({ "confirm": "Qualifying" });
-    // The stage had no end of its own; the season's is its.
+    // The stage had no end, so it ended with the season.
     let done = site.post(&sign, Some(ADMIN), &confirmed).await.json(200);
     assert_eq!(done["finalised"]["by"], "organiser");
 }

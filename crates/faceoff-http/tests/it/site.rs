@@ -1,9 +1,9 @@
-//! A running site: axum on a loopback port, SQLite in a temporary folder, a clock that tests turn,
-//! and the steps that a worker would take.
+//! A running site: axum on a loopback port, SQLite in a temporary folder, a clock that tests set, and helpers that take
+//! the steps of a worker.
 
 use faceoff_api::token::hash_token;
 use faceoff_http::{
-    Capacity, CapacityWatch, ConnectionLimits, HttpConfig, HttpLimits, LeastRate, LinkKey, Offer,
+    Capacity, CapacityMonitor, ConnectionLimits, HttpConfig, HttpLimits, MinTransferRate, LinkKey, AgentResources,
     RateLimits, router,
 };
 use faceoff_metrics::{Metrics, Process};
@@ -23,17 +23,17 @@ use tokio::{net::TcpListener, sync::oneshot, task::JoinHandle};
 
 pub const ADMIN: &str = "fo_admin_0123456789abcdef";
 pub const MAX_BUNDLE: u64 = 64 * 1024;
-/// The first bytes of a gzip stream; the web side looks no further.
+/// The first bytes of a gzip stream. The web side checks no more of a bundle.
 pub const GZIP: [u8; 4] = [0x1f, 0x8b, 8, 0];
 
-/// Of whatever makes clients. None speaks TLS, so none asks for the machine's certificate authorities.
-pub fn http() -> reqwest::ClientBuilder {
+/// Clients of tests do not use TLS, so they do not load the system's certificate authorities.
+pub fn client_builder() -> reqwest::ClientBuilder {
     reqwest::Client::builder()
         .no_proxy()
         .tls_backend_preconfigured(no_tls())
 }
 
-/// Nothing here speaks TLS, so nobody's certificate is believed.
+/// A TLS configuration that trusts no certificate, since no test uses TLS.
 pub fn no_tls() -> rustls::ClientConfig {
     rustls::ClientConfig::builder()
         .with_root_certificates(rustls::RootCertStore::empty())
@@ -48,8 +48,8 @@ pub struct Site {
     now: Arc<Mutex<Timestamp>>,
     http: reqwest::Client,
     server: JoinHandle<()>,
-    /// What makes it end in an orderly way.
-    ends: Option<oneshot::Sender<()>>,
+    /// Sends the signal for an orderly shutdown.
+    shutdown: Option<oneshot::Sender<()>>,
 }
 
 impl Drop for Site {
@@ -63,7 +63,7 @@ pub struct TestTeam {
     pub token: String,
 }
 
-/// An answer, read to its end.
+/// A response with its whole body.
 #[derive(Debug)]
 pub struct Answer {
     pub status: StatusCode,
@@ -97,7 +97,7 @@ impl Answer {
         serde_json::from_str(&self.body).unwrap()
     }
 
-    /// Asserts a whole problem document of this kind, whose detail contains `words`.
+    /// Asserts that the body is a problem document of this kind, and that its detail contains all `words`.
     #[track_caller]
     pub fn problem(&self, status: u16, slug: &str, words: &[&str]) -> Value {
         assert_eq!(self.status.as_u16(), status, "{}", self.body);
@@ -119,11 +119,11 @@ impl Answer {
     }
 }
 
-/// As usual, but with a patience that only a dead machine wears out.
-pub fn patient() -> HttpLimits {
+/// The default limits, with time limits that no working machine reaches.
+pub fn generous_limits() -> HttpLimits {
     HttpLimits {
-        answer: Duration::from_secs(600),
-        upload_rate: LeastRate {
+        request_timeout: Duration::from_secs(600),
+        min_upload_rate: MinTransferRate {
             bytes_per_s: 1,
             grace: Duration::from_secs(600),
         },
@@ -131,8 +131,8 @@ pub fn patient() -> HttpLimits {
     }
 }
 
-/// Two runtimes, as they might have been found.
-fn offer() -> Offer {
+/// Two runtimes that work, and one that is broken.
+fn agent_resources() -> AgentResources {
     let python = PythonInventory {
         implementation: "CPython".into(),
         version: "3.11.2".into(),
@@ -150,7 +150,7 @@ fn offer() -> Offer {
         cpu_model: Some("A CPU".into()),
         cpus_per_agent: 1,
     };
-    Offer::of(
+    AgentResources::with_inventories(
         AgentLimits::default(),
         machine,
         vec![
@@ -158,8 +158,8 @@ fn offer() -> Offer {
             inventory("python3", RuntimeContent::Python(python)),
             inventory(
                 "wrong",
-                RuntimeContent::Broken {
-                    why: "/secret/folder does not exist".into(),
+                RuntimeContent::Failed {
+                    reason: "/secret/folder does not exist".into(),
                 },
             ),
         ],
@@ -168,33 +168,33 @@ fn offer() -> Offer {
 
 impl Site {
     pub async fn start() -> Self {
-        Self::start_with(patient()).await
+        Self::start_with(generous_limits()).await
     }
 
-    /// With a schedule, as far as the web side shows it.
-    pub async fn start_daily(at: &str) -> Self {
-        Self::configured(patient(), Some(at.parse().unwrap())).await
+    /// A site whose first stage has a daily schedule. No scheduler runs.
+    pub async fn start_with_schedule(at: &str) -> Self {
+        Self::start_configured(generous_limits(), Some(at.parse().unwrap())).await
     }
 
-    /// The same server, whose callers may ask so often only.
+    /// Restarts the server with these rate limits.
     pub async fn with_rates(mut self, rates: RateLimits) -> Self {
-        self.config.rates = rates;
+        self.config.rate_limits = rates;
         self.restart().await;
         self
     }
 
-    /// The same server, which knows the address that others know it by.
-    pub async fn at(mut self, public_url: &str) -> Self {
+    /// Restarts the server with a public URL.
+    pub async fn with_public_url(mut self, public_url: &str) -> Self {
         self.config.public_url = Some(public_url.to_owned());
         self.restart().await;
         self
     }
 
     pub async fn start_with(limits: HttpLimits) -> Self {
-        Self::configured(limits, None).await
+        Self::start_configured(limits, None).await
     }
 
-    async fn configured(limits: HttpLimits, daily_at: Option<jiff::civil::Time>) -> Self {
+    async fn start_configured(limits: HttpLimits, daily_at: Option<jiff::civil::Time>) -> Self {
         let folder = tempfile::tempdir().unwrap();
         let upload_dir = folder.path().join("uploads");
         std::fs::create_dir(&upload_dir).unwrap();
@@ -211,7 +211,7 @@ impl Site {
             .await
             .unwrap();
         let schedule = daily_at.map(Schedule::daily);
-        stage_by(&store, &plan(), schedule, start).await;
+        configure_stage(&store, &plan(), schedule, start).await;
         let now = Arc::new(Mutex::new(start));
         let clock = Arc::clone(&now);
         let config = HttpConfig {
@@ -225,8 +225,8 @@ impl Site {
                 time: TimeLimits::default(),
                 runtimes: ["native", "python3"].map(str::to_owned).to_vec(),
             },
-            offer: offer(),
-            rates: RateLimits::default(),
+            agent_resources: agent_resources(),
+            rate_limits: RateLimits::default(),
             link_key: LinkKey::generate().unwrap(),
             metrics: Metrics::new("0.0.0"),
             process: Process::default,
@@ -237,8 +237,8 @@ impl Site {
                 allow_private: vec!["127.0.0.0/8".parse().unwrap()],
             },
         };
-        let (url, server, ends) = serve(&store, &config).await;
-        let http = http().build().unwrap();
+        let (url, server, shutdown) = serve(&store, &config).await;
+        let http = client_builder().build().unwrap();
         Self {
             url,
             store,
@@ -247,16 +247,16 @@ impl Site {
             now,
             http,
             server,
-            ends: Some(ends),
+            shutdown: Some(shutdown),
         }
     }
 
-    /// A server on a data folder that an archive was imported into, at the moment that it shows.
-    pub async fn showing(folder: tempfile::TempDir) -> Self {
+    /// A server on a data folder with an imported archive. Its clock shows the time at which the archive was made.
+    pub async fn open_archive(folder: tempfile::TempDir) -> Self {
         let upload_dir = folder.path().join("uploads");
         std::fs::create_dir(&upload_dir).unwrap();
         let store = Store::open(folder.path()).await.unwrap();
-        let made_at = store.archived().unwrap().made_at;
+        let made_at = store.archived_season().unwrap().made_at;
         assert!(
             store
                 .set_host_token(hash_token(ADMIN), made_at)
@@ -268,61 +268,61 @@ impl Site {
             public_url: None,
             upload_dir,
             clock: Clock::new(move || made_at),
-            limits: patient(),
+            limits: generous_limits(),
             capacity: Capacity {
                 slots: 0,
                 runtimes: Vec::new(),
                 time: TimeLimits::default(),
             },
-            offer: Offer::nothing(),
-            rates: RateLimits::default(),
+            agent_resources: AgentResources::none(),
+            rate_limits: RateLimits::default(),
             link_key: LinkKey::generate().unwrap(),
             metrics: Metrics::new("0.0.0"),
             process: Process::default,
             webhooks: WebhookRules::default(),
         };
-        let (url, server, ends) = serve(&store, &config).await;
+        let (url, server, shutdown) = serve(&store, &config).await;
         Self {
             url,
             store,
             folder,
             config,
             now: Arc::new(Mutex::new(made_at)),
-            http: http().build().unwrap(),
+            http: client_builder().build().unwrap(),
             server,
-            ends: Some(ends),
+            shutdown: Some(shutdown),
         }
     }
 
-    /// What the server counts of itself.
+    /// The metrics of the server.
     pub fn metrics(&self) -> &Metrics {
         &self.config.metrics
     }
 
-    /// Another server on the same folder, which remembers nothing.
+    /// Replaces the server by a new one on the same folder, with empty caches.
     pub async fn restart(&mut self) {
         self.server.abort();
-        let (url, server, ends) = serve(&self.store, &self.config).await;
-        (self.url, self.server, self.ends) = (url, server, Some(ends));
+        let (url, server, shutdown) = serve(&self.store, &self.config).await;
+        (self.url, self.server, self.shutdown) = (url, server, Some(shutdown));
     }
 
-    /// Ends the server as a signal does, and waits until it has ended.
-    pub async fn end(&mut self) {
-        self.ends.take().unwrap().send(()).unwrap();
+    /// Shuts the server down as a signal does, and waits for its end.
+    pub async fn shut_down(&mut self) {
+        self.shutdown.take().unwrap().send(()).unwrap();
         (&mut self.server).await.unwrap();
     }
 
-    /// What warns of days that do not fit, with nothing seen yet.
-    /// What it seals grants of work orders with.
+    /// The key that seals the grants of jobs.
     pub fn grant_key(&self) -> GrantKey {
-        self.config.link_key.of_grants()
+        self.config.link_key.grant_key()
     }
 
-    pub fn capacity_watch(&self) -> CapacityWatch {
+    /// A monitor that has not checked any day yet.
+    pub fn capacity_monitor(&self) -> CapacityMonitor {
         let HttpConfig {
             clock, capacity, ..
         } = self.config.clone();
-        CapacityWatch::new(self.store.clone(), clock, capacity)
+        CapacityMonitor::new(self.store.clone(), clock, capacity)
     }
 
     pub fn clock(&self) -> Clock {
@@ -333,11 +333,11 @@ impl Site {
         *self.now.lock().unwrap()
     }
 
-    pub fn later(&self, seconds: i64) {
+    pub fn advance(&self, seconds: i64) {
         *self.now.lock().unwrap() += SignedDuration::from_secs(seconds);
     }
 
-    pub fn turn_to(&self, now: Timestamp) {
+    pub fn set_time(&self, now: Timestamp) {
         *self.now.lock().unwrap() = now;
     }
 
@@ -345,7 +345,7 @@ impl Site {
         *self.now.lock().unwrap() += SignedDuration::from_hours(24);
     }
 
-    /// A request; paths that begin with `/api` or not are taken as they are.
+    /// A request to this path of the site, which is used unchanged.
     pub fn request(&self, method: Method, path: &str, token: Option<&str>) -> RequestBuilder {
         let request = self.http.request(method, format!("{}{path}", self.url));
         match token {
@@ -381,52 +381,52 @@ impl Site {
             .await;
         let team = answer.json(201);
         TestTeam {
-            id: text(&team["id"]),
-            token: text(&team["token"]),
+            id: string(&team["id"]),
+            token: string(&team["token"]),
         }
     }
 
-    /// Uploads a bundle and finds it valid, as a worker's smoke run would; the submission's path.
+    /// Uploads a bundle and commits a successful validation run of it. Returns the submission's path in the API.
     pub async fn valid_submission(&self, team: &TestTeam, agent: &str) -> String {
         let submission = self.upload(&team.token, GZIP.to_vec()).await.json(201);
-        let outcome = SmokeOutcome::Valid {
+        let outcome = ValidationOutcome::Valid {
             runtime: "native".into(),
             agent_name: agent.into(),
             timing: Vec::new(),
             log: "ready\n".into(),
         };
-        self.smoke(outcome).await;
-        format!("/api/v1/submissions/{}", text(&submission["id"]))
+        self.finish_validation(outcome).await;
+        format!("/api/v1/submissions/{}", string(&submission["id"]))
     }
 
-    /// Ends the next smoke run.
-    pub async fn smoke(&self, outcome: SmokeOutcome) {
-        let Claimed { claim, work } = self.claim().await;
-        assert!(matches!(work, Work::Smoke { .. }), "claimed {work:?}");
+    /// Claims the next validation run and commits its outcome.
+    pub async fn finish_validation(&self, outcome: ValidationOutcome) {
+        let ClaimedJob { claim, job } = self.claim().await;
+        assert!(matches!(job, Job::Validation { .. }), "claimed {job:?}");
         self.store
-            .commit_smoke(&claim, outcome, self.now())
+            .commit_validation(&claim, outcome, self.now())
             .await
             .unwrap();
     }
 
-    pub async fn claim(&self) -> Claimed {
+    pub async fn claim(&self) -> ClaimedJob {
         self.store
             .claim("slot 0", 60, self.now())
             .await
             .unwrap()
-            .expect("work is queued")
+            .expect("a job is queued")
     }
 
-    pub async fn claim_shard(&self) -> (Claim, Run, Shard) {
-        let Claimed { claim, work } = self.claim().await;
-        match work {
-            Work::Shard { run, shard, .. } => (claim, run, shard),
+    pub async fn claim_shard(&self) -> (JobClaim, Run, Shard) {
+        let ClaimedJob { claim, job } = self.claim().await;
+        match job {
+            Job::Shard { run, shard, .. } => (claim, run, shard),
             other => panic!("expected a shard, claimed {other:?}"),
         }
     }
 
-    /// Plays the shards of the evaluation that comes next, with `faults` agent faults in each.
-    pub async fn play_shards(&self, faults: usize) {
+    /// Runs the shards of the next evaluation, with `faults` agent faults in each.
+    pub async fn run_shards(&self, faults: usize) {
         for _ in Task::ALL {
             let (claim, run, shard) = self.claim_shard().await;
             let commit = ShardCommit {
@@ -442,20 +442,20 @@ impl Site {
                 .await
                 .unwrap();
             if faults > 0 {
-                // one shard's faults are more than the plan forgives
+                // The faults of one shard exceed those that the plan allows, so the evaluation has failed.
                 return;
             }
         }
     }
 
-    /// Plays the evaluation that comes next and scores it as given.
-    pub async fn finish(&self, result: &EvaluationResult) {
-        self.play_shards(0).await;
-        let Claimed { claim, work } = self.claim().await;
-        let Work::Finalise { evaluation, .. } = work else {
+    /// Runs the next evaluation without faults and commits this result.
+    pub async fn finish_evaluation(&self, result: &EvaluationResult) {
+        self.run_shards(0).await;
+        let ClaimedJob { claim, job } = self.claim().await;
+        let Job::Scoring { evaluation, .. } = job else {
             panic!("expected a finalisation");
         };
-        self.publish(&claim, evaluation, result).await;
+        self.commit_evaluation(&claim, evaluation, result).await;
     }
 
     /// The season's first stage.
@@ -463,52 +463,52 @@ impl Site {
         self.store.stages().await.unwrap()[0].id
     }
 
-    /// Starts the day with what all teams have active, unless that was done; the path in the API of the
-    /// team's evaluation, which plays this submission.
+    /// Starts the day with the active submissions of all teams, unless it has started. Returns the path in the API of the
+    /// team's evaluation, which must be of this submission.
     pub async fn evaluate(&self, team: &TestTeam, submission: &str) -> String {
         match self
             .store
             .start_day(Actor::Organiser, self.stage().await, self.now())
             .await
         {
-            Ok(_) | Err(StoreError::DayHasCut { .. }) => {}
+            Ok(_) | Err(StoreError::CutoffPassed { .. }) => {}
             Err(error) => panic!("{error}"),
         }
-        let of_team = self.store.evaluations_of(team.id.parse().unwrap()).await;
-        let newest = &of_team.unwrap()[0];
+        let evaluations = self.store.evaluations_of(team.id.parse().unwrap()).await;
+        let newest = &evaluations.unwrap()[0];
         assert!(submission.ends_with(&newest.submission.to_string()));
         format!("/api/v1/evaluations/{}", newest.id)
     }
 
-    /// Plays the evaluation that comes next, episode by episode as `played` says, and scores it by the
-    /// rules; the evaluation's id.
-    pub async fn finish_as(&self, played: impl Fn(Task, u32) -> EpisodeOutcome) -> EvaluationId {
+    /// Runs the next evaluation with the outcomes that `outcome_fn` returns for its episodes, and scores it by the rules.
+    /// Returns the evaluation's id.
+    pub async fn run_evaluation(&self, outcome_fn: impl Fn(Task, u32) -> EpisodeOutcome) -> EvaluationId {
         let mut outcomes = Vec::new();
         loop {
-            let Claimed { claim, work } = self.claim().await;
-            match work {
-                Work::Shard { run, shard, .. } => {
-                    let of_shard: Vec<_> = (shard.first_episode..shard.end_episode)
-                        .map(|episode| played(shard.task, episode))
+            let ClaimedJob { claim, job } = self.claim().await;
+            match job {
+                Job::Shard { run, shard, .. } => {
+                    let shard_outcomes: Vec<_> = (shard.first_episode..shard.end_episode)
+                        .map(|episode| outcome_fn(shard.task, episode))
                         .collect();
-                    outcomes.extend(of_shard.iter().cloned());
+                    outcomes.extend(shard_outcomes.iter().cloned());
                     let commit = ShardCommit {
-                        outcomes: of_shard,
+                        outcomes: shard_outcomes,
                         log: String::new(),
                         stopped_by_faults: false,
                         recording: Some(claim.recording_key(run.id)),
                     };
                     let committed = self.store.commit_shard(&claim, commit, self.now());
-                    assert_eq!(committed.await.unwrap(), Committed::Now);
+                    assert_eq!(committed.await.unwrap(), CommitOutcome::Stored);
                 }
-                Work::Finalise {
+                Job::Scoring {
                     evaluation,
                     run,
                     seeds,
                     ..
                 } => {
-                    let result = scored(&run, seeds.episodes, &outcomes);
-                    self.publish(&claim, evaluation, &result).await;
+                    let result = score_outcomes(&run, seeds.episodes, &outcomes);
+                    self.commit_evaluation(&claim, evaluation, &result).await;
                     return evaluation;
                 }
                 other => panic!("expected a shard or a finalisation, claimed {other:?}"),
@@ -516,8 +516,8 @@ impl Site {
         }
     }
 
-    /// Ends an evaluation with its score and a dataset.
-    pub async fn publish(&self, claim: &Claim, id: EvaluationId, result: &EvaluationResult) {
+    /// Commits the result of an evaluation with a dataset.
+    pub async fn commit_evaluation(&self, claim: &JobClaim, id: EvaluationId, result: &EvaluationResult) {
         let dataset = self.folder.path().join("dataset.zip");
         let archive = b"PK the recorded dataset";
         std::fs::write(&dataset, archive).unwrap();
@@ -534,12 +534,12 @@ impl Site {
             .unwrap();
     }
 
-    /// A day of `episodes` of each task on which these new teams' agents played as the functions say, and
-    /// those of older teams as the first one; the new teams' evaluations.
-    pub async fn played_day<const N: usize>(
+    /// Adds these teams, and evaluates a day with `episodes` of each task. Their functions give the outcomes; older teams use
+    /// the first function. Returns the evaluations of the new teams.
+    pub async fn run_day<const N: usize>(
         &self,
         episodes: u32,
-        teams: [(&str, Played<'_>); N],
+        teams: [(&str, OutcomeFn<'_>); N],
     ) -> [EvaluationId; N] {
         for (name, _) in &teams {
             let team = self.team(name).await;
@@ -551,21 +551,21 @@ impl Site {
             max_faults: 0,
             ..plan()
         };
-        let stage = stage_by(&self.store, &plan, None, self.now()).await;
+        let stage = configure_stage(&self.store, &plan, None, self.now()).await;
         let started = self.store.start_day(Actor::Organiser, stage, self.now());
         let started = started.await.unwrap();
         let mut by_name = BTreeMap::new();
         for evaluation in &started {
             let name = self.store.team(evaluation.team).await.unwrap().name;
-            let of_team = teams.iter().find(|(new, _)| *new == name.as_str());
-            let (_, played) = of_team.unwrap_or(&teams[0]);
-            assert_eq!(self.finish_as(played).await, evaluation.id);
+            let outcome_fn = teams.iter().find(|(new, _)| *new == name.as_str());
+            let (_, outcome_fn) = outcome_fn.unwrap_or(&teams[0]);
+            assert_eq!(self.run_evaluation(outcome_fn).await, evaluation.id);
             by_name.insert(name.to_string(), evaluation.id);
         }
         teams.map(|(name, _)| by_name[name])
     }
 
-    /// A day of new teams with these scores.
+    /// Adds these teams, and evaluates a day with these results.
     pub async fn ranked_teams(&self, teams: &[(&str, EvaluationResult)]) {
         for (name, _) in teams {
             let team = self.team(name).await;
@@ -574,16 +574,16 @@ impl Site {
         let started = self.post("/api/v1/days", Some(ADMIN), &json!({})).await;
         started.json(200);
         for (_, result) in teams {
-            self.finish(result).await;
+            self.finish_evaluation(result).await;
         }
     }
 }
 
-/// What these episodes of a run come to, by the rules.
-pub fn scored(run: &Run, seed: Seed, outcomes: &[EpisodeOutcome]) -> EvaluationResult {
+/// The result of these episodes of a run, by the rules.
+pub fn score_outcomes(run: &Run, seed: Seed, outcomes: &[EpisodeOutcome]) -> EvaluationResult {
     let plan = &run.plan;
     let tasks = plan.tasks.iter().map(|task| {
-        let of_task: Vec<_> = outcomes
+        let task_outcomes: Vec<_> = outcomes
             .iter()
             .filter(|outcome| outcome.task == *task)
             .cloned()
@@ -591,7 +591,7 @@ pub fn scored(run: &Run, seed: Seed, outcomes: &[EpisodeOutcome]) -> EvaluationR
         let bounds = &plan.variation.tier_bounds;
         (
             *task,
-            faceoff_scoring::score_task(&of_task, &Default::default(), bounds),
+            faceoff_scoring::score_task(&task_outcomes, &Default::default(), bounds),
         )
     });
     faceoff_scoring::score_evaluation(
@@ -603,7 +603,7 @@ pub fn scored(run: &Run, seed: Seed, outcomes: &[EpisodeOutcome]) -> EvaluationR
     )
 }
 
-/// What the first stage plays.
+/// The run plan of the first stage.
 fn plan() -> RunPlan {
     RunPlan {
         profile: Profile::Evaluation,
@@ -616,8 +616,8 @@ fn plan() -> RunPlan {
     }
 }
 
-/// The season's first stage, which plays by this plan from now on.
-async fn stage_by(
+/// Configures the season's first stage by this plan. Returns its id.
+async fn configure_stage(
     store: &Store,
     plan: &RunPlan,
     schedule: Option<Schedule>,
@@ -645,14 +645,14 @@ async fn stage_by(
     store.stages().await.unwrap()[0].id
 }
 
-/// How an agent played.
-pub type Played<'a> = &'a dyn Fn(Task, u32) -> EpisodeOutcome;
+/// The outcome of an agent in an episode.
+pub type OutcomeFn<'a> = &'a dyn Fn(Task, u32) -> EpisodeOutcome;
 
-/// A patience that only a dead machine wears out.
-fn connections() -> ConnectionLimits {
+/// The default limits, with time limits that no working machine reaches.
+fn connection_limits() -> ConnectionLimits {
     ConnectionLimits {
-        head: Duration::from_secs(600),
-        reading: LeastRate {
+        head_timeout: Duration::from_secs(600),
+        min_read_rate: MinTransferRate {
             bytes_per_s: 1,
             grace: Duration::from_secs(600),
         },
@@ -667,30 +667,30 @@ async fn serve(
     let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
     let url = format!("http://{}", listener.local_addr().unwrap());
     let site = router(store.clone(), config.clone());
-    let (ends, end) = oneshot::channel();
+    let (shutdown, end) = oneshot::channel();
     let server = tokio::spawn(async move {
         let until = async move {
-            // Without a word it goes on: who sends none has dropped it.
+            // A sender that is dropped without a signal does not end the server.
             if end.await.is_err() {
                 std::future::pending().await
             }
         };
-        faceoff_http::serve(listener, site, connections(), until).await;
+        faceoff_http::serve(listener, site, connection_limits(), until).await;
     });
-    (url, server, ends)
+    (url, server, shutdown)
 }
 
-pub fn text(value: &Value) -> String {
+pub fn string(value: &Value) -> String {
     value
         .as_str()
-        .unwrap_or_else(|| panic!("{value} is no text"))
+        .unwrap_or_else(|| panic!("{value} is not a string"))
         .to_owned()
 }
 
-pub fn outcome(task: Task, episode: u32, faulty: bool) -> EpisodeOutcome {
-    let fault = faulty.then(|| AgentFault {
+pub fn outcome(task: Task, episode: u32, has_fault: bool) -> EpisodeOutcome {
+    let fault = has_fault.then(|| AgentFault {
         fault: AgentFaultKind::NonFinite,
-        contest: task.into(),
+        agent_task: task.into(),
         episode: Some(episode),
         step: Some(3),
         line: Some("{\"type\":\"act\"}".into()),
@@ -699,12 +699,12 @@ pub fn outcome(task: Task, episode: u32, faulty: bool) -> EpisodeOutcome {
         task,
         episode,
         steps: 17,
-        end: if faulty {
+        end: if has_fault {
             EpisodeEnd::AgentFault
         } else {
             EpisodeEnd::LeftTable
         },
-        success: !faulty,
+        success: !has_fault,
         violations: Violations::default(),
         computation_time: ComputationTime {
             mean_s: 1e-4,
@@ -714,8 +714,8 @@ pub fn outcome(task: Task, episode: u32, faulty: bool) -> EpisodeOutcome {
     }
 }
 
-/// A result with these success rates (hit, defend, prepare) over 1000 episodes and these overall
-/// penalty points, all of them from `hit`.
+/// A result over 1000 episodes with these success rates (hit, defend, prepare) and these overall penalty points, all of
+/// them from `hit`.
 pub fn result(rates: [f64; 3], penalty_points: f64) -> EvaluationResult {
     let tier = match penalty_points {
         points if points <= 500.0 => Tier::Deployable,

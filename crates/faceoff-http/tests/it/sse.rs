@@ -1,10 +1,10 @@
-//! Server-sent events, as a program reads them.
+//! Server-sent events, as an API client reads them.
 
 use crate::site::Site;
 use reqwest::{Method, Response};
 use serde_json::Value;
 
-/// An event of a stream.
+/// One event of a stream.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Event {
     pub name: String,
@@ -12,7 +12,7 @@ pub struct Event {
     pub data: Value,
 }
 
-/// A stream that is read event by event.
+/// An open stream that is read event by event.
 pub struct Stream {
     response: Response,
     unread: String,
@@ -35,7 +35,7 @@ impl Stream {
         }
     }
 
-    /// The next event; none: the stream has ended.
+    /// The next event, or `None` at the end of the stream.
     pub async fn next(&mut self) -> Option<Event> {
         loop {
             if let Some((block, rest)) = self.unread.split_once("\n\n") {
@@ -52,7 +52,7 @@ impl Stream {
     }
 }
 
-/// None: a comment that keeps the connection open.
+/// The event of a block, or `None` for a comment that keeps the connection open.
 fn parse(block: &str) -> Option<Event> {
     let field = |name: &str| {
         block

@@ -1,4 +1,4 @@
-//! Stages over HTTP and on pages.
+//! Stages in the API and on pages.
 
 use crate::site::{ADMIN, Answer, Site, result};
 use faceoff_store::{Actor, StageChange};
@@ -6,7 +6,7 @@ use faceoff_types::{Ruleset, StageRules};
 use reqwest::Method;
 use serde_json::{Value, json};
 
-async fn make(site: &Site, body: Value) -> Answer {
+async fn create(site: &Site, body: Value) -> Answer {
     site.post("/api/v1/stages", Some(ADMIN), &body).await
 }
 
@@ -17,11 +17,11 @@ async fn change(site: &Site, stage: &Value, body: Value) -> Answer {
 }
 
 #[tokio::test]
-async fn a_stage_is_made_seen_changed_and_played() {
+async fn stage_is_created_changed_and_played() {
     let site = Site::start().await;
     let team = site.team("Alpha").await;
     site.valid_submission(&team, "a").await;
-    let made = make(
+    let created = create(
         &site,
         json!({
             "name": "Final",
@@ -34,36 +34,36 @@ async fn a_stage_is_made_seen_changed_and_played() {
     )
     .await
     .json(201);
-    assert_eq!(made["phase"], "upcoming");
-    assert_eq!(made["profile"], "evaluation", "as in the open stage");
+    assert_eq!(created["phase"], "upcoming");
+    assert_eq!(created["profile"], "evaluation", "as in the open stage");
     assert_eq!(
         (
-            &made["revision"],
-            &made["since"],
-            &made["episodes_per_task"]
+            &created["revision"],
+            &created["since"],
+            &created["episodes_per_task"]
         ),
         (&json!(1), &json!("2026-03-02T08:00:00Z"), &json!(2))
     );
-    // Monday at 9:00 in Berlin is when it opens.
-    assert_eq!(made["next_cut"]["day"], "2026-03-02");
-    assert_eq!(made["next_cut"]["at"], "2026-03-02T08:00:00Z");
-    let path = format!("/api/v1/stages/{}", made["id"].as_str().unwrap());
-    assert_eq!(site.get(&path, Some(ADMIN)).await.json(200), made);
+    // The stage opens on Monday at 9:00 in Berlin.
+    assert_eq!(created["next_cut"]["day"], "2026-03-02");
+    assert_eq!(created["next_cut"]["at"], "2026-03-02T08:00:00Z");
+    let path = format!("/api/v1/stages/{}", created["id"].as_str().unwrap());
+    assert_eq!(site.get(&path, Some(ADMIN)).await.json(200), created);
     let all = site.get("/api/v1/stages", Some(ADMIN)).await.json(200);
     assert_eq!(all.as_array().unwrap().len(), 2);
-    assert_eq!(all[1], made);
+    assert_eq!(all[1], created);
     assert_eq!(
         site.get("/api/v1/season", Some(ADMIN)).await.json(200)["stages"],
         all
     );
 
-    let early = json!({ "stage": made["id"] });
-    site.post("/api/v1/days", Some(ADMIN), &early)
+    let start_request = json!({ "stage": created["id"] });
+    site.post("/api/v1/days", Some(ADMIN), &start_request)
         .await
         .problem(409, "stage-not-open", &["Final", "2026-03-02 08:00:00 UTC"]);
     let changed = change(
         &site,
-        &made,
+        &created,
         json!({ "schedule": null, "closes_at": null, "name": "Finals" }),
     )
     .await;
@@ -78,19 +78,19 @@ async fn a_stage_is_made_seen_changed_and_played() {
     );
 
     site.next_day();
-    // Two are open: which one is to be said.
+    // Two stages are open, so the request must name one.
     site.post("/api/v1/days", Some(ADMIN), &json!({}))
         .await
         .problem(422, "invalid-content", &["stage", "Qualifying", "Finals"]);
     let day = site
-        .post("/api/v1/days", Some(ADMIN), &early)
+        .post("/api/v1/days", Some(ADMIN), &start_request)
         .await
         .json(200);
     assert_eq!(
         (&day["stage"], &day["day"]),
-        (&made["id"], &json!("2026-03-02"))
+        (&created["id"], &json!("2026-03-02"))
     );
-    site.finish(&result([0.5, 0.6, 0.7], 100.0)).await;
+    site.finish_evaluation(&result([0.5, 0.6, 0.7], 100.0)).await;
     let board = site.get("/api/v1/board", None).await.json(200);
     assert_eq!(
         (
@@ -104,12 +104,12 @@ async fn a_stage_is_made_seen_changed_and_played() {
 }
 
 #[tokio::test]
-async fn other_rules_of_an_open_stage_are_confirmed_and_get_a_board_of_their_own() {
+async fn changed_rules_need_confirmation_and_have_their_own_board() {
     let site = Site::start().await;
     let team = site.team("Alpha").await;
     let submission = site.valid_submission(&team, "a").await;
     site.evaluate(&team, &submission).await;
-    site.finish(&result([0.5, 0.6, 0.7], 100.0)).await;
+    site.finish_evaluation(&result([0.5, 0.6, 0.7], 100.0)).await;
     let stage = site.get("/api/v1/stages", None).await.json(200)[0].clone();
     let harder = json!({ "episodes_per_task": 9 });
     let problem = change(&site, &stage, harder).await;
@@ -126,7 +126,7 @@ async fn other_rules_of_an_open_stage_are_confirmed_and_get_a_board_of_their_own
     let changed = change(&site, &stage, harder).await.json(200);
     assert_eq!(changed["revision"], 2);
     assert_eq!(changed["configured"], false);
-    let told: Vec<_> = changed["revisions"]
+    let revisions: Vec<_> = changed["revisions"]
         .as_array()
         .unwrap()
         .iter()
@@ -137,9 +137,9 @@ async fn other_rules_of_an_open_stage_are_confirmed_and_get_a_board_of_their_own
             )
         })
         .collect();
-    assert_eq!(told, [(json!(1), json!(4)), (json!(2), json!(9))]);
+    assert_eq!(revisions, [(json!(1), json!(4)), (json!(2), json!(9))]);
 
-    // Until there is a result by the new rules, the board is that of the old ones, and says so.
+    // Until the first result by the new rules, the board of the old revision is shown and named.
     let board = site.get("/api/v1/board", None).await.json(200);
     assert_eq!(
         (&board["revision"], board["rows"].as_array().unwrap().len()),
@@ -167,20 +167,20 @@ async fn other_rules_of_an_open_stage_are_confirmed_and_get_a_board_of_their_own
 #[tokio::test]
 async fn stage_keeps_its_ruleset_until_its_rules_change() {
     let site = Site::start().await;
-    let is = site.store.stages().await.unwrap().remove(0);
-    // As a program of the ruleset before has left it.
+    let stage = site.store.stages().await.unwrap().remove(0);
+    // As a server with the previous ruleset would have stored it.
     let earlier = StageChange {
         rules: Some(StageRules {
             ruleset: Ruleset::Second,
-            ..is.rules.rules
+            ..stage.rules.rules
         }),
         ..StageChange::default()
     };
     let now = site.now();
-    let left = site
+    let changed = site
         .store
-        .change_stage(Actor::Organiser, is.id, earlier, now);
-    left.await.unwrap();
+        .change_stage(Actor::Organiser, stage.id, earlier, now);
+    changed.await.unwrap();
     let stage = site.get("/api/v1/stages", None).await.json(200)[0].clone();
     for (body, revision, ruleset) in [
         (json!({ "name": "Heats" }), 2, "airhockey-2023.2"),
@@ -199,17 +199,17 @@ async fn stage_keeps_its_ruleset_until_its_rules_change() {
 }
 
 #[tokio::test]
-async fn pages_tell_of_stages() {
-    let site = Site::start_daily("12:00").await;
-    let made = make(
+async fn pages_show_stages() {
+    let site = Site::start_with_schedule("12:00").await;
+    let created = create(
         &site,
         json!({ "name": "Final", "opens_at": "2026-03-02T08:00:00Z", "closes_at": "2026-03-09T08:00:00Z" }),
     );
-    made.await.json(201);
+    created.await.json(201);
     let page = site.get("/", None).await.body;
     for part in [
         "stage <strong>Qualifying</strong>, open",
-        "2026-03-01 at 12:00:00 UTC",
+        "1 March, 12:00 UTC",
         ">Final</a>",
     ] {
         assert!(page.contains(part), "{part:?} is not in {page}");
@@ -218,7 +218,7 @@ async fn pages_tell_of_stages() {
     for part in [
         "Final",
         "2026-03-09 08:00:00 UTC",
-        "open end",
+        "no date set",
         "revision 1 since",
     ] {
         assert!(season.contains(part), "{part:?} is not in {season}");
@@ -232,7 +232,7 @@ async fn pages_tell_of_stages() {
 }
 
 #[tokio::test]
-async fn what_cannot_be_is_said_with_what_can() {
+async fn invalid_stage_is_refused_with_valid_values() {
     let site = Site::start().await;
     for (body, status, slug, words) in [
         (json!({}), 422, "invalid-content", &["name"][..]),
@@ -310,7 +310,7 @@ async fn what_cannot_be_is_said_with_what_can() {
             &["deadline", "closes_at"],
         ),
     ] {
-        make(&site, body).await.problem(status, slug, words);
+        create(&site, body).await.problem(status, slug, words);
     }
     assert_eq!(
         site.get("/api/v1/stages", None)
@@ -326,12 +326,12 @@ async fn what_cannot_be_is_said_with_what_can() {
         .post("/api/v1/stages", Some(&team.token), &json!({ "name": "F" }))
         .await;
     by_team.problem(403, "forbidden", &[]);
-    let by_none = site
+    let by_visitor = site
         .post("/api/v1/stages", None, &json!({ "name": "F" }))
         .await;
-    by_none.problem(401, "unauthenticated", &[]);
-    let none = json!({ "id": uuid::Uuid::nil() });
-    change(&site, &none, json!({ "name": "F" }))
+    by_visitor.problem(401, "unauthenticated", &[]);
+    let missing = json!({ "id": uuid::Uuid::nil() });
+    change(&site, &missing, json!({ "name": "F" }))
         .await
         .problem(404, "not-found", &["stage"]);
     let stage = site.get("/api/v1/stages", None).await.json(200)[0].clone();

@@ -1,13 +1,15 @@
-use crate::site::{ADMIN, Answer, GZIP, MAX_BUNDLE, Site, patient, text};
+//! Uploads and submissions.
+
+use crate::site::{ADMIN, Answer, GZIP, MAX_BUNDLE, Site, generous_limits, string};
 use bytes::Bytes;
-use faceoff_http::{HttpLimits, LeastRate};
-use faceoff_types::SmokeOutcome;
+use faceoff_http::{HttpLimits, MinTransferRate};
+use faceoff_types::ValidationOutcome;
 use reqwest::{Body, Method};
 use serde_json::{Value, json};
 use std::{convert::Infallible, time::Duration};
 
 /// A bundle of `bytes` bytes, sent in pieces and without a Content-Length.
-fn in_pieces(bytes: usize) -> Body {
+fn chunked_bundle(bytes: usize) -> Body {
     let mut bundle = vec![7; bytes];
     bundle[..4].copy_from_slice(&GZIP);
     let pieces: Vec<_> = bundle
@@ -17,20 +19,20 @@ fn in_pieces(bytes: usize) -> Body {
     Body::wrap_stream(futures::stream::iter(pieces))
 }
 
-fn uploads_left(site: &Site) -> usize {
+fn temporary_uploads(site: &Site) -> usize {
     std::fs::read_dir(site.folder.path().join("uploads"))
         .unwrap()
         .count()
 }
 
 #[tokio::test]
-async fn an_upload_is_stored_hashed_and_queued() {
+async fn upload_is_stored_hashed_and_queued() {
     let site = Site::start().await;
     let team = site.team("Alpha").await;
     let size = MAX_BUNDLE as usize;
-    let answer = site.upload(&team.token, in_pieces(size)).await;
+    let answer = site.upload(&team.token, chunked_bundle(size)).await;
     let submission = answer.json(201);
-    let path = format!("/api/v1/submissions/{}", text(&submission["id"]));
+    let path = format!("/api/v1/submissions/{}", string(&submission["id"]));
     assert_eq!(answer.header("location"), path);
     assert_eq!(submission["state"], "validating");
     assert_eq!(submission["bytes"], MAX_BUNDLE);
@@ -38,7 +40,7 @@ async fn an_upload_is_stored_hashed_and_queued() {
 
     let stored = site
         .store
-        .submission(text(&submission["id"]).parse().unwrap())
+        .submission(string(&submission["id"]).parse().unwrap())
         .await
         .unwrap();
     let copy = site.folder.path().join("copy");
@@ -51,21 +53,21 @@ async fn an_upload_is_stored_hashed_and_queued() {
     assert_eq!(bytes.len(), size);
     assert_eq!(
         blake3::hash(&bytes).to_string(),
-        text(&submission["blake3"])
+        string(&submission["blake3"])
     );
-    assert_eq!(uploads_left(&site), 0);
+    assert_eq!(temporary_uploads(&site), 0);
 
-    let outcome = SmokeOutcome::Valid {
+    let outcome = ValidationOutcome::Valid {
         runtime: "native".into(),
         agent_name: "striker 1.0".into(),
         timing: Vec::new(),
         log: "model loaded\n".into(),
     };
-    site.smoke(outcome).await;
+    site.finish_validation(outcome).await;
     let mut submission = site.get(&path, Some(&team.token)).await.json(200);
     assert_eq!(submission["state"], "valid");
     assert_eq!(submission["agent_name"], "striker 1.0");
-    // shown of one, left out of lists
+    // The log is part of the single view, not of lists.
     let log = submission.as_object_mut().unwrap().remove("log");
     assert_eq!(log, Some(json!("model loaded\n")));
     let list = site
@@ -76,18 +78,18 @@ async fn an_upload_is_stored_hashed_and_queued() {
 }
 
 #[tokio::test]
-async fn an_invalid_bundle_shows_its_reason_and_its_log() {
+async fn invalid_submission_shows_reason_and_log() {
     let site = Site::start().await;
     let team = site.team("Alpha").await;
-    let id = text(&site.upload(&team.token, GZIP.to_vec()).await.json(201)["id"]);
-    let outcome = SmokeOutcome::Invalid {
+    let id = string(&site.upload(&team.token, GZIP.to_vec()).await.json(201)["id"]);
+    let outcome = ValidationOutcome::Invalid {
         runtime: None,
         agent_name: None,
         reason: "no answer within the start-up limit of 120 s".into(),
         timing: Vec::new(),
         log: "ImportError: torch\n".into(),
     };
-    site.smoke(outcome).await;
+    site.finish_validation(outcome).await;
     let path = format!("/api/v1/submissions/{id}");
     let submission = site.get(&path, Some(&team.token)).await.json(200);
     assert_eq!(submission["state"], "invalid");
@@ -102,7 +104,7 @@ async fn an_invalid_bundle_shows_its_reason_and_its_log() {
 }
 
 #[tokio::test]
-async fn the_newest_valid_upload_is_active_until_the_team_chooses() {
+async fn newest_valid_submission_is_active_until_another_is_chosen() {
     let site = Site::start().await;
     let team = site.team("Alpha").await;
     let token = Some(team.token.as_str());
@@ -115,39 +117,39 @@ async fn the_newest_valid_upload_is_active_until_the_team_chooses() {
         };
         let me = site.get("/api/v1/me", token).await.json(200);
         assert_eq!(me["active_submission"], one["id"]);
-        format!("/api/v1/submissions/{}", text(&one["id"]))
+        format!("/api/v1/submissions/{}", string(&one["id"]))
     };
     let first = site.valid_submission(&team, "first").await;
     assert_eq!(active().await, first);
-    site.later(1);
-    let waiting = text(&site.upload(&team.token, GZIP.to_vec()).await.json(201)["id"]);
+    site.advance(1);
+    let waiting = string(&site.upload(&team.token, GZIP.to_vec()).await.json(201)["id"]);
     let activate = format!("/api/v1/submissions/{waiting}/activate");
     site.post(&activate, token, &json!({}))
         .await
         .problem(409, "conflict", &["wait"]);
     assert_eq!(active().await, first);
-    let outcome = SmokeOutcome::Valid {
+    let outcome = ValidationOutcome::Valid {
         runtime: "native".into(),
         agent_name: "second".into(),
         timing: Vec::new(),
         log: String::new(),
     };
-    site.smoke(outcome).await;
+    site.finish_validation(outcome).await;
     assert!(active().await.ends_with(&waiting));
 
-    site.later(1);
+    site.advance(1);
     let chosen = site
         .post(&format!("{first}/activate"), token, &json!({}))
         .await;
     assert_eq!(chosen.json(200)["active"], true);
     assert_eq!(active().await, first);
     let evaluation = site.evaluate(&team, &first).await;
-    // A choice after the cut is one for the next.
-    site.later(1);
+    // A choice after the cutoff applies to the next one.
+    site.advance(1);
     site.post(&activate, token, &json!({})).await.json(200);
     let playing = site.get(&evaluation, token).await.json(200);
-    assert!(first.ends_with(&text(&playing["submission"])));
-    site.later(1);
+    assert!(first.ends_with(&string(&playing["submission"])));
+    site.advance(1);
     let third = site.valid_submission(&team, "third").await;
     assert_eq!(active().await, third);
     site.post(&format!("{first}/activate"), Some(ADMIN), &json!({}))
@@ -155,20 +157,20 @@ async fn the_newest_valid_upload_is_active_until_the_team_chooses() {
         .problem(403, "forbidden", &[]);
 }
 
-/// What earlier versions have stored may hold anything.
+/// Texts stored by earlier versions may contain control characters.
 #[tokio::test]
-async fn what_agents_wrote_is_shown_as_text() {
+async fn agent_texts_are_escaped() {
     let site = Site::start().await;
     let team = site.team("Alpha").await;
-    let id = text(&site.upload(&team.token, GZIP.to_vec()).await.json(201)["id"]);
-    let outcome = SmokeOutcome::Invalid {
+    let id = string(&site.upload(&team.token, GZIP.to_vec()).await.json(201)["id"]);
+    let outcome = ValidationOutcome::Invalid {
         runtime: None,
         timing: Vec::new(),
         agent_name: Some("a\u{202e}b".into()),
         reason: "expected act, got \u{2066}\u{1b}[2J".into(),
         log: "\u{9b}31m red\n".into(),
     };
-    site.smoke(outcome).await;
+    site.finish_validation(outcome).await;
     let path = format!("/api/v1/submissions/{id}");
     let submission = site.get(&path, Some(&team.token)).await.json(200);
     assert_eq!(submission["agent_name"], "a\\u202eb");
@@ -177,24 +179,24 @@ async fn what_agents_wrote_is_shown_as_text() {
 }
 
 #[tokio::test]
-async fn a_bundle_that_is_too_large_is_refused_with_and_without_an_announced_length() {
+async fn too_large_bundle_is_refused_with_and_without_length() {
     let site = Site::start().await;
     let team = site.team("Alpha").await;
     let limit = MAX_BUNDLE as usize;
-    let mut announced = vec![7; limit + 1];
-    announced[..4].copy_from_slice(&GZIP);
-    let problem = site.upload(&team.token, announced).await.problem(
+    let mut with_length = vec![7; limit + 1];
+    with_length[..4].copy_from_slice(&GZIP);
+    let problem = site.upload(&team.token, with_length).await.problem(
         413,
         "too-large",
         &["65536 bytes", "65537", "leave out"],
     );
     assert_eq!(problem["limit_bytes"], MAX_BUNDLE);
     for bytes in [limit + 1, 20 * limit] {
-        site.upload(&team.token, in_pieces(bytes))
+        site.upload(&team.token, chunked_bundle(bytes))
             .await
             .problem(413, "too-large", &["65536"]);
     }
-    assert_eq!(uploads_left(&site), 0);
+    assert_eq!(temporary_uploads(&site), 0);
     assert_eq!(
         site.get("/api/v1/submissions", Some(&team.token))
             .await
@@ -204,7 +206,7 @@ async fn a_bundle_that_is_too_large_is_refused_with_and_without_an_announced_len
 }
 
 #[tokio::test]
-async fn what_is_no_archive_is_refused_at_once() {
+async fn upload_that_is_no_archive_is_refused() {
     let site = Site::start().await;
     let team = site.team("Alpha").await;
     let upload = |body: Vec<u8>| site.upload(&team.token, body);
@@ -242,17 +244,17 @@ async fn what_is_no_archive_is_refused_at_once() {
     })
     .unwrap()
     .await;
-    assert_eq!(uploads_left(&site), 0);
+    assert_eq!(temporary_uploads(&site), 0);
 }
 
 #[tokio::test]
-async fn an_upload_that_stalls_is_given_up() {
+async fn stalled_upload_times_out() {
     let limits = HttpLimits {
-        upload_rate: LeastRate {
+        min_upload_rate: MinTransferRate {
             bytes_per_s: 1000,
             grace: Duration::from_millis(50),
         },
-        ..patient()
+        ..generous_limits()
     };
     let site = Site::start_with(limits).await;
     let team = site.team("Alpha").await;
@@ -264,14 +266,14 @@ async fn an_upload_that_stalls_is_given_up() {
         "request-timeout",
         &["send it again", "1000 bytes per second"],
     );
-    assert_eq!(uploads_left(&site), 0);
+    assert_eq!(temporary_uploads(&site), 0);
 }
 
 #[tokio::test]
-async fn a_team_cannot_fill_the_queue_with_uploads() {
+async fn pending_uploads_of_a_team_are_limited() {
     let limits = HttpLimits {
         pending_submissions: 2,
-        ..patient()
+        ..generous_limits()
     };
     let site = Site::start_with(limits).await;
     let team = site.team("Alpha").await;
@@ -281,7 +283,7 @@ async fn a_team_cannot_fill_the_queue_with_uploads() {
     let refused = site.upload(&team.token, GZIP.to_vec()).await;
     refused.problem(429, "too-many-pending", &["2 uploads", "verdict"]);
     assert_eq!(refused.header("retry-after"), "30");
-    site.smoke(SmokeOutcome::Valid {
+    site.finish_validation(ValidationOutcome::Valid {
         runtime: "native".into(),
         agent_name: "a".into(),
         timing: Vec::new(),
@@ -292,7 +294,7 @@ async fn a_team_cannot_fill_the_queue_with_uploads() {
 }
 
 #[tokio::test]
-async fn another_teams_submission_looks_like_none() {
+async fn submission_of_another_team_is_not_found() {
     let site = Site::start().await;
     let (owner, other) = (site.team("Owner").await, site.team("Other").await);
     let path = site.valid_submission(&owner, "striker").await;
@@ -324,50 +326,50 @@ async fn another_teams_submission_looks_like_none() {
 }
 
 #[tokio::test]
-async fn a_team_names_and_withdraws_its_own() {
+async fn team_labels_and_withdraws_its_submission() {
     let site = Site::start().await;
     let (team, other) = (site.team("Alpha").await, site.team("Beta").await);
     let path = site.valid_submission(&team, "a").await;
-    let name = async |token: &str, body: Value| {
+    let describe = async |token: &str, body: Value| {
         let request = site.request(reqwest::Method::PATCH, &path, Some(token));
         Answer::of(request.json(&body).send().await.unwrap()).await
     };
-    let named = name(&team.token, json!({ "label": " baseline " }))
+    let labelled = describe(&team.token, json!({ "label": " baseline " }))
         .await
         .json(200);
-    assert_eq!(named["label"], "baseline");
+    assert_eq!(labelled["label"], "baseline");
     for wrong in [json!(""), json!("x".repeat(81))] {
         let body = json!({ "label": wrong });
-        name(&team.token, body)
+        describe(&team.token, body)
             .await
             .problem(422, "invalid-content", &["label", "1 to 80"]);
     }
-    name(&team.token, json!({ "name": "x" })).await.problem(
+    describe(&team.token, json!({ "name": "x" })).await.problem(
         422,
         "invalid-content",
         &["name", "label"],
     );
-    name(&team.token, json!({})).await.problem(
+    describe(&team.token, json!({})).await.problem(
         422,
         "invalid-content",
-        &["label, note, or both", "nothing to change"],
+        &["label, note, or both", "got neither"],
     );
     let note = "line one\nline two";
-    let noted = name(&team.token, json!({ "note": note })).await.json(200);
+    let with_note = describe(&team.token, json!({ "note": note })).await.json(200);
     assert_eq!(
-        (&noted["note"], &noted["label"]),
+        (&with_note["note"], &with_note["label"]),
         (&json!(note), &json!("baseline"))
     );
     for wrong in [json!(" "), json!("x".repeat(2001))] {
-        name(&team.token, json!({ "note": wrong })).await.problem(
+        describe(&team.token, json!({ "note": wrong })).await.problem(
             422,
             "invalid-content",
             &["note", "1 to 2000"],
         );
     }
-    let named = name(&team.token, json!({ "label": null })).await.json(200);
-    assert_eq!(named.get("label"), None);
-    assert_eq!(named["note"], note, "what is left out stays");
+    let labelled = describe(&team.token, json!({ "label": null })).await.json(200);
+    assert_eq!(labelled.get("label"), None);
+    assert_eq!(labelled["note"], note, "omitted fields do not change");
 
     let withdraw = format!("{path}/withdraw");
     for (token, status, slug) in [
@@ -377,7 +379,7 @@ async fn a_team_names_and_withdraws_its_own() {
         site.post(&withdraw, Some(token), &json!({}))
             .await
             .problem(status, slug, &[]);
-        name(token, json!({ "label": "x" }))
+        describe(token, json!({ "label": "x" }))
             .await
             .problem(status, slug, &[]);
     }

@@ -1,4 +1,4 @@
-//! A team's page: its days, what they broke, and what it has uploaded.
+//! The page of a team: its days, fouls and submissions.
 
 use crate::{
     html::{page, texts},
@@ -8,7 +8,7 @@ use reqwest::Method;
 use scraper::{Html, Selector};
 use serde_json::json;
 
-/// Two teams on three days; the first one's scores rise.
+/// Two teams on three days. The first team's scores rise.
 async fn three_days(site: &Site) -> [TestTeam; 2] {
     let teams = [site.team("Alpha").await, site.team("Beta").await];
     for team in &teams {
@@ -21,8 +21,8 @@ async fn three_days(site: &Site) -> [TestTeam; 2] {
         site.post("/api/v1/days", Some(ADMIN), &json!({}))
             .await
             .json(200);
-        site.finish(&result([rate; 3], 700.0)).await;
-        site.finish(&result([0.65; 3], 10.0)).await;
+        site.finish_evaluation(&result([rate; 3], 700.0)).await;
+        site.finish_evaluation(&result([0.65; 3], 10.0)).await;
     }
     teams
 }
@@ -34,12 +34,12 @@ fn attributes(html: &Html, selector: &str, name: &str) -> Vec<String> {
 }
 
 #[tokio::test]
-async fn a_team_sees_how_it_came_where_it_is() {
+async fn team_page_shows_rank_history_and_fouls() {
     let site = Site::start().await;
     let [alpha, beta] = three_days(&site).await;
     let html = page(&site, &format!("/teams/{}", alpha.id)).await;
     assert_eq!(texts(&html, "h1"), ["Alpha"]);
-    // A better score in a worse tier stands below.
+    // A better score in a worse tier has a lower rank.
     let tiles = texts(&html, ".tiles").join(" ");
     for part in ["Rank by 2026-03-03", "▲ Improvable", "70.0 %", "700.0"] {
         assert!(tiles.contains(part), "{part:?} is not in {tiles:?}");
@@ -51,7 +51,7 @@ async fn a_team_sees_how_it_came_where_it_is() {
     );
     for panel in 1..=5 {
         let dots = format!(".panel:nth-of-type({panel}) circle");
-        assert_eq!(texts(&html, &dots).len(), 3, "a point for each day");
+        assert_eq!(texts(&html, &dots).len(), 3, "one point for each day");
     }
     // 3 percentage points of each task to each side, which weigh 0.4, 0.4 and 0.2: 3 × 0.6.
     assert_eq!(
@@ -60,7 +60,7 @@ async fn a_team_sees_how_it_came_where_it_is() {
     );
     assert_eq!(
         texts(&html, ".panel:nth-of-type(2) text.bound"),
-        ["deployable up to here"],
+        ["limit of deployable"],
         "0.7 points an episode are far below the other bound"
     );
     assert_eq!(
@@ -68,14 +68,14 @@ async fn a_team_sees_how_it_came_where_it_is() {
         ["2026-03-03", "2026-03-02", "2026-03-01"]
     );
     let newest = texts(&html, "details tbody tr:first-child td");
-    let told = [&newest[..3], &newest[6..]].concat();
+    let shown_cells = [&newest[..3], &newest[6..]].concat();
     let expected = ["2", "▲ Improvable", "70.0 68.2 – 71.8", "700.0", "0.70"];
-    assert_eq!(told, expected, "{newest:?}");
-    // 7 episodes of 1000 of each task and day.
-    let broken = "section[aria-labelledby=broken] tbody";
-    assert_eq!(texts(&html, &format!("{broken} tr")).len(), 3);
+    assert_eq!(shown_cells, expected, "{newest:?}");
+    // 7 of 1000 episodes of each task on each day.
+    let fouls = "section[aria-labelledby=broken] tbody";
+    assert_eq!(texts(&html, &format!("{fouls} tr")).len(), 3);
     assert_eq!(
-        texts(&html, &format!("{broken} tr:first-child td")),
+        texts(&html, &format!("{fouls} tr:first-child td")),
         ["3000", "21 (1 %)", "0", "0", "0", "0"]
     );
 
@@ -93,27 +93,27 @@ async fn a_team_sees_how_it_came_where_it_is() {
 }
 
 #[tokio::test]
-async fn what_was_not_played_is_for_the_team_and_organisers_alone() {
+async fn submissions_are_shown_to_the_team_and_organisers_only() {
     let site = Site::start().await;
     let [alpha, beta] = three_days(&site).await;
     let path = format!("/teams/{}", alpha.id);
     let own = site.get(&path, Some(&alpha.token)).await.body;
-    assert!(own.contains("plays at the next cut"), "{own}");
+    assert!(own.contains("active at the next cutoff"), "{own}");
     assert!(
         site.get(&path, Some(ADMIN))
             .await
             .body
-            .contains("plays at the next cut")
+            .contains("active at the next cutoff")
     );
     for token in [None, Some(beta.token.as_str())] {
-        let theirs = site.get(&path, token).await;
-        assert_eq!(theirs.status, 200);
-        assert!(!theirs.body.contains("Submissions"), "{}", theirs.body);
+        let answer = site.get(&path, token).await;
+        assert_eq!(answer.status, 200);
+        assert!(!answer.body.contains("Submissions"), "{}", answer.body);
     }
 }
 
 #[tokio::test]
-async fn a_team_without_a_result_says_so_and_a_team_that_is_none_is_not_found() {
+async fn team_page_without_result_and_of_an_unknown_team() {
     let site = Site::start().await;
     let team = site.team("Gamma").await;
     let html = page(&site, &format!("/teams/{}", team.id)).await;
@@ -135,11 +135,11 @@ async fn a_team_without_a_result_says_so_and_a_team_that_is_none_is_not_found() 
 }
 
 #[tokio::test]
-async fn a_disqualified_team_keeps_its_page_with_the_reason() {
+async fn disqualified_team_page_shows_the_reason() {
     let site = Site::start().await;
     let [alpha, _] = three_days(&site).await;
     let path = format!("/api/v1/teams/{}/disqualify", alpha.id);
-    let body = json!({ "reason": "it looked elsewhere", "confirm": "Alpha" });
+    let body = json!({ "reason": "it read the seed", "confirm": "Alpha" });
     let request = site.request(Method::POST, &path, Some(ADMIN)).json(&body);
     let answer = request.send().await.unwrap();
     assert!(
@@ -148,5 +148,5 @@ async fn a_disqualified_team_keeps_its_page_with_the_reason() {
         answer.text().await.unwrap()
     );
     let html = page(&site, &format!("/teams/{}", alpha.id)).await;
-    assert!(texts(&html, "[role=status]")[0].contains("it looked elsewhere"));
+    assert!(texts(&html, "[role=status]")[0].contains("it read the seed"));
 }

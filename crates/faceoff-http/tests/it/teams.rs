@@ -1,14 +1,16 @@
-use crate::site::{ADMIN, Site, text};
+//! Teams and their tokens.
+
+use crate::site::{ADMIN, Site, string};
 use serde_json::json;
 
 #[tokio::test]
-async fn a_team_gets_its_token_once_and_only_the_hash_is_kept() {
+async fn team_token_is_shown_once_and_stored_as_a_hash() {
     let site = Site::start().await;
     let answer = site
         .post("/api/v1/teams", Some(ADMIN), &json!({ "name": "Zoë 1" }))
         .await;
     let team = answer.json(201);
-    let token = text(&team["token"]);
+    let token = string(&team["token"]);
     assert!(token.starts_with("fo_team_"));
     assert_eq!(answer.header("cache-control"), "no-store");
 
@@ -18,16 +20,16 @@ async fn a_team_gets_its_token_once_and_only_the_hash_is_kept() {
     site.store.close().await;
     for file in ["faceoff.sqlite3", "faceoff.sqlite3-wal"] {
         if let Ok(bytes) = std::fs::read(site.folder.path().join(file)) {
-            let clear = bytes
+            let is_found = bytes
                 .windows(token.len())
                 .any(|window| window == token.as_bytes());
-            assert!(!clear, "{file} holds the token in the clear");
+            assert!(!is_found, "{file} holds the token in the clear");
         }
     }
 }
 
 #[tokio::test]
-async fn the_token_opens_the_teams_own_page() {
+async fn team_token_gives_access_to_its_own_view() {
     let site = Site::start().await;
     let team = site.team("Alpha").await;
     let me = site.get("/api/v1/me", Some(&team.token)).await.json(200);
@@ -46,11 +48,11 @@ async fn the_token_opens_the_teams_own_page() {
 }
 
 #[tokio::test]
-async fn a_new_token_ends_the_old_one() {
+async fn new_token_revokes_the_old_one() {
     let site = Site::start().await;
     let team = site.team("Alpha").await;
     let path = format!("/api/v1/teams/{}/token", team.id);
-    let fresh = text(&site.post(&path, Some(ADMIN), &json!({})).await.json(200)["token"]);
+    let fresh = string(&site.post(&path, Some(ADMIN), &json!({})).await.json(200)["token"]);
     assert_ne!(fresh, team.token);
     site.get("/api/v1/me", Some(&fresh)).await.json(200);
     site.get("/api/v1/me", Some(&team.token)).await.problem(
@@ -68,7 +70,7 @@ async fn a_new_token_ends_the_old_one() {
 }
 
 #[tokio::test]
-async fn a_name_that_is_none_or_taken_is_refused_with_the_reason() {
+async fn invalid_or_taken_team_name_is_refused_with_reason() {
     let site = Site::start().await;
     site.team("Alpha").await;
     let create = |name: &'static str| {
@@ -107,7 +109,7 @@ async fn a_name_that_is_none_or_taken_is_refused_with_the_reason() {
 }
 
 #[tokio::test]
-async fn tokens_of_the_wrong_kind_and_no_tokens_are_told_what_to_do() {
+async fn missing_or_wrong_token_gets_an_explanation() {
     let site = Site::start().await;
     let team = site.team("Alpha").await;
     let new = json!({ "name": "Beta" });

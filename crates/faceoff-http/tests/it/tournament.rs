@@ -1,16 +1,15 @@
-//! Tournaments over HTTP: opened, drawn, played by a stand-in for the slots, ruled over, watched and downloaded. Results
-//! are committed to the real store as a slot does.
+//! Tournaments in the API and on pages. A fake slot plays the games: it commits results to the real store as a slot does.
 
-mod archived;
+mod archive;
 pub mod cup;
-mod files;
+mod downloads;
 mod formats;
-mod free_games;
+mod test_games;
 mod game_page;
 mod live;
 mod pages;
-mod paper;
+mod paper_results;
 mod replays;
-mod rulings;
-pub mod slot;
-mod wrong;
+mod decisions;
+pub mod fake_slot;
+mod invalid_input;

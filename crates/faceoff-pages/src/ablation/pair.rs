@@ -1,4 +1,5 @@
-//! `/submissions/{id}/ablation/{profile}/{task}/{episode}`: an episode in the ideal simulator and with a perturbation.
+//! `/submissions/{id}/ablation/{profile}/{task}/{episode}`: an episode in the ideal simulator and with a perturbation, side by
+//! side.
 
 use crate::{
     assets,
@@ -14,7 +15,7 @@ use faceoff_service::{
     problem::Problem,
     viewer::Viewer,
     views::{
-        ablation_clips::{AblationClips, Differing},
+        ablation_clips::{AblationClips, DifferingEpisode},
         season::SeasonHead,
         submission, team,
     },
@@ -31,14 +32,13 @@ struct Page {
     task: Task,
     episode: u32,
     sides: Vec<Side>,
-    /// The nearest episodes of the task that differ.
+    /// The nearest episodes of the task with different outcomes.
     before: Option<u32>,
     after: Option<u32>,
     styles: [&'static str; 2],
     script: &'static str,
 }
 
-/// An episode of an ablation, twice.
 pub(crate) async fn page(
     viewer: Result<Viewer, Problem>,
     State(app): State<App>,
@@ -50,32 +50,32 @@ pub(crate) async fn page(
         task,
         episode,
     } = path?;
-    let clips = AblationClips::of(&app, viewer?, id).await?;
+    let clips = AblationClips::load(&app, viewer?, id).await?;
     let mut sides = Vec::new();
-    for (element, of) in [("replay-a", Profile::Ideal), ("replay-b", profile)] {
-        let found = clips.episode(&app, of, task, episode).await?;
-        let api = format!("{}/ablation/{of}/{task}/{episode}", paths::submission(id));
-        sides.push(Side::of(element, &found, &api, of.to_string()));
+    for (element_id, shown) in [("replay-a", Profile::Ideal), ("replay-b", profile)] {
+        let clip = clips.episode(&app, shown, task, episode).await?;
+        let api = format!("{}/ablation/{shown}/{task}/{episode}", paths::submission(id));
+        sides.push(Side::new(element_id, &clip, &api, shown.to_string()));
     }
-    let differing = clips.differing(&app).await?;
-    let of_task = || {
+    let differing = clips.differing_episodes(&app).await?;
+    let differing_episodes = || {
         let all = differing.get(&profile).into_iter().flatten();
-        let of_task = all.filter(|Differing { ideal, .. }| ideal.task == task);
-        of_task.map(|Differing { ideal, .. }| ideal.episode)
+        let task_episodes = all.filter(|DifferingEpisode { ideal, .. }| ideal.task == task);
+        task_episodes.map(|DifferingEpisode { ideal, .. }| ideal.episode)
     };
     let submission = submission::find(&app, id).await?;
     let team = team::find(&app, submission.team).await?;
-    let season = SeasonHead::now(&app).await?;
+    let season = SeasonHead::load(&app).await?;
     render(&Page {
-        frame: Frame::of(&app, season.name, ""),
+        frame: Frame::for_app(&app, season.name, ""),
         id,
         team: team.name.to_string(),
         profile,
         task,
         episode,
         sides,
-        before: of_task().filter(|other| *other < episode).max(),
-        after: of_task().filter(|other| *other > episode).min(),
+        before: differing_episodes().filter(|other| *other < episode).max(),
+        after: differing_episodes().filter(|other| *other > episode).min(),
         styles: [assets::EPISODES_STYLE.url(), assets::REPLAY_STYLE.url()],
         script: assets::REPLAY_SCRIPT.url(),
     })

@@ -1,42 +1,41 @@
-//! Where the other boards of a page are: by the query that asked for this one, with a part of it changed.
+//! Addresses of other boards: the query of the current page with one part changed.
 
-use crate::query::asking;
+use crate::query::with_query;
 use faceoff_api::requests::{BoardColumn, BoardPageQuery, BoardSort};
 use jiff::civil::Date;
 
-/// Path and query of a board's page.
+/// Path and query of the page of a board.
 pub(super) struct Address<'a> {
     path: String,
     query: &'a BoardPageQuery,
 }
 
 impl<'a> Address<'a> {
-    pub(super) fn of(path: impl Into<String>, query: &'a BoardPageQuery) -> Self {
+    pub(super) fn new(path: impl Into<String>, query: &'a BoardPageQuery) -> Self {
         Self {
             path: path.into(),
             query,
         }
     }
 
-    /// The same board of another task, in board order.
-    pub(super) fn at(&self, path: &str) -> String {
-        written(path, self.query, self.query.day, None)
+    /// The board of another task, sorted by rank.
+    pub(super) fn with_path(&self, path: &str) -> String {
+        address(path, self.query, self.query.day, None)
     }
 
-    /// The board of a day; `None`: of now.
-    pub(super) fn of_day(&self, day: Option<Date>) -> String {
-        written(&self.path, self.query, day, self.query.sort)
+    /// The board of a day; `None`: the latest.
+    pub(super) fn with_day(&self, day: Option<Date>) -> String {
+        address(&self.path, self.query, day, self.query.sort)
     }
 
-    /// Sorted by a column.
-    pub(super) fn sorted(&self, sort: BoardSort) -> String {
-        let is_usual = sort.column == BoardColumn::Place && !sort.is_reversed;
-        let sort = (!is_usual).then_some(sort);
-        written(&self.path, self.query, self.query.day, sort)
+    pub(super) fn with_sort(&self, sort: BoardSort) -> String {
+        let is_default = sort.column == BoardColumn::Place && !sort.is_reversed;
+        let sort = (!is_default).then_some(sort);
+        address(&self.path, self.query, self.query.day, sort)
     }
 }
 
-fn written(
+fn address(
     path: &str,
     query: &BoardPageQuery,
     day: Option<Date>,
@@ -47,7 +46,7 @@ fn written(
         sort,
         ..query.clone()
     };
-    asking(path, &query)
+    with_query(path, &query)
 }
 
 #[cfg(test)]
@@ -56,7 +55,7 @@ mod tests {
     use jiff::civil::date;
 
     #[test]
-    fn a_link_keeps_what_was_asked_for_and_changes_a_part() {
+    fn address_changes_one_part_of_the_query() {
         let query = BoardPageQuery {
             division: Some("Bachelor students".parse().unwrap()),
             day: Some(date(2026, 3, 2)),
@@ -66,24 +65,24 @@ mod tests {
             }),
             ..BoardPageQuery::default()
         };
-        let address = Address::of("/tasks/hit", &query);
+        let address = Address::new("/tasks/hit", &query);
         assert_eq!(
-            address.of_day(None),
+            address.with_day(None),
             "/tasks/hit?division=Bachelor+students&sort=-points"
         );
         assert_eq!(
-            address.at("/"),
+            address.with_path("/"),
             "/?division=Bachelor+students&day=2026-03-02"
         );
-        let usual = BoardSort {
+        let by_rank = BoardSort {
             column: BoardColumn::Place,
             is_reversed: false,
         };
         assert_eq!(
-            address.sorted(usual),
+            address.with_sort(by_rank),
             "/tasks/hit?division=Bachelor+students&day=2026-03-02"
         );
         let plain = BoardPageQuery::default();
-        assert_eq!(Address::of("/", &plain).of_day(None), "/");
+        assert_eq!(Address::new("/", &plain).with_day(None), "/");
     }
 }

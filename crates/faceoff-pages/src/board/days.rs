@@ -1,23 +1,23 @@
-//! From day to day.
+//! Navigation between the evaluation days of a board.
 
 use super::address::Address;
 use faceoff_api::views::board::BoardView;
-use faceoff_service::views::trail::Trail;
+use faceoff_service::views::board_timeline::BoardTimeline;
 use jiff::civil::Date;
 
-/// The days of a board, the shown one among them.
+/// The evaluation days of a board.
 pub(super) struct Days {
-    /// By the results of the days up to this one; `None` before the first.
+    /// The board counts the results up to this day; `None` before the first day.
     pub(super) shown: Option<Date>,
-    /// It is an earlier one than the newest.
+    /// Is the shown day not the latest?
     pub(super) is_past: bool,
     pub(super) earlier: Option<Day>,
     pub(super) later: Option<Day>,
-    /// The newer first.
+    /// Newest first.
     pub(super) all: Vec<Day>,
 }
 
-/// A day, and where its board is.
+/// A day with the address of its board.
 pub(super) struct Day {
     pub(super) day: Date,
     pub(super) address: String,
@@ -25,23 +25,23 @@ pub(super) struct Day {
 }
 
 impl Days {
-    pub(super) fn of(board: &BoardView, trail: &Trail, address: &Address) -> Self {
-        let newest = trail.days.last().copied();
+    pub(super) fn new(board: &BoardView, timeline: &BoardTimeline, address: &Address) -> Self {
+        let newest = timeline.days.last().copied();
         let shown = board.day.or(newest);
-        // The newest is shown without naming it, so that who stays there sees the next one.
+        // The address of the latest day has no date, so that an open page moves on to the next day.
         let day = |day: Date| Day {
             day,
-            address: address.of_day((Some(day) != newest).then_some(day)),
+            address: address.with_day((Some(day) != newest).then_some(day)),
             is_shown: Some(day) == shown,
         };
-        let mut days = trail.days.iter().copied();
+        let mut days = timeline.days.iter().copied();
         let earlier = days.clone().rev().find(|day| Some(*day) < shown);
         Self {
             shown,
             is_past: shown < newest,
             earlier: earlier.map(day),
             later: days.find(|day| Some(*day) > shown).map(day),
-            all: trail.days.iter().rev().copied().map(day).collect(),
+            all: timeline.days.iter().rev().copied().map(day).collect(),
         }
     }
 }

@@ -1,62 +1,58 @@
-//! Whose board a page is, and which others there are.
+//! The heading of a board: stage, notices, rules, and links to other boards.
 
 use super::address::Address;
-use crate::{figures::minute, frame::PageProblem, standing};
+use crate::{figures::utc_minute, frame::PageProblem, board_status};
 use faceoff_api::views::{
     board::BoardView,
-    day::NextCut,
+    day::NextCutoff,
     ruling::RulingView,
     stage::{PhaseView, StageView},
 };
 use faceoff_service::{
     app::App,
     problem::Problem,
-    views::{sight::Sight, stage},
+    views::{visibility::Visibility, stage},
 };
 use faceoff_types::{DivisionName, Task, TaskWeights, TierBounds};
 use jiff::Timestamp;
 
-/// What stands above a board.
 pub(super) struct Heading {
     pub(super) stage: String,
-    /// Since when, until when.
+    /// Dates of the stage.
     pub(super) times: String,
-    /// When the next day starts.
-    pub(super) next: Option<NextCut>,
-    /// Of the rules, if the stage has had several.
+    pub(super) next: Option<NextEvaluation>,
+    /// The revision of the rules, if the stage has several.
     pub(super) rules: Option<String>,
     pub(super) others: Vec<OtherBoard>,
-    /// Of which the board can be asked for; with the one that is shown, if one is.
+    /// Divisions with a board of their own; `division` is the shown one.
     pub(super) divisions: Vec<DivisionName>,
     pub(super) division: Option<DivisionName>,
-    /// The query that asks for this board of all teams.
-    pub(super) of_all: String,
-    /// The organiser holds the queue.
+    /// Query of this board with all teams.
+    pub(super) all_teams: String,
+    /// The queue is paused.
     pub(super) paused: Option<RulingView>,
-    /// The organiser has frozen the board.
+    /// The organisers have frozen the board.
     pub(super) frozen: Option<RulingView>,
-    /// What its rows are, for the table's caption.
-    pub(super) rows: String,
-    /// What the tasks weigh, and the bounds of the tiers.
+    /// What a row contains, for the caption of the table.
+    pub(super) rows_caption: String,
     pub(super) weights: TaskWeights,
     pub(super) tier_bounds: TierBounds,
-    /// The perturbations have magnitudes of their own.
-    pub(super) own_magnitudes: bool,
-    /// What decides in the end, if that is something else.
-    pub(super) still_to_come: Option<&'static str>,
-    /// Who sees it, if not everybody.
-    pub(super) blind: Option<&'static str>,
+    /// The stage has its own magnitudes of the perturbations.
+    pub(super) has_own_magnitudes: bool,
+    /// Set while only the final day counts and it is still to come.
+    pub(super) final_day_notice: Option<&'static str>,
+    /// Who sees a blind board.
+    pub(super) blind_notice: Option<&'static str>,
     /// Is it hidden from the viewer?
     pub(super) is_hidden: bool,
-    pub(super) result: String,
+    pub(super) result_status: String,
     pub(super) is_provisional: bool,
-    /// The overall board and those of the tasks.
+    /// The overall board and the boards of the tasks.
     pub(super) tabs: Vec<Tab>,
 }
 
 pub(super) struct OtherBoard {
     pub(super) label: String,
-    /// The query that asks for it.
     pub(super) query: String,
 }
 
@@ -67,7 +63,7 @@ pub(super) struct Tab {
     pub(super) is_shown: bool,
 }
 
-/// The overall board's and the tasks' names, with their paths.
+/// Task, name and path of each board.
 const TABS: [(Option<Task>, &str, &str); 4] = [
     (None, "Overall", "/"),
     (Some(Task::Hit), "Hit", "/tasks/hit"),
@@ -76,14 +72,14 @@ const TABS: [(Option<Task>, &str, &str); 4] = [
 ];
 
 impl Heading {
-    pub(super) async fn of(
+    pub(super) async fn load(
         app: &App,
         board: &BoardView,
-        sight: &Sight,
+        visibility: &Visibility,
         address: &Address<'_>,
         paused: Option<RulingView>,
     ) -> Result<Self, PageProblem> {
-        let is_hidden = sight.is_hidden(board.stage);
+        let is_hidden = visibility.is_hidden(board.stage);
         let stages = stage::all(app).await?;
         let mut others = Vec::new();
         let mut heading = None;
@@ -96,7 +92,7 @@ impl Heading {
                 }
                 others.push(OtherBoard {
                     label: if is_shown {
-                        format!("{}, rules of {}", stage.name, minute(rules.since))
+                        format!("{}, rules of {}", stage.name, utc_minute(rules.since))
                     } else {
                         stage.name.to_string()
                     },
@@ -110,31 +106,31 @@ impl Heading {
             if is_shown {
                 heading = Some(Self {
                     times: times(&stage),
-                    next: stage.next_cut.clone(),
+                    next: stage.next_cut.as_ref().map(NextEvaluation::new),
                     rules: (stage.revisions.len() > 1).then(|| {
-                        format!("revision {}, since {}", board.revision, minute(board.since))
+                        format!("revision {}, since {}", board.revision, utc_minute(board.since))
                     }),
                     stage: stage.name.to_string(),
                     others: Vec::new(),
                     divisions: app.store.divisions().await.map_err(Problem::from)?,
                     division: board.division.clone(),
-                    of_all: format!("?stage={}&revision={}", board.stage, board.revision),
+                    all_teams: format!("?stage={}&revision={}", board.stage, board.revision),
                     paused: None,
                     frozen: board.frozen.clone(),
-                    rows: standing::rows(board),
+                    rows_caption: board_status::rows_caption(board),
                     weights: board.weights,
                     tier_bounds: board.tier_bounds,
-                    own_magnitudes: board.perturbations.is_some(),
-                    still_to_come: standing::still_to_come(board),
-                    blind: standing::blind(board, is_hidden),
+                    has_own_magnitudes: board.perturbations.is_some(),
+                    final_day_notice: board_status::final_day_notice(board),
+                    blind_notice: board_status::blind_notice(board, is_hidden),
                     is_hidden,
-                    result: standing::result(board),
+                    result_status: board_status::result_status(board),
                     is_provisional: board.provisional,
                     tabs: tabs(board.task, address),
                 });
             }
         }
-        let heading = heading.ok_or_else(|| Problem::internal("a board without its stage"))?;
+        let heading = heading.ok_or_else(|| Problem::internal("board without its stage"))?;
         Ok(Self {
             others,
             paused,
@@ -143,24 +139,47 @@ impl Heading {
     }
 }
 
+/// Time of the next evaluation of the stage.
+pub(super) struct NextEvaluation {
+    /// `None` where an organiser starts the day.
+    pub(super) at: Option<Timestamp>,
+    pub(super) text: String,
+}
+
+impl NextEvaluation {
+    fn new(next: &NextCutoff) -> Self {
+        let text = match next.at {
+            Some(at) => {
+                let local = at.to_zoned(next.zone.time_zone());
+                format!("{} {}", local.strftime("%-d %B, %H:%M"), next.zone)
+            }
+            None => format!(
+                "{} at the earliest (started by the organisers)",
+                next.day.strftime("%-d %B")
+            ),
+        };
+        Self { at: next.at, text }
+    }
+}
+
 fn tabs(shown: Option<Task>, address: &Address<'_>) -> Vec<Tab> {
     let tab = |(task, name, path): (Option<Task>, &'static str, &str)| Tab {
         name,
-        address: address.at(path),
+        address: address.with_path(path),
         is_shown: task == shown,
     };
     TABS.into_iter().map(tab).collect()
 }
 
 fn times(stage: &StageView) -> String {
-    let there = |at: Timestamp| {
-        let there = at.to_zoned(stage.zone.time_zone());
-        format!("{} {}", there.strftime("%Y-%m-%d %H:%M:%S"), stage.zone)
+    let local = |at: Timestamp| {
+        let local = at.to_zoned(stage.zone.time_zone());
+        format!("{} {}", local.strftime("%Y-%m-%d %H:%M:%S"), stage.zone)
     };
     match (stage.phase, stage.closes_at) {
-        (PhaseView::Upcoming, _) => format!("opens {}", there(stage.opens_at)),
-        (PhaseView::Open, Some(at)) => format!("open until {}", there(at)),
+        (PhaseView::Upcoming, _) => format!("opens {}", local(stage.opens_at)),
+        (PhaseView::Open, Some(at)) => format!("open until {}", local(at)),
         (PhaseView::Open, None) => "open".to_owned(),
-        (PhaseView::Closed, at) => format!("closed {}", there(at.unwrap_or(stage.opens_at))),
+        (PhaseView::Closed, at) => format!("closed {}", local(at.unwrap_or(stage.opens_at))),
     }
 }

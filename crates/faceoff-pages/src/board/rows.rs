@@ -1,26 +1,26 @@
-//! A board's rows in words, and the groups that they stand in.
+//! Rows of a board as text, grouped by tier.
 
 use crate::figures::{self, Rate};
 use faceoff_api::views::{
     board::{BoardRow, BoardView},
     task::TaskView,
 };
-use faceoff_service::views::trail::Before;
+use faceoff_service::views::board_timeline::EarlierBoard;
 use faceoff_types::{DivisionName, EvaluationId, Task, TaskWeights, TeamId, Tier, ViolationCounts};
 use jiff::civil;
 use std::{cmp::Ordering, collections::BTreeMap};
 
-/// A lower probability that the tier is luck is not worth a reader's time.
-const NOTABLE_TIER_CHANGE: f64 = 0.01;
+/// Least probability of another tier that is shown.
+const MIN_SHOWN_TIER_CHANGE: f64 = 0.01;
 
-/// Who a row is about.
-pub(super) struct Who {
+/// The team of a row with its rank.
+pub(super) struct TeamCell {
     pub(super) rank: u32,
-    /// Since the day before, if the board had one.
-    pub(super) moved: Option<Moved>,
-    /// Whom the episodes cannot tell it from, if that is another team.
-    pub(super) level_with: Option<String>,
-    /// Of the tier on this board; `None` where that hardly is luck, and of means.
+    /// Change since the day before, if the board has one.
+    pub(super) change: Option<RankChange>,
+    /// The first team of the rank group, if that is another team.
+    pub(super) tied_with: Option<String>,
+    /// Probability of another tier; `None` below [`MIN_SHOWN_TIER_CHANGE`] and for means of several days.
     pub(super) tier_change: Option<String>,
     pub(super) team: String,
     pub(super) team_id: TeamId,
@@ -28,62 +28,63 @@ pub(super) struct Who {
     pub(super) agent: Option<String>,
     pub(super) evaluation: EvaluationId,
     pub(super) day: civil::Date,
-    /// Why it is a turn beside the day's own.
+    /// Reason of an extra evaluation.
     pub(super) extra_turn: Option<String>,
-    /// How many days the row is a mean of, if of several.
+    /// Number of days in the mean, if there are several.
     pub(super) days: Option<usize>,
-    /// How it was evaluated, where the rows of the board differ in that.
+    /// Conditions of the evaluation, where they differ between rows.
     pub(super) setting: Option<String>,
-    /// Its tier, where the row does not stand below it.
-    pub(super) tier: Option<TierWords>,
+    /// The tier, where rows are not grouped by tier.
+    pub(super) tier: Option<TierLabel>,
 }
 
-/// Where a team has gone since the day before.
-pub(super) struct Moved {
-    /// For the eye; empty of who stands where they stood.
-    pub(super) sign: String,
+/// Change of a team's rank and score since the day before.
+pub(super) struct RankChange {
+    /// Visible text; empty if the rank is unchanged.
+    pub(super) symbol: String,
     pub(super) class: &'static str,
-    pub(super) told: String,
-    /// By how many percentage points its score has changed; `None` of a new one, and of one that did not.
+    /// Text for screen readers.
+    pub(super) description: String,
+    /// Change of the score in percentage points; `None` for a new team and for an unchanged score.
     pub(super) score: Option<String>,
 }
 
-pub(super) struct TierWords {
+pub(super) struct TierLabel {
     pub(super) name: &'static str,
     pub(super) title: &'static str,
-    pub(super) sign: &'static str,
+    pub(super) symbol: &'static str,
     pub(super) bounds: String,
 }
 
-/// Rows below a tier's name; or all, where they are sorted by something else.
+/// Rows of one tier; all rows if the board is not sorted by rank.
 pub(super) struct Group<Row> {
-    pub(super) tier: Option<TierWords>,
+    pub(super) tier: Option<TierLabel>,
     pub(super) rows: Vec<Row>,
 }
 
-/// How a result came about; results of different settings do not compare.
+/// Conditions of an evaluation. Results under different conditions are not comparable.
 fn setting(row: &BoardRow) -> String {
     format!(
         "{} profile, {} episodes per task, rules {}",
         row.profile,
-        episodes(row),
+        episodes_per_day(row),
         row.ruleset
     )
 }
 
-/// Of the task with the most, on a day.
-fn episodes(row: &BoardRow) -> u32 {
+/// Largest number of episodes of a task per day.
+fn episodes_per_day(row: &BoardRow) -> u32 {
     let episodes = row.tasks.values().map(|task| task.episodes);
-    of_a_day(row, episodes.max().unwrap_or(0))
+    per_day(row, episodes.max().unwrap_or(0))
 }
 
-/// Episodes of a day, of those of all that the row is made of.
-fn of_a_day(row: &BoardRow, episodes: u32) -> u32 {
+/// Splits episodes over the days of the row.
+fn per_day(row: &BoardRow, episodes: u32) -> u32 {
     let days = u32::try_from(row.evaluations.len()).unwrap_or(u32::MAX);
     episodes / days.max(1)
 }
 
-/// The setting of the whole board; `None` where its rows differ.
+/// The conditions of all rows; `None` if they differ.
 pub(super) fn common_setting(rows: &[BoardRow]) -> Option<String> {
     let first = setting(rows.first()?);
     rows.iter()
@@ -91,19 +92,19 @@ pub(super) fn common_setting(rows: &[BoardRow]) -> Option<String> {
         .then_some(first)
 }
 
-/// What of a row is said by comparing it with others.
+/// The board around a row: what a row shows by comparison with others.
 pub(super) struct Context<'a> {
     board: &'a BoardView,
-    before: Option<&'a Before>,
+    before: Option<&'a EarlierBoard>,
     has_common_setting: bool,
-    is_usual: bool,
-    /// Of rank groups with more than one team the first.
+    is_by_rank: bool,
+    /// The first team of each rank group with several teams.
     leaders: BTreeMap<u32, TeamId>,
 }
 
 impl<'a> Context<'a> {
-    /// `is_usual`: the rows stand tier by tier.
-    pub(super) fn of(board: &'a BoardView, before: Option<&'a Before>, is_usual: bool) -> Self {
+    /// `is_by_rank`: rows are grouped by tier.
+    pub(super) fn new(board: &'a BoardView, before: Option<&'a EarlierBoard>, is_by_rank: bool) -> Self {
         let mut groups: BTreeMap<u32, Vec<&BoardRow>> = BTreeMap::new();
         for row in &board.rows {
             groups.entry(row.rank_group).or_default().push(row);
@@ -117,17 +118,17 @@ impl<'a> Context<'a> {
             board,
             before,
             has_common_setting: common_setting(&board.rows).is_some(),
-            is_usual,
+            is_by_rank,
             leaders: leaders.collect(),
         }
     }
 
-    /// Are there teams that cannot be told apart?
-    pub(super) fn has_groups(&self) -> bool {
+    /// Are teams statistically tied?
+    pub(super) fn has_ties(&self) -> bool {
         !self.leaders.is_empty()
     }
 
-    fn level_with(&self, row: &BoardRow) -> Option<String> {
+    fn tied_with(&self, row: &BoardRow) -> Option<String> {
         let leader = self.leaders.get(&row.rank_group)?;
         let rows = self.board.rows.iter();
         let mut others = rows.filter(|other| other.team_id != row.team_id);
@@ -135,46 +136,46 @@ impl<'a> Context<'a> {
         Some(leader.team.to_string())
     }
 
-    fn moved(&self, row: &BoardRow) -> Option<Moved> {
+    fn change(&self, row: &BoardRow) -> Option<RankChange> {
         let before = self.before?;
-        let Some(stood) = before.stood(row.team_id) else {
-            return Some(Moved {
-                sign: "new".to_owned(),
+        let Some(previous) = before.rank_of(row.team_id) else {
+            return Some(RankChange {
+                symbol: "new".to_owned(),
                 class: "new",
-                told: format!(": not on the board of {}", before.day),
+                description: format!(": not on the board of {}", before.day),
                 score: None,
             });
         };
-        let (sign, class, places) = match row.rank.cmp(&stood.rank) {
-            Ordering::Less => ("▲", "up", stood.rank - row.rank),
-            Ordering::Greater => ("▼", "down", row.rank - stood.rank),
+        let (symbol, class, places) = match row.rank.cmp(&previous.rank) {
+            Ordering::Less => ("▲", "up", previous.rank - row.rank),
+            Ordering::Greater => ("▼", "down", row.rank - previous.rank),
             Ordering::Equal => ("", "same", 0),
         };
         let score = match self.board.task.and_then(|task| row.tasks.get(&task)) {
-            Some(of_task) => 100.0 * of_task.success_rate,
+            Some(result) => 100.0 * result.success_rate,
             None => row.score,
         };
-        let score = figures::signed(score - stood.score);
-        Some(Moved {
-            sign: match places {
+        let score = figures::signed(score - previous.score);
+        Some(RankChange {
+            symbol: match places {
                 0 => String::new(),
-                _ => format!("{sign} {places}"),
+                _ => format!("{symbol} {places}"),
             },
             class,
-            told: format!(" {class} since {}", before.day),
+            description: format!(" {class} since {}", before.day),
             score: (score != "0.0").then_some(score),
         })
     }
 
-    fn who(&self, row: &BoardRow) -> Who {
+    fn team_cell(&self, row: &BoardRow) -> TeamCell {
         let change = row.tier_change_probability;
-        Who {
+        TeamCell {
             rank: row.rank,
-            moved: self.moved(row),
-            level_with: self.level_with(row),
+            change: self.change(row),
+            tied_with: self.tied_with(row),
             tier_change: change
-                .filter(|chance| *chance >= NOTABLE_TIER_CHANGE)
-                .map(figures::chance),
+                .filter(|chance| *chance >= MIN_SHOWN_TIER_CHANGE)
+                .map(figures::probability),
             team: row.team.to_string(),
             team_id: row.team_id,
             division: row.division.clone(),
@@ -184,24 +185,24 @@ impl<'a> Context<'a> {
             extra_turn: row.extra_turn.clone(),
             days: (row.evaluations.len() > 1).then_some(row.evaluations.len()),
             setting: (!self.has_common_setting).then(|| setting(row)),
-            tier: (!self.is_usual).then(|| self.tier(row.tier)),
+            tier: (!self.is_by_rank).then(|| self.tier(row.tier)),
         }
     }
 
-    fn tier(&self, tier: Tier) -> TierWords {
-        TierWords {
+    fn tier(&self, tier: Tier) -> TierLabel {
+        TierLabel {
             name: tier.as_str(),
             title: tier.title(),
-            sign: figures::tier_sign(tier),
+            symbol: figures::tier_symbol(tier),
             bounds: figures::tier_bounds(tier, &self.board.tier_bounds),
         }
     }
 
-    /// Tiers without a team are left out.
+    /// Groups the rows; tiers without a team are omitted.
     pub(super) fn groups<Row>(&self, row: impl Fn(&BoardRow) -> Row) -> Vec<Group<Row>> {
         let rows = &self.board.rows;
-        let mut groups: Vec<Group<Row>> = if self.is_usual {
-            let of_tier = |tier: Tier| Group {
+        let mut groups: Vec<Group<Row>> = if self.is_by_rank {
+            let tier_group = |tier: Tier| Group {
                 tier: Some(self.tier(tier)),
                 rows: rows
                     .iter()
@@ -209,7 +210,7 @@ impl<'a> Context<'a> {
                     .map(&row)
                     .collect(),
             };
-            Tier::ALL.into_iter().map(of_tier).collect()
+            Tier::ALL.into_iter().map(tier_group).collect()
         } else {
             vec![Group {
                 tier: None,
@@ -223,39 +224,39 @@ impl<'a> Context<'a> {
 
 /// A row of the overall board.
 pub(super) struct OverallRow {
-    pub(super) who: Who,
+    pub(super) team: TeamCell,
     pub(super) score: Rate,
-    /// In the order of `Task::ALL`; `None` where the task was not played.
+    /// In the order of `Task::ALL`; `None`: task not played.
     pub(super) rates: Vec<(Task, Option<Rate>)>,
     pub(super) penalty_points: String,
     pub(super) per_episode: String,
 }
 
 impl OverallRow {
-    pub(super) fn of(row: &BoardRow, context: &Context, weights: &TaskWeights) -> Self {
+    pub(super) fn new(row: &BoardRow, context: &Context, weights: &TaskWeights) -> Self {
         Self {
-            who: context.who(row),
+            team: context.team_cell(row),
             score: Rate::of_score(row.score, &row.tasks, weights),
             rates: Task::ALL
                 .into_iter()
-                .map(|task| (task, row.tasks.get(&task).map(Rate::of)))
+                .map(|task| (task, row.tasks.get(&task).map(Rate::new)))
                 .collect(),
-            penalty_points: figures::one(row.penalty_points),
-            per_episode: figures::per_episode(row.penalty_points, episodes(row)),
+            penalty_points: figures::one_decimal(row.penalty_points),
+            per_episode: figures::per_episode(row.penalty_points, episodes_per_day(row)),
         }
     }
 }
 
-/// A row of a task's board.
+/// A row of the board of a task.
 pub(super) struct TaskRow {
-    pub(super) who: Who,
+    pub(super) team: TeamCell,
     pub(super) rate: Rate,
     pub(super) penalty_points: String,
     pub(super) per_episode: String,
     pub(super) details: Option<TaskDetails>,
 }
 
-/// What is told of a row once its day is released.
+/// Details that are public once the day is released.
 pub(super) struct TaskDetails {
     pub(super) violations: ViolationCounts,
     pub(super) mean_ms: String,
@@ -264,7 +265,7 @@ pub(super) struct TaskDetails {
 }
 
 impl TaskDetails {
-    fn of(result: &TaskView) -> Option<Self> {
+    fn new(result: &TaskView) -> Option<Self> {
         let time = result.computation_time_s?;
         Some(Self {
             violations: result.violations?,
@@ -276,16 +277,16 @@ impl TaskDetails {
 }
 
 impl TaskRow {
-    pub(super) fn of(row: &BoardRow, result: &TaskView, context: &Context) -> Self {
+    pub(super) fn new(row: &BoardRow, result: &TaskView, context: &Context) -> Self {
         Self {
-            who: context.who(row),
-            rate: Rate::of(result),
-            penalty_points: figures::one(result.penalty_points),
+            team: context.team_cell(row),
+            rate: Rate::new(result),
+            penalty_points: figures::one_decimal(result.penalty_points),
             per_episode: figures::per_episode(
                 result.penalty_points,
-                of_a_day(row, result.episodes),
+                per_day(row, result.episodes),
             ),
-            details: TaskDetails::of(result),
+            details: TaskDetails::new(result),
         }
     }
 }

@@ -1,35 +1,35 @@
-//! How often values lie where.
+//! Histograms.
 
 use super::scale::{BOTTOM, GRID, LEFT, RIGHT, Scale, Tick, short};
 use crate::figures;
 
-/// The most words below the columns: more would run into each other on a phone.
-const MOST_EDGES: usize = 8;
+/// Largest number of labels below the columns; more would overlap on a phone.
+const MAX_LABELS: usize = 8;
 
-/// Columns of one width from zero on. Those that stand beside each other have one axis.
+/// Columns of equal width, starting at zero. Histograms beside each other share them.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Bins {
-    /// In the values' unit.
+    /// In the unit of the values.
     pub(crate) width: f64,
     pub(crate) count: usize,
 }
 
-/// Counts of values, ready to be drawn by `chart.html`.
+/// Counts of values, in the form that `chart.html` draws.
 #[derive(Debug)]
 pub(crate) struct Histogram {
     pub(crate) title: String,
     pub(crate) unit: &'static str,
     pub(crate) grid: Vec<Tick>,
-    /// Where columns begin and end.
+    /// Labels at the edges of columns.
     pub(crate) edges: Vec<Tick>,
-    /// All columns, an SVG path.
+    /// All columns as one SVG path.
     pub(crate) columns: String,
-    /// What it shows in a sentence, for whoever does not see it.
-    pub(crate) told: String,
+    /// Text alternative for screen readers.
+    pub(crate) description: String,
 }
 
 impl Bins {
-    /// Enough of this width for the largest of the values.
+    /// As many columns as the largest value needs.
     #[expect(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
@@ -43,24 +43,23 @@ impl Bins {
         }
     }
 
-    /// How many values lie in each; on an edge, a value lies in the column after it.
+    /// Values per column; a value on an edge belongs to the column after it.
     pub(crate) fn counts(self, values: &[f64]) -> Vec<usize> {
         let mut counts = vec![0; self.count];
         for value in values {
-            let column = (0..self.count).rev().find(|at| self.from(*at) <= *value);
+            let column = (0..self.count).rev().find(|at| self.start(*at) <= *value);
             counts[column.unwrap_or_default()] += 1;
         }
         counts
     }
 
-    /// Where a column begins.
-    fn from(self, column: usize) -> f64 {
+    fn start(self, column: usize) -> f64 {
         self.width * column as f64
     }
 
-    /// Where a column begins and ends, in words.
-    pub(crate) fn words(self, column: usize) -> String {
-        let [from, to] = [column, column + 1].map(|edge| short(self.from(edge)));
+    /// Range of a column as text.
+    pub(crate) fn label(self, column: usize) -> String {
+        let [from, to] = [column, column + 1].map(|edge| short(self.start(edge)));
         format!("{from} to {to}")
     }
 
@@ -69,35 +68,35 @@ impl Bins {
     }
 
     fn edges(self) -> Vec<Tick> {
-        let step = self.count.div_ceil(MOST_EDGES);
+        let step = self.count.div_ceil(MAX_LABELS);
         let edges = (0..=self.count).step_by(step).map(|edge| Tick {
-            at: figures::one(self.x(edge)),
-            word: short(self.from(edge)),
+            at: figures::one_decimal(self.x(edge)),
+            label: short(self.start(edge)),
         });
         edges.collect()
     }
 }
 
 impl Histogram {
-    /// `most`: the largest count of those beside it.
-    pub(crate) fn of(
+    /// `max`: the largest count of all histograms beside each other.
+    pub(crate) fn new(
         title: &str,
         unit: &'static str,
         bins: Bins,
         counts: &[usize],
-        most: usize,
+        max: usize,
     ) -> Self {
         let scale = Scale {
-            most: f64::from(GRID) * whole_step(most as f64 / f64::from(GRID)),
+            max: f64::from(GRID) * whole_step(max as f64 / f64::from(GRID)),
         };
         let filled = || counts.iter().enumerate().filter(|(_, count)| **count > 0);
         let columns = filled().map(|(column, count)| {
-            let top = figures::one(scale.y(*count as f64));
-            let [left, right] = [bins.x(column) + 0.5, bins.x(column + 1) - 0.5].map(figures::one);
+            let top = figures::one_decimal(scale.y(*count as f64));
+            let [left, right] = [bins.x(column) + 0.5, bins.x(column + 1) - 0.5].map(figures::one_decimal);
             format!("M{left} {BOTTOM}V{top}H{right}V{BOTTOM}z")
         });
-        let told: Vec<String> = filled()
-            .map(|(column, count)| format!("{} {unit}: {count}", bins.words(column)))
+        let texts: Vec<String> = filled()
+            .map(|(column, count)| format!("{} {unit}: {count}", bins.label(column)))
             .collect();
         Self {
             title: title.to_owned(),
@@ -105,15 +104,15 @@ impl Histogram {
             grid: scale.grid(),
             edges: bins.edges(),
             columns: columns.collect(),
-            told: match told.is_empty() {
+            description: match texts.is_empty() {
                 true => format!("{title}: none"),
-                false => format!("{title}: {}", told.join(", ")),
+                false => format!("{title}: {}", texts.join(", ")),
             },
         }
     }
 }
 
-/// The least of 1, 2 and 5 times a power of ten that is no less and whole: there is no half of a thing that is counted.
+/// The smallest 1, 2 or 5 times a power of ten that is at least `least` and whole, since counts are whole numbers.
 fn whole_step(least: f64) -> f64 {
     let power = 10_f64.powf(least.max(1.0).log10().floor());
     let found = [1.0, 2.0, 5.0]
@@ -128,29 +127,29 @@ mod tests {
     use super::*;
 
     #[test]
-    fn values_are_counted_where_they_lie_and_columns_are_as_high() {
+    fn values_are_counted_by_column_and_drawn_by_count() {
         let values = [0.0, 0.4, 0.5, 1.9];
         let bins = Bins::for_all(0.5, values.into_iter().chain([2.0]));
         assert_eq!(bins.count, 5, "a value on the last edge has a column");
         let counts = bins.counts(&values);
         assert_eq!(counts, [2, 1, 0, 1, 0]);
-        let drawn = Histogram::of("Alpha", "m/s", bins, &counts, 4);
+        let drawn = Histogram::new("Alpha", "m/s", bins, &counts, 4);
         assert_eq!(
             drawn.columns,
             "M38.5 140V76.0H99.1V140zM100.1 140V108.0H160.7V140zM223.3 140V108.0H283.9V140z"
         );
-        let edges: Vec<&str> = drawn.edges.iter().map(|edge| &*edge.word).collect();
+        let edges: Vec<&str> = drawn.edges.iter().map(|edge| &*edge.label).collect();
         assert_eq!(edges, ["0", "0.5", "1", "1.5", "2", "2.5"]);
         assert_eq!(
-            drawn.told,
+            drawn.description,
             "Alpha: 0 to 0.5 m/s: 2, 0.5 to 1 m/s: 1, 1.5 to 2 m/s: 1"
         );
-        let none = Histogram::of("Beta", "m/s", bins, &[0; 5], 0);
-        assert_eq!((&*none.columns, &*none.told), ("", "Beta: none"));
+        let none = Histogram::new("Beta", "m/s", bins, &[0; 5], 0);
+        assert_eq!((&*none.columns, &*none.description), ("", "Beta: none"));
     }
 
     #[test]
-    fn the_axis_counts_in_whole_numbers() {
+    fn axis_steps_are_whole_numbers() {
         for (least, step) in [
             (0.0, 1.0),
             (0.5, 1.0),
@@ -164,7 +163,7 @@ mod tests {
     }
 
     #[test]
-    fn many_columns_have_few_words() {
+    fn many_columns_have_few_labels() {
         let bins = Bins::for_all(0.5, [12.0]);
         assert_eq!(bins.count, 25);
         assert_eq!(bins.edges().len(), 7, "every fourth of 26 edges");

@@ -1,38 +1,38 @@
-//! A value over days.
+//! A value over evaluation days.
 
-use super::scale::{LEFT, RIGHT, Scale, Tick, nice, trimmed};
+use super::scale::{LEFT, RIGHT, Scale, Tick, round_up, without_trailing_zeros};
 use crate::figures;
 use jiff::civil::Date;
 
-/// A value of a day.
+/// A value of an evaluation day.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Value {
+pub(crate) struct DayValue {
     pub(crate) day: Date,
     pub(crate) value: f64,
-    /// The ends of its 95 % interval, if it has one.
+    /// Ends of the 95 % interval, if there is one.
     pub(crate) interval: Option<[f64; 2]>,
 }
 
-/// What values are held against.
+/// A limit, drawn as a line.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Bound {
     pub(crate) name: &'static str,
     pub(crate) value: f64,
 }
 
-/// A chart, ready to be drawn by `chart.html`.
+/// A chart over days, in the form that `chart.html` draws.
 #[derive(Debug)]
 pub(crate) struct Panel {
     pub(crate) title: &'static str,
-    /// What is on its axis.
+    /// Unit of the axis.
     pub(crate) unit: &'static str,
-    /// What it shows in a sentence, for whoever does not see it.
-    pub(crate) told: String,
+    /// Text alternative for screen readers.
+    pub(crate) description: String,
     pub(crate) grid: Vec<Tick>,
     pub(crate) days: Vec<Tick>,
     pub(crate) bounds: Vec<Tick>,
     pub(crate) points: Vec<Point>,
-    /// Through all of them; an SVG path.
+    /// Line through all points; an SVG path.
     pub(crate) path: String,
 }
 
@@ -41,33 +41,33 @@ pub(crate) struct Point {
     pub(crate) x: String,
     pub(crate) y: String,
     pub(crate) interval: Option<[String; 2]>,
-    /// What a pointer over it shows.
-    pub(crate) word: String,
+    /// Tooltip.
+    pub(crate) label: String,
 }
 
 impl Panel {
-    /// Of rates in percent: all panels of such have the same scale.
-    pub(crate) fn of_percent(title: &'static str, values: &[Value]) -> Self {
-        Self::of(title, "percent", values, &[], Scale { most: 100.0 })
+    /// A panel of rates from 0 to 100 percent.
+    pub(crate) fn from_percent(title: &'static str, values: &[DayValue]) -> Self {
+        Self::new(title, "percent", values, &[], Scale { max: 100.0 })
     }
 
-    /// Of values that are not negative and have no upper end; the scale has room for the first of the bounds.
+    /// A panel of non-negative values; the scale includes the first bound.
     pub(crate) fn from_zero(
         title: &'static str,
         unit: &'static str,
-        values: &[Value],
+        values: &[DayValue],
         bounds: &[Bound],
     ) -> Self {
-        let of_values = values.iter().map(|one| one.value);
-        let most = of_values.chain(bounds.first().map(|bound| 1.25 * bound.value));
-        let most = nice(most.fold(f64::MIN_POSITIVE, f64::max));
-        Self::of(title, unit, values, bounds, Scale { most })
+        let extents = values.iter().map(|value| value.value);
+        let extents = extents.chain(bounds.first().map(|bound| 1.25 * bound.value));
+        let max = round_up(extents.fold(f64::MIN_POSITIVE, f64::max));
+        Self::new(title, unit, values, bounds, Scale { max })
     }
 
-    fn of(
+    fn new(
         title: &'static str,
         unit: &'static str,
-        values: &[Value],
+        values: &[DayValue],
         bounds: &[Bound],
         scale: Scale,
     ) -> Self {
@@ -75,16 +75,16 @@ impl Panel {
             .first()
             .zip(values.last())
             .map(|(first, last)| (first.day, last.day));
-        let place = |value: &Value| x(value.day, span);
+        let place = |value: &DayValue| x(value.day, span);
         let points: Vec<Point> = values
             .iter()
             .map(|value| Point {
-                x: figures::one(place(value)),
-                y: figures::one(scale.y(value.value)),
+                x: figures::one_decimal(place(value)),
+                y: figures::one_decimal(scale.y(value.value)),
                 interval: value
                     .interval
-                    .map(|ends| ends.map(|end| figures::one(scale.y(end)))),
-                word: word(value),
+                    .map(|ends| ends.map(|end| figures::one_decimal(scale.y(end)))),
+                label: label(value),
             })
             .collect();
         let path = points
@@ -92,17 +92,17 @@ impl Panel {
             .zip(std::iter::once("M").chain(std::iter::repeat("L")))
             .map(|(point, step)| format!("{step}{} {}", point.x, point.y))
             .collect();
-        let shown = bounds.iter().filter(|bound| bound.value <= scale.most);
+        let shown = bounds.iter().filter(|bound| bound.value <= scale.max);
         Self {
             title,
             unit,
-            told: told(title, unit, values),
+            description: description(title, unit, values),
             grid: scale.grid(),
-            days: ends(span),
+            days: day_ticks(span),
             bounds: shown
                 .map(|bound| Tick {
-                    at: figures::one(scale.y(bound.value)),
-                    word: bound.name.to_owned(),
+                    at: figures::one_decimal(scale.y(bound.value)),
+                    label: bound.name.to_owned(),
                 })
                 .collect(),
             points,
@@ -111,7 +111,7 @@ impl Panel {
     }
 }
 
-/// By the calendar: days without a value are gaps. A single day stands in the middle.
+/// x of a day on a calendar axis: days without a value are gaps, a single day is in the middle.
 fn x(day: Date, span: Option<(Date, Date)>) -> f64 {
     let days = |from: Date, to: Date| f64::from((to - from).get_days());
     match span {
@@ -124,8 +124,8 @@ fn x(day: Date, span: Option<(Date, Date)>) -> f64 {
     }
 }
 
-/// The first and the last day, which the axis names.
-fn ends(span: Option<(Date, Date)>) -> Vec<Tick> {
+/// Labels of the first and the last day.
+fn day_ticks(span: Option<(Date, Date)>) -> Vec<Tick> {
     let Some((first, last)) = span else {
         return Vec::new();
     };
@@ -133,14 +133,14 @@ fn ends(span: Option<(Date, Date)>) -> Vec<Tick> {
     days.dedup();
     days.into_iter()
         .map(|day| Tick {
-            at: figures::one(x(day, span)),
-            word: day.to_string(),
+            at: figures::one_decimal(x(day, span)),
+            label: day.to_string(),
         })
         .collect()
 }
 
-fn word(value: &Value) -> String {
-    let shown = |value: f64| trimmed(value, 2);
+fn label(value: &DayValue) -> String {
+    let shown = |value: f64| without_trailing_zeros(value, 2);
     match value.interval {
         Some([low, high]) => format!(
             "{}: {} ({} – {})",
@@ -153,15 +153,15 @@ fn word(value: &Value) -> String {
     }
 }
 
-fn told(title: &str, unit: &str, values: &[Value]) -> String {
+fn description(title: &str, unit: &str, values: &[DayValue]) -> String {
     match values {
         [] => format!("{title}: no day has a result"),
-        [only] => format!("{title}, {unit}: {}", word(only)),
+        [only] => format!("{title}, {unit}: {}", label(only)),
         [first, .., last] => format!(
-            "{title}, {unit}, of {} days: {} to {}; the table below has all of them",
+            "{title}, {unit}, {} days: {} to {}; the table below lists all",
             values.len(),
-            word(first),
-            word(last)
+            label(first),
+            label(last)
         ),
     }
 }
@@ -171,8 +171,8 @@ mod tests {
     use super::*;
     use jiff::civil::date;
 
-    fn value(day: i8, value: f64) -> Value {
-        Value {
+    fn value(day: i8, value: f64) -> DayValue {
+        DayValue {
             day: date(2026, 3, day),
             value,
             interval: Some([value - 10.0, value + 10.0]),
@@ -180,8 +180,8 @@ mod tests {
     }
 
     #[test]
-    fn days_stand_where_the_calendar_has_them_and_values_by_the_scale() {
-        let panel = Panel::of_percent("Score", &[value(1, 0.0), value(2, 50.0), value(5, 100.0)]);
+    fn days_follow_the_calendar_and_values_the_scale() {
+        let panel = Panel::from_percent("Score", &[value(1, 0.0), value(2, 50.0), value(5, 100.0)]);
         let places: Vec<_> = panel.points.iter().map(|point| point.x.as_str()).collect();
         assert_eq!(places, ["46.0", "119.0", "338.0"], "a quarter of the way");
         let heights: Vec<_> = panel.points.iter().map(|point| point.y.as_str()).collect();
@@ -189,30 +189,30 @@ mod tests {
         assert_eq!(
             panel.points[0].interval,
             Some(["140.0", "127.2"].map(str::to_owned)),
-            "what lies outside of the scale ends with it"
+            "values outside the scale are clamped"
         );
         assert_eq!(panel.path, "M46.0 140.0L119.0 76.0L338.0 12.0");
-        let days: Vec<_> = panel.days.iter().map(|tick| tick.word.as_str()).collect();
+        let days: Vec<_> = panel.days.iter().map(|tick| tick.label.as_str()).collect();
         assert_eq!(days, ["2026-03-01", "2026-03-05"]);
         assert!(
-            panel.told.contains("2026-03-05: 100 (90 – 110)"),
+            panel.description.contains("2026-03-05: 100 (90 – 110)"),
             "{}",
-            panel.told
+            panel.description
         );
     }
 
     #[test]
-    fn one_day_is_a_point_in_the_middle_and_none_is_said() {
-        let panel = Panel::of_percent("Score", &[value(1, 50.0)]);
+    fn single_day_is_centred_and_missing_days_are_described() {
+        let panel = Panel::from_percent("Score", &[value(1, 50.0)]);
         assert_eq!((panel.points.len(), panel.days.len()), (1, 1));
         assert_eq!(panel.points[0].x, "192.0");
-        let empty = Panel::of_percent("Score", &[]);
+        let empty = Panel::from_percent("Score", &[]);
         assert!(empty.points.is_empty() && empty.path.is_empty());
-        assert!(empty.told.contains("no day"));
+        assert!(empty.description.contains("no day"));
     }
 
     #[test]
-    fn a_scale_has_room_for_the_first_bound() {
+    fn scale_includes_the_first_bound() {
         let bounds = [
             Bound {
                 name: "deployable",
@@ -224,9 +224,9 @@ mod tests {
             },
         ];
         let low = Panel::from_zero("Points", "per episode", &[value(1, 0.1)], &bounds);
-        let words: Vec<_> = low.bounds.iter().map(|tick| tick.word.as_str()).collect();
-        assert_eq!(words, ["deployable"], "the other is far above");
-        assert_eq!(low.grid.last().map(|tick| tick.word.as_str()), Some("0.8"));
+        let words: Vec<_> = low.bounds.iter().map(|tick| tick.label.as_str()).collect();
+        assert_eq!(words, ["deployable"], "the other bound is outside the scale");
+        assert_eq!(low.grid.last().map(|tick| tick.label.as_str()), Some("0.8"));
         let high = Panel::from_zero("Points", "per episode", &[value(1, 3.0)], &bounds);
         assert_eq!(high.bounds.len(), 2);
     }

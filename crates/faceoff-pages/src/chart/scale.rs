@@ -1,62 +1,63 @@
-//! What the charts have in common: the plot, its axis of values, and numbers on it.
+//! The plot area of a chart, its value axis and number labels.
 
 use crate::figures;
 
-/// The plot's measures in the units of the drawing, which `chart.html` makes 360 wide.
+/// Edges of the plot in units of the drawing, which is 360 wide (`chart.html`).
 pub(super) const LEFT: f64 = 38.0;
 pub(super) const RIGHT: f64 = 346.0;
 pub(super) const TOP: f64 = 12.0;
 pub(super) const BOTTOM: f64 = 140.0;
-/// Intervals on the axis of values.
+/// Number of intervals on the value axis.
 pub(super) const GRID: u32 = 4;
 
-/// A line with its word.
+/// A labelled position on an axis.
 #[derive(Debug)]
 pub(crate) struct Tick {
     pub(crate) at: String,
-    pub(crate) word: String,
+    pub(crate) label: String,
 }
 
-/// From a value to its height.
+/// Maps a value to a y coordinate.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Scale {
-    pub(super) most: f64,
+    /// Value at the top of the plot.
+    pub(super) max: f64,
 }
 
 impl Scale {
     pub(super) fn y(self, value: f64) -> f64 {
-        BOTTOM - (BOTTOM - TOP) * (value / self.most).clamp(0.0, 1.0)
+        BOTTOM - (BOTTOM - TOP) * (value / self.max).clamp(0.0, 1.0)
     }
 
-    /// The axis of values.
+    /// Ticks of the value axis.
     pub(super) fn grid(self) -> Vec<Tick> {
         let line = |part: u32| {
-            let value = self.most * f64::from(part) / f64::from(GRID);
+            let value = self.max * f64::from(part) / f64::from(GRID);
             Tick {
-                at: figures::one(self.y(value)),
-                word: short(value),
+                at: figures::one_decimal(self.y(value)),
+                label: short(value),
             }
         };
         (0..=GRID).map(line).collect()
     }
 }
 
-/// The least of 1, 2, 4 and 8 times a power of ten that is no less: its quarters are short.
-pub(super) fn nice(value: f64) -> f64 {
+/// The smallest 1, 2, 4 or 8 times a power of ten that is at least `value`: its quarters have few digits.
+pub(super) fn round_up(value: f64) -> f64 {
     let power = 10_f64.powf(value.log10().floor());
     let found = [1.0, 2.0, 4.0, 8.0]
         .into_iter()
         .map(|factor| factor * power)
-        .find(|nice| *nice >= value);
+        .find(|rounded| *rounded >= value);
     found.unwrap_or(10.0 * power)
 }
 
-/// A number of an axis.
+/// A number on an axis.
 pub(super) fn short(value: f64) -> String {
-    trimmed(value, 3)
+    without_trailing_zeros(value, 3)
 }
 
-pub(super) fn trimmed(value: f64, decimals: usize) -> String {
+pub(super) fn without_trailing_zeros(value: f64, decimals: usize) -> String {
     let text = format!("{value:.decimals$}");
     let text = text.trim_end_matches('0').trim_end_matches('.');
     text.to_owned()
@@ -67,15 +68,15 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_scale_ends_at_a_round_number() {
-        for (value, most) in [
+    fn scale_ends_at_a_round_number() {
+        for (value, max) in [
             (0.3, 0.4),
             (0.5, 0.8),
             (1.0, 1.0),
             (9.0, 10.0),
             (37.0, 40.0),
         ] {
-            assert!((nice(value) - most).abs() < 1e-12, "{value}");
+            assert!((round_up(value) - max).abs() < 1e-12, "{value}");
         }
     }
 }

@@ -1,70 +1,70 @@
-//! Times of several kinds on a logarithmic axis.
+//! Answer times on a logarithmic axis, a row per task.
 
 use super::scale::{RIGHT, Tick, short};
 use crate::figures;
 
-/// The axis of times begins and ends at these powers of ten of a millisecond.
+/// Ends of the time axis, as powers of ten of a millisecond.
 const FIRST_DECADE: f64 = -2.0;
 const LAST_DECADE: f64 = 3.0;
-/// Words before the rows of a strip are as wide.
+/// Left edge of the plot; row names are to the left of it.
 const STRIP_LEFT: f64 = 58.0;
-/// From row to row, and where the rows have distributions above them.
+/// Height of a row without and with a distribution.
 const ROW: u32 = 24;
 const TALL_ROW: u32 = 48;
-/// The height of a distribution, and how far above its row it stands.
+/// Height of a distribution, and its distance from the row.
 const SHAPE: f64 = 26.0;
 const SHAPE_GAP: u32 = 8;
-/// What an answer has: a control step, in milliseconds.
+/// Duration of a control step, in milliseconds.
 const STEP_MS: f64 = 20.0;
 
-/// Times of one kind, in milliseconds.
+/// Answer times of a task, in milliseconds.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Span {
+pub(crate) struct TimeSummary {
     pub(crate) name: &'static str,
     pub(crate) mean: f64,
     pub(crate) p99: f64,
     pub(crate) max: f64,
-    /// How many of them lie where, the shorter first; empty where that is not told.
-    pub(crate) counted: Vec<Counted>,
+    /// The distribution, shortest times first; empty if it is not public.
+    pub(crate) bins: Vec<TimeBin>,
 }
 
-/// So many times lie between two, in milliseconds.
+/// Number of times in a range, in milliseconds.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Counted {
+pub(crate) struct TimeBin {
     pub(crate) from: f64,
     pub(crate) to: f64,
     pub(crate) count: u64,
 }
 
-/// Times on a logarithmic axis, ready to be drawn by `chart.html`.
+/// Times on a logarithmic axis, in the form that `chart.html` draws.
 #[derive(Debug)]
 pub(crate) struct Strip {
     pub(crate) rows: Vec<StripRow>,
     pub(crate) grid: Vec<Tick>,
-    /// Are there distributions above the rows?
+    /// Are distributions drawn?
     pub(crate) has_shapes: bool,
-    /// Where a control step ends.
+    /// x of the duration of a control step.
     pub(crate) limit: String,
-    /// Where the noise floor begins, and how wide it is.
+    /// x and width of the noise floor.
     pub(crate) floor: Option<[String; 2]>,
     pub(crate) bottom: u32,
     pub(crate) height: u32,
-    /// The distributions in numbers, a row for each of their columns.
+    /// The distributions as a table, a row per column.
     pub(crate) counts: Vec<CountRow>,
-    /// What it shows in a sentence, for whoever does not see it.
-    pub(crate) told: String,
+    /// Text alternative for screen readers.
+    pub(crate) description: String,
 }
 
-/// How many times of each kind lie between two, in milliseconds.
+/// Number of times in a range, per task; bounds in milliseconds.
 #[derive(Debug)]
 pub(crate) struct CountRow {
     pub(crate) from: String,
     pub(crate) to: String,
-    /// In the order of the strip's rows.
+    /// In the order of [`Strip::rows`].
     pub(crate) counts: Vec<u64>,
 }
 
-/// Where the times of one kind lie.
+/// Positions of the times of a task.
 #[derive(Debug)]
 pub(crate) struct StripRow {
     pub(crate) name: &'static str,
@@ -72,97 +72,96 @@ pub(crate) struct StripRow {
     pub(crate) mean: String,
     pub(crate) p99: String,
     pub(crate) max: String,
-    /// The distribution, an SVG path.
+    /// The distribution as an SVG path.
     pub(crate) shape: String,
 }
 
 impl Strip {
-    /// `floor`: median and 99th percentile of what the server itself adds, in milliseconds.
-    pub(crate) fn of(spans: &[Span], floor: Option<[f64; 2]>) -> Self {
-        let has_shapes = spans.iter().any(|span| !span.counted.is_empty());
+    /// `floor`: median and 99th percentile of the noise floor, in milliseconds.
+    pub(crate) fn new(summaries: &[TimeSummary], floor: Option<[f64; 2]>) -> Self {
+        let has_shapes = summaries.iter().any(|summary| !summary.bins.is_empty());
         let mut y = 0;
-        let rows = spans.iter().map(|span| {
+        let rows = summaries.iter().map(|summary| {
             y += if has_shapes { TALL_ROW } else { ROW };
-            let [mean, p99, max] = [span.mean, span.p99, span.max].map(|ms| figures::one(at(ms)));
+            let [mean, p99, max] = [summary.mean, summary.p99, summary.max].map(|ms| figures::one_decimal(x(ms)));
             StripRow {
-                name: span.name,
+                name: summary.name,
                 y,
                 mean,
                 p99,
                 max,
-                shape: shape(&span.counted, y - SHAPE_GAP),
+                shape: shape(&summary.bins, y - SHAPE_GAP),
             }
         });
         let rows = rows.collect();
         let bottom = y + ROW / 2;
         let grid = [0.01, 0.1, 1.0, 10.0, 100.0, 1000.0].map(|ms| Tick {
-            at: figures::one(at(ms)),
-            word: short(ms),
+            at: figures::one_decimal(x(ms)),
+            label: short(ms),
         });
-        let told = spans.iter().map(|span| {
-            let [mean, p99, max] = [span.mean, span.p99, span.max].map(short);
+        let texts = summaries.iter().map(|summary| {
+            let [mean, p99, max] = [summary.mean, summary.p99, summary.max].map(short);
             format!(
                 "{}: mean {mean}, 99th percentile {p99}, maximum {max}",
-                span.name
+                summary.name
             )
         });
-        let told: Vec<String> = told.collect();
+        let texts: Vec<String> = texts.collect();
         Self {
             rows,
             grid: grid.into(),
             has_shapes,
-            limit: figures::one(at(STEP_MS)),
-            floor: floor.map(|[from, to]| [at(from), at(to) - at(from)].map(figures::one)),
+            limit: figures::one_decimal(x(STEP_MS)),
+            floor: floor.map(|[from, to]| [x(from), x(to) - x(from)].map(figures::one_decimal)),
             bottom,
             height: bottom + 20,
-            counts: counts(spans),
-            told: format!(
-                "Answer times in milliseconds, of {STEP_MS} that a control step has; {}",
-                told.join("; ")
+            counts: count_rows(summaries),
+            description: format!(
+                "Answer times in milliseconds; a control step lasts {STEP_MS}; {}",
+                texts.join("; ")
             ),
         }
     }
 }
 
-/// Columns without any time are left out.
-fn counts(spans: &[Span]) -> Vec<CountRow> {
-    // All kinds have the same columns; some have fewer.
-    let longest = spans
+/// A row per column with at least one time.
+fn count_rows(summaries: &[TimeSummary]) -> Vec<CountRow> {
+    // All tasks have the same columns; some have fewer.
+    let longest = summaries
         .iter()
-        .map(|span| &span.counted)
+        .map(|summary| &summary.bins)
         .max_by_key(|all| all.len());
     let columns = longest.into_iter().flatten().enumerate();
-    let rows = columns.map(|(column, of)| CountRow {
-        from: figures::significant(of.from),
-        to: figures::significant(of.to),
-        counts: spans
+    let rows = columns.map(|(column, bin)| CountRow {
+        from: figures::two_significant_digits(bin.from),
+        to: figures::two_significant_digits(bin.to),
+        counts: summaries
             .iter()
-            .map(|span| span.counted.get(column).map_or(0, |one| one.count))
+            .map(|summary| summary.bins.get(column).map_or(0, |bin| bin.count))
             .collect(),
     });
     rows.filter(|row| row.counts.iter().any(|count| *count > 0))
         .collect()
 }
 
-/// Columns above `bottom`. Their heights are by the logarithm of the counts: few slow answers among thousands are what one
-/// looks for.
-fn shape(counted: &[Counted], bottom: u32) -> String {
+/// Columns above `bottom`. Heights are logarithmic, so that a few slow answers among thousands stay visible.
+fn shape(bins: &[TimeBin], bottom: u32) -> String {
     let height = |count: u64| (1.0 + count as f64).ln();
-    let most = counted
+    let max = bins
         .iter()
-        .map(|one| one.count)
+        .map(|bin| bin.count)
         .max()
         .map_or(1.0, height);
-    let columns = counted.iter().filter(|one| one.count > 0).map(|one| {
-        let top = f64::from(bottom) - SHAPE * height(one.count) / most;
-        let [left, right, top] = [at(one.from), at(one.to), top].map(figures::one);
+    let columns = bins.iter().filter(|bin| bin.count > 0).map(|bin| {
+        let top = f64::from(bottom) - SHAPE * height(bin.count) / max;
+        let [left, right, top] = [x(bin.from), x(bin.to), top].map(figures::one_decimal);
         format!("M{left} {bottom}V{top}H{right}V{bottom}z")
     });
     columns.collect()
 }
 
-/// Where a time lies.
-fn at(ms: f64) -> f64 {
+/// x of a time.
+fn x(ms: f64) -> f64 {
     let decade = ms.max(f64::MIN_POSITIVE).log10();
     let share = (decade - FIRST_DECADE) / (LAST_DECADE - FIRST_DECADE);
     STRIP_LEFT + share.clamp(0.0, 1.0) * (RIGHT - STRIP_LEFT)
@@ -173,30 +172,30 @@ mod tests {
     use super::*;
 
     #[test]
-    fn times_stand_by_their_powers_of_ten_and_none_lies_outside() {
-        let span = Span {
+    fn times_are_placed_logarithmically_inside_the_plot() {
+        let summary = TimeSummary {
             name: "hit",
             mean: 0.1,
             p99: 10.0,
             max: 5000.0,
-            counted: Vec::new(),
+            bins: Vec::new(),
         };
-        let strip = Strip::of(std::slice::from_ref(&span), Some([0.001, 1.0]));
+        let strip = Strip::new(std::slice::from_ref(&summary), Some([0.001, 1.0]));
         assert!(!strip.has_shapes && strip.height == 56, "{strip:?}");
-        let counted = |from, to, count| Counted { from, to, count };
-        let told = Span {
-            counted: vec![
-                counted(0.1, 1.0, 99),
-                counted(1.0, 10.0, 0),
-                counted(10.0, 100.0, 9),
+        let bin = |from, to, count| TimeBin { from, to, count };
+        let with_bins = TimeSummary {
+            bins: vec![
+                bin(0.1, 1.0, 99),
+                bin(1.0, 10.0, 0),
+                bin(10.0, 100.0, 9),
             ],
-            ..span
+            ..summary
         };
-        let tall = Strip::of(&[told], None);
+        let tall = Strip::new(&[with_bins], None);
         assert!(tall.has_shapes);
         assert_eq!(
             tall.rows[0].shape, "M115.6 40V14.0H173.2V40zM230.8 40V27.0H288.4V40z",
-            "a tenth of the times is half as high; none is nothing"
+            "a tenth of the count is half as high; an empty column is not drawn"
         );
         let rows: Vec<_> = tall
             .counts
@@ -214,7 +213,7 @@ mod tests {
         assert_eq!(strip.limit, "248.1");
         assert!(
             strip
-                .told
+                .description
                 .contains("hit: mean 0.1, 99th percentile 10, maximum 5000")
         );
     }

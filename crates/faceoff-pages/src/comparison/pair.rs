@@ -1,4 +1,4 @@
-//! `/evaluations/{a}/compare/{b}/{task}/{episode}`: one episode as both played it, side by side and in step.
+//! `/evaluations/{a}/compare/{b}/{task}/{episode}`: an episode of two evaluations, side by side.
 
 use crate::{
     assets,
@@ -9,13 +9,13 @@ use crate::{
 use askama::Template;
 use axum::{extract::State, response::Response};
 use faceoff_api::{paths, requests::ComparisonQuery, views::comparison::ComparedView};
-use faceoff_scoring::WhoSolved;
+use faceoff_scoring::SolvedEpisodes;
 use faceoff_service::{
     app::App,
     extract::PathParams,
     problem::{Problem, ProblemKind},
     viewer::Viewer,
-    views::{clips::Clips, comparison, season::SeasonHead, sight::Sight},
+    views::{clips::Clips, comparison, season::SeasonHead, visibility::Visibility},
 };
 use faceoff_types::{EvaluationId, Task};
 use jiff::civil::Date;
@@ -30,37 +30,36 @@ struct Page {
     day: Date,
     teams: [String; 2],
     sides: Vec<Side>,
-    /// The nearest episodes of the task that one alone solved.
+    /// The nearest episodes of the task that only one team solved.
     before: Option<u32>,
     after: Option<u32>,
     styles: [&'static str; 2],
     script: &'static str,
 }
 
-/// An episode of two evaluations.
 pub(crate) async fn page(
     viewer: Result<Viewer, Problem>,
     State(app): State<App>,
     path: Result<PathParams<String, 4>, Problem>,
 ) -> Result<Response, PageProblem> {
     let PathParams([a, b, task, episode]) = path?;
-    let nothing = || Problem::new(ProblemKind::NotFound, "there is no such episode of both");
-    let id = |text: &str| text.parse::<EvaluationId>().map_err(|_| nothing());
+    let not_found = || Problem::new(ProblemKind::NotFound, "the evaluations have no such common episode");
+    let id = |text: &str| text.parse::<EvaluationId>().map_err(|_| not_found());
     let ids = [id(&a)?, id(&b)?];
-    let task: Task = task.parse().map_err(|_| nothing())?;
-    let episode: u32 = episode.parse().map_err(|_| nothing())?;
-    let sight = Sight::of(&app, viewer?).await?;
+    let task: Task = task.parse().map_err(|_| not_found())?;
+    let episode: u32 = episode.parse().map_err(|_| not_found())?;
+    let visibility = Visibility::load(&app, viewer?).await?;
     let query = ComparisonQuery { episodes: true };
-    let view = comparison::of(&app, &sight, ids, query).await?;
+    let view = comparison::compare(&app, &visibility, ids, query).await?;
     let sides = [
-        side(&app, &sight, &view.a, "replay-a", (task, episode)).await?,
-        side(&app, &sight, &view.b, "replay-b", (task, episode)).await?,
+        side(&app, &visibility, &view.a, "replay-a", (task, episode)).await?,
+        side(&app, &visibility, &view.b, "replay-b", (task, episode)).await?,
     ];
-    let who = view.episodes.as_ref().and_then(|all| all.get(&task));
-    let [before, after] = who.map_or([None; 2], |who| beside(who, episode));
-    let season = SeasonHead::now(&app).await?;
+    let solved = view.episodes.as_ref().and_then(|all| all.get(&task));
+    let [before, after] = solved.map_or([None; 2], |solved| differing_neighbours(solved, episode));
+    let season = SeasonHead::load(&app).await?;
     render(&Page {
-        frame: Frame::of(&app, season.name, ""),
+        frame: Frame::for_app(&app, season.name, ""),
         ids,
         task,
         episode,
@@ -76,26 +75,26 @@ pub(crate) async fn page(
 
 async fn side(
     app: &App,
-    sight: &Sight,
-    of: &ComparedView,
-    id: &'static str,
+    visibility: &Visibility,
+    evaluation: &ComparedView,
+    element_id: &'static str,
     (task, episode): (Task, u32),
 ) -> Result<Side, Problem> {
-    let clips = Clips::of(app, sight, of.evaluation).await?;
-    let found = clips.episode(task, episode).await?;
+    let clips = Clips::find(app, visibility, evaluation.evaluation).await?;
+    let clip = clips.episode(task, episode).await?;
     let api = format!(
         "{}/episodes/{task}/{episode}",
-        paths::evaluation(of.evaluation)
+        paths::evaluation(evaluation.evaluation)
     );
     Ok(Side {
-        path: Some(page_path(of.evaluation, task, episode)),
-        ..Side::of(id, &found, &api, of.team.to_string())
+        path: Some(page_path(evaluation.evaluation, task, episode)),
+        ..Side::new(element_id, &clip, &api, evaluation.team.to_string())
     })
 }
 
-/// The nearest episodes before and after this one that one of the two alone solved.
-fn beside(who: &WhoSolved, episode: u32) -> [Option<u32>; 2] {
-    let differing = || who.only_a.iter().chain(&who.only_b).copied();
+/// The nearest episodes before and after this one that only one team solved.
+fn differing_neighbours(solved: &SolvedEpisodes, episode: u32) -> [Option<u32>; 2] {
+    let differing = || solved.only_a.iter().chain(&solved.only_b).copied();
     [
         differing().filter(|other| *other < episode).max(),
         differing().filter(|other| *other > episode).min(),
@@ -107,15 +106,15 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_nearest_that_differ_are_found_whoever_solved_them() {
-        let who = WhoSolved {
+    fn differing_neighbours_include_episodes_of_both_teams() {
+        let solved = SolvedEpisodes {
             both: vec![2],
             only_a: vec![0, 7],
             only_b: vec![3, 9],
             neither: vec![5],
         };
-        assert_eq!(beside(&who, 5), [Some(3), Some(7)]);
-        assert_eq!(beside(&who, 0), [None, Some(3)]);
-        assert_eq!(beside(&who, 9), [Some(7), None]);
+        assert_eq!(differing_neighbours(&solved, 5), [Some(3), Some(7)]);
+        assert_eq!(differing_neighbours(&solved, 0), [None, Some(3)]);
+        assert_eq!(differing_neighbours(&solved, 9), [Some(7), None]);
     }
 }

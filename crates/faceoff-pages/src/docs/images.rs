@@ -1,6 +1,6 @@
-//! The documents' pictures, compiled in.
+//! Pictures of the documentation, compiled in.
 
-use crate::packed::{Packed, packed};
+use crate::compressed_text::{CompressedText, compressed_text};
 use axum::{
     http::{HeaderValue, header},
     response::{IntoResponse, Response},
@@ -11,8 +11,8 @@ use faceoff_service::{
     problem::{Problem, ProblemKind},
 };
 
-/// Their addresses stay, so they may change with the program's version.
-const KEPT: &str = "public, max-age=3600";
+/// The address of a picture is stable while its content changes between versions, so browsers may cache it for an hour only.
+const CACHE_CONTROL: &str = "public, max-age=3600";
 
 struct Image {
     name: &'static str,
@@ -21,7 +21,7 @@ struct Image {
 
 enum Content {
     Png(&'static [u8]),
-    Svg(Packed),
+    Svg(CompressedText),
 }
 
 impl Image {
@@ -55,7 +55,7 @@ macro_rules! image {
     (svg $name:literal) => {
         Image {
             name: $name,
-            content: Content::Svg(packed!("docs/images/", $name)),
+            content: Content::Svg(compressed_text!("docs/images/", $name)),
         }
     };
 }
@@ -70,7 +70,7 @@ static IMAGES: [Image; 7] = [
     image!(svg "fidelity/paths.svg"),
 ];
 
-/// Where the picture of this name is, if there is one.
+/// Path of a picture by its name.
 pub(super) fn path(name: &str) -> Option<String> {
     let image = IMAGES.iter().find(|image| image.name == name)?;
     Some(format!("/docs/images/{}", image.name))
@@ -84,17 +84,17 @@ pub(super) async fn image(
         let detail = format!("the documentation has no picture {name}");
         return Err(Problem::new(ProblemKind::NotFound, detail));
     };
-    let tag = ETag::of("picture", &[blake3::hash(image.bytes()).to_hex().as_str()]);
-    let kept = [
+    let tag = ETag::new("picture", &[blake3::hash(image.bytes()).to_hex().as_str()]);
+    let headers = [
         (header::ETAG, tag.header()),
-        (header::CACHE_CONTROL, HeaderValue::from_static(KEPT)),
+        (header::CACHE_CONTROL, HeaderValue::from_static(CACHE_CONTROL)),
     ];
-    if let Some(known) = conditions.not_modified(&tag) {
-        return Ok((kept, known).into_response());
+    if let Some(not_modified) = conditions.not_modified(&tag) {
+        return Ok((headers, not_modified).into_response());
     }
     let media_type = [(
         header::CONTENT_TYPE,
         HeaderValue::from_static(image.media_type()),
     )];
-    Ok((kept, media_type, image.bytes()).into_response())
+    Ok((headers, media_type, image.bytes()).into_response())
 }

@@ -1,14 +1,13 @@
-//! The documents that are pages, in their order.
+//! The documents that have a page, in order.
 
 use super::{
     images,
-    markdown::{self, Entry, Site},
+    markdown::{self, ContentsEntry, Site},
     sections::Section,
 };
-use crate::packed::{Packed, packed};
+use crate::compressed_text::{CompressedText, compressed_text};
 use std::sync::LazyLock;
 
-/// Documents for one purpose.
 #[derive(Debug)]
 pub(super) struct Group {
     pub(super) name: &'static str,
@@ -20,10 +19,10 @@ pub(super) struct Group {
 pub(super) struct Page {
     pub(super) name: &'static str,
     pub(super) title: &'static str,
-    /// What it is good for, in one line.
+    /// Content of the page in one line.
     pub(super) about: &'static str,
     pub(super) html: String,
-    pub(super) contents: Vec<Entry>,
+    pub(super) contents: Vec<ContentsEntry>,
     pub(super) sections: Vec<Section>,
 }
 
@@ -40,7 +39,7 @@ fn path(name: &str) -> String {
 struct Source {
     name: &'static str,
     about: &'static str,
-    markdown: Packed,
+    markdown: CompressedText,
 }
 
 /// A file of `docs/`, by its name.
@@ -49,7 +48,7 @@ macro_rules! source {
         Source {
             name: $name,
             about: $about,
-            markdown: packed!("docs/", $name, ".md"),
+            markdown: compressed_text!("docs/", $name, ".md"),
         }
     };
 }
@@ -61,31 +60,31 @@ static SOURCES: LazyLock<[(&str, Vec<Source>); 4]> = LazyLock::new(|| {
             vec![
                 source!(
                     "start",
-                    "From nothing to an agent on the board in an hour, and what to do next."
+                    "Your first agent on the board within an hour, and next steps."
                 ),
                 source!(
                     "rules",
-                    "Tasks, fouls, penalty points, tiers, boards, the tournament: what counts, and how."
+                    "Tasks, fouls, penalty points, tiers, boards and the tournament."
                 ),
                 source!(
                     "protocol",
-                    "The conversation between the evaluator and an agent, line by line, and the bundle."
+                    "Messages between evaluator and agent, line by line, and the bundle format."
                 ),
                 source!(
                     "robot",
-                    "The arm, the table and the puck: frames, lengths, limits, what an agent observes."
+                    "Arm, table and puck: frames, dimensions, limits and observations."
                 ),
                 source!(
                     "python",
-                    "Environments to train in, games, evaluation and kinematics, from Python."
+                    "Training environments, games, evaluation and kinematics in Python."
                 ),
                 source!(
                     "sandbox",
-                    "Runtimes, packages, memory, time: what an agent can use on the server."
+                    "Runtimes, packages, memory and time of agents on the server."
                 ),
                 source!(
                     "tournament",
-                    "How games between teams are drawn, played, counted and shown."
+                    "Schedule, games, scoring and pages of tournaments."
                 ),
             ],
         ),
@@ -94,19 +93,19 @@ static SOURCES: LazyLock<[(&str, Vec<Source>); 4]> = LazyLock::new(|| {
             vec![
                 source!(
                     "dataset",
-                    "What is recorded of an evaluation or a game, file by file and column by column."
+                    "Recordings of evaluations and games, by file and column."
                 ),
                 source!(
                     "replay",
-                    "What the pages of episodes and games show, who sees it, and the clips that it is drawn from."
+                    "Replay pages of episodes and games, their visibility, and the clip format."
                 ),
                 source!(
                     "verifying",
-                    "How anybody computes a score again from its dataset."
+                    "How to recompute a score from its dataset."
                 ),
                 source!(
                     "archive",
-                    "The files of a whole season, to keep and to show again."
+                    "The files of a whole season, for storage and for a read-only server."
                 ),
             ],
         ),
@@ -115,63 +114,105 @@ static SOURCES: LazyLock<[(&str, Vec<Source>); 4]> = LazyLock::new(|| {
             vec![
                 source!(
                     "cli",
-                    "The program's commands, their status and their files."
+                    "Commands with their exit codes and files."
                 ),
                 source!(
                     "api",
-                    "What programs can ask of the server, explained by topic."
+                    "The API explained by topic."
                 ),
                 source!(
                     "simulator",
-                    "The physics behind the scores, and how near to the reference it is."
+                    "The physics behind the scores, and its accuracy against the reference."
                 ),
                 source!(
                     "security",
-                    "What keeps agents from each other, from the server and from the episodes."
+                    "How agents are isolated from each other, the server and future episodes."
                 ),
             ],
         ),
         (
             "For organisers",
-            vec![source!(
-                "operating",
-                "Setting up a server and running a season on it."
-            )],
+            vec![
+                source!(
+                    "operating",
+                    "Where to find what: installing, running and watching a server."
+                ),
+                source!(
+                    "season",
+                    "One season in order, from the installation to the archive."
+                ),
+                source!(
+                    "install",
+                    "The program, its sandbox, a service, a proxy and TLS."
+                ),
+                source!(
+                    "containers",
+                    "Images for Docker, Compose and Kubernetes, and what they need."
+                ),
+                source!(
+                    "configuration",
+                    "Every value of faceoff.toml with its default, unit and meaning."
+                ),
+                source!(
+                    "accounts",
+                    "Invitations, registration, teams, tokens and the dashboard."
+                ),
+                source!(
+                    "stages",
+                    "Rules, evaluation days, corrections, trials, retention and ablations."
+                ),
+                source!(
+                    "monitoring",
+                    "Health, metrics, log, full disks, host interference and the queue."
+                ),
+                source!(
+                    "workers",
+                    "Evaluating on other machines over NATS."
+                ),
+                source!(
+                    "capacity",
+                    "How many teams, shards and workers a server can carry, measured."
+                ),
+                source!(
+                    "backup",
+                    "Backup, restore, upgrade and the archive of a season."
+                ),
+            ],
         ),
     ]
 });
 
-/// Rendered when somebody reads for the first time.
+/// Rendered on first use.
 pub(super) static LIBRARY: LazyLock<Vec<Group>> = LazyLock::new(|| {
     let groups = SOURCES.iter().map(|(name, sources)| Group {
         name,
-        pages: sources.iter().map(rendered).collect(),
+        pages: sources.iter().map(render).collect(),
     });
     groups.collect()
 });
 
-fn rendered(source: &'static Source) -> Page {
+fn render(source: &'static Source) -> Page {
     let title = markdown::title(source.markdown.text());
-    let rendered = markdown::document(source.markdown.text(), &path(source.name), title, &Here);
+    let document =
+        markdown::render_document(source.markdown.text(), &path(source.name), title, &DocsSite);
     Page {
         name: source.name,
         title,
         about: source.about,
-        html: rendered.html,
-        contents: rendered.contents,
-        sections: rendered.sections,
+        html: document.html,
+        contents: document.contents,
+        sections: document.sections,
     }
 }
 
-/// The page of this name.
 pub(super) fn page(name: &str) -> Option<&'static Page> {
     let mut pages = LIBRARY.iter().flat_map(|group| &group.pages);
     pages.find(|page| page.name == name)
 }
 
-struct Here;
+struct DocsSite;
 
-impl Site for Here {
+impl Site for DocsSite {
     fn page(&self, file: &str) -> Option<(&str, String)> {
         let name = file.strip_suffix(".md")?;
         let mut sources = SOURCES.iter().flat_map(|(_, sources)| sources.iter());

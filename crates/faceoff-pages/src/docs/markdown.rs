@@ -1,6 +1,5 @@
-//! The documents' Markdown as HTML of this site: headings that can be linked to, tables and code that scroll by themselves,
-//! and links that lead somewhere here. HTML within Markdown is shown as text; styles are classes, never attributes, as the
-//! pages' policy demands.
+//! Markdown of the documents as HTML of this site: headings with anchors, scrollable tables and listings, and links to pages of
+//! this site. HTML in Markdown is shown as text. Styles are classes, never attributes: the content security policy demands it.
 
 use super::sections::{Section, Sections};
 use askama::filters::{Escaper, Html};
@@ -9,32 +8,36 @@ use pulldown_cmark::{
 };
 use std::collections::HashSet;
 
-/// What a document becomes.
 #[derive(Debug)]
-pub(super) struct Rendered {
+pub(super) struct Document {
     pub(super) html: String,
-    /// Of its sections, as "On this page" lists them.
-    pub(super) contents: Vec<Entry>,
+    /// Entries of "On this page".
+    pub(super) contents: Vec<ContentsEntry>,
     pub(super) sections: Vec<Section>,
 }
 
 /// A heading of the second level.
 #[derive(Debug)]
-pub(super) struct Entry {
+pub(super) struct ContentsEntry {
     pub(super) id: String,
     pub(super) title: String,
 }
 
-/// Where links and pictures of a document lead on this site.
+/// Resolves links and pictures of a document.
 pub(super) trait Site {
-    /// The title of the page that a Markdown file is, and its path.
+    /// Title and path of the page of a Markdown file.
     fn page(&self, file: &str) -> Option<(&str, String)>;
     /// The path of a picture.
     fn picture(&self, file: &str) -> Option<String>;
 }
 
-/// A whole document. `path` is its own.
-pub(super) fn document(markdown: &str, path: &str, title: &str, site: &impl Site) -> Rendered {
+/// Renders a whole document. `path`: path of its page.
+pub(super) fn render_document(
+    markdown: &str,
+    path: &str,
+    title: &str,
+    site: &impl Site,
+) -> Document {
     let options = Options::ENABLE_TABLES | Options::ENABLE_FOOTNOTES;
     let mut writer = Writer {
         site,
@@ -48,33 +51,33 @@ pub(super) fn document(markdown: &str, path: &str, title: &str, site: &impl Site
         columns: Vec::new(),
         column: 0,
         is_head: false,
-        left_out: Vec::new(),
+        link_ends: Vec::new(),
     };
     let mut events = Parser::new_ext(markdown, options);
     while let Some(event) = events.next() {
         writer.write(event, &mut events);
     }
-    let mut written = String::with_capacity(markdown.len() * 3 / 2);
-    html::push_html(&mut written, writer.out.into_iter());
-    Rendered {
-        html: written,
+    let mut rendered = String::with_capacity(markdown.len() * 3 / 2);
+    html::push_html(&mut rendered, writer.out.into_iter());
+    Document {
+        html: rendered,
         contents: writer.contents,
-        sections: writer.sections.done(),
+        sections: writer.sections.finish(),
     }
 }
 
-/// What a program says of something.
+/// A description from the OpenAPI document.
 #[derive(Debug, Default)]
 pub(super) struct Prose {
     pub(super) html: String,
     pub(super) plain: String,
 }
 
-/// What a program says of itself: paragraphs without links, since they would lead into its source.
-pub(super) fn prose(markdown: &str) -> Prose {
-    // Rust's way to name another item.
+/// Renders a description without links, which would point into the source code.
+pub(super) fn render_prose(markdown: &str) -> Prose {
+    // Doc links to other items of the code.
     let markdown = markdown.replace("[`", "`").replace("`]", "`");
-    let linked = |event: &Event<'_>| {
+    let is_link = |event: &Event<'_>| {
         let links = [TagEnd::Link, TagEnd::Image];
         match event {
             Event::Start(tag) => links.contains(&tag.to_end()),
@@ -82,15 +85,15 @@ pub(super) fn prose(markdown: &str) -> Prose {
             _ => false,
         }
     };
-    let events = Parser::new(&markdown).filter(|event| !linked(event));
+    let events = Parser::new(&markdown).filter(|event| !is_link(event));
     let events: Vec<Event<'_>> = events.map(without_html).collect();
-    let plain = said(&events);
+    let plain = plain_text(&events);
     let mut html = String::new();
     html::push_html(&mut html, events.into_iter());
     Prose { html, plain }
 }
 
-/// The first of Markdown's lines that is a heading: its title.
+/// The first heading of a Markdown text.
 pub(super) fn title(markdown: &str) -> &str {
     let mut lines = markdown.lines();
     lines
@@ -98,20 +101,20 @@ pub(super) fn title(markdown: &str) -> &str {
         .unwrap_or_default()
 }
 
-/// What GitHub makes of a heading, which is what the documents' links name.
+/// Anchor of a heading by the rules of GitHub, which links in the documents use.
 pub(super) fn slug(heading: &str) -> String {
-    let kept = heading.chars().filter_map(|c| match c {
+    let anchor = heading.chars().filter_map(|c| match c {
         ' ' => Some('-'),
         '-' | '_' => Some(c),
         _ => c.is_alphanumeric().then_some(c),
     });
-    kept.flat_map(char::to_lowercase).collect()
+    anchor.flat_map(char::to_lowercase).collect()
 }
 
-pub(super) fn escaped(text: &str) -> String {
+pub(super) fn escape(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     Html.write_escaped_str(&mut out, text)
-        .expect("a String takes everything");
+        .expect("writing to a String cannot fail");
     out
 }
 
@@ -119,7 +122,7 @@ struct Writer<'a, S> {
     site: &'a S,
     out: Vec<Event<'a>>,
     ids: HashSet<String>,
-    contents: Vec<Entry>,
+    contents: Vec<ContentsEntry>,
     sections: Sections,
     /// The nearest heading above.
     heading: String,
@@ -128,8 +131,8 @@ struct Writer<'a, S> {
     columns: Vec<Alignment>,
     column: usize,
     is_head: bool,
-    /// Ends of the links that are open.
-    left_out: Vec<String>,
+    /// Closing tags of open links.
+    link_ends: Vec<String>,
 }
 
 impl<'a, S: Site> Writer<'a, S> {
@@ -143,12 +146,12 @@ impl<'a, S: Site> Writer<'a, S> {
             Event::Start(Tag::Image { dest_url, .. }) => self.picture(&dest_url, rest),
             Event::Start(Tag::Link { dest_url, .. }) => self.link(&dest_url, rest),
             Event::End(TagEnd::Link) => {
-                let end = self.left_out.pop().unwrap_or_default();
+                let end = self.link_ends.pop().unwrap_or_default();
                 self.html(end);
             }
             Event::Start(Tag::CodeBlock(kind)) => self.listing(&kind),
             Event::End(TagEnd::CodeBlock) => {
-                self.sections.pause();
+                self.sections.push_space();
                 self.html("</code></pre>\n");
             }
             Event::Start(Tag::Table(columns)) => self.table(columns),
@@ -169,17 +172,17 @@ impl<'a, S: Site> Writer<'a, S> {
             Event::Start(Tag::TableCell) => self.cell(),
             Event::End(TagEnd::TableCell) => {
                 self.column += 1;
-                self.sections.pause();
+                self.sections.push_space();
                 self.html(if self.is_head { "</th>" } else { "</td>" });
             }
             Event::Html(text) | Event::InlineHtml(text) => self.text(Event::Text(text)),
             Event::Text(_) | Event::Code(_) => self.text(event),
             Event::SoftBreak | Event::HardBreak => {
-                self.sections.pause();
+                self.sections.push_space();
                 self.out.push(event);
             }
             Event::End(_) => {
-                self.sections.pause_after(&event);
+                self.sections.push_space_after(&event);
                 self.out.push(event);
             }
             other => self.out.push(other),
@@ -188,15 +191,15 @@ impl<'a, S: Site> Writer<'a, S> {
 
     fn text(&mut self, event: Event<'a>) {
         if let Event::Text(text) | Event::Code(text) = &event {
-            self.sections.say(text);
+            self.sections.push_text(text);
         }
         self.out.push(event);
     }
 
     fn heading(&mut self, level: HeadingLevel, rest: &mut Parser<'a>) {
         let end = Event::End(TagEnd::Heading(level));
-        let inner = until(&end, rest);
-        let title = said(&inner);
+        let inner = take_until(&end, rest);
+        let title = plain_text(&inner);
         self.heading.clone_from(&title);
         if level == HeadingLevel::H1 {
             self.html("<h1>");
@@ -206,18 +209,18 @@ impl<'a, S: Site> Writer<'a, S> {
         let id = self.unique(slug(&title));
         if level == HeadingLevel::H2 {
             let (id, title) = (id.clone(), title.clone());
-            self.contents.push(Entry { id, title });
+            self.contents.push(ContentsEntry { id, title });
         }
         if level <= HeadingLevel::H3 {
-            self.sections.begin(&title, &id);
+            self.sections.start(&title, &id);
         } else {
-            self.sections.say(&title);
-            self.sections.pause();
+            self.sections.push_text(&title);
+            self.sections.push_space();
         }
-        let (id, name) = (escaped(&id), escaped(&title));
+        let (id, name) = (escape(&id), escape(&title));
         self.html(format!("<div class=\"titled\"><{level} id=\"{id}\">"));
         self.out.extend(inner);
-        // Beside the heading and not in it, where it would be a part of its name.
+        // The anchor is next to the heading: inside, it would be part of its accessible name.
         self.html(format!(
             "</{level}><a class=\"anchor\" href=\"#{id}\" aria-label=\"Link to the section {name}\">#</a></div>\n"
         ));
@@ -228,20 +231,20 @@ impl<'a, S: Site> Writer<'a, S> {
         let id = std::iter::once(slug.clone())
             .chain(numbered)
             .find(|id| !self.ids.contains(id))
-            .expect("there is always another number");
+            .expect("the sequence of numbers is infinite");
         self.ids.insert(id.clone());
         id
     }
 
     fn picture(&mut self, file: &str, rest: &mut Parser<'a>) {
-        let inner = until(&Event::End(TagEnd::Image), rest);
-        let shown = said(&inner);
-        self.sections.say(&shown);
-        let alt = escaped(&shown);
+        let inner = take_until(&Event::End(TagEnd::Image), rest);
+        let shown = plain_text(&inner);
+        self.sections.push_text(&shown);
+        let alt = escape(&shown);
         match self.site.picture(file) {
             Some(path) => self.html(format!(
                 "<img src=\"{}\" alt=\"{alt}\" loading=\"lazy\">",
-                escaped(&path)
+                escape(&path)
             )),
             None => self.html(alt),
         }
@@ -249,15 +252,15 @@ impl<'a, S: Site> Writer<'a, S> {
 
     fn link(&mut self, to: &str, rest: &mut Parser<'a>) {
         if to.starts_with('#') || to.starts_with("https://") || to.starts_with("http://") {
-            self.html(format!("<a href=\"{}\">", escaped(to)));
-            return self.left_out.push("</a>".into());
+            self.html(format!("<a href=\"{}\">", escape(to)));
+            return self.link_ends.push("</a>".into());
         }
         let (file, anchor) = to
             .split_once('#')
             .map_or((to, None), |(file, anchor)| (file, Some(anchor)));
-        let inner = until(&Event::End(TagEnd::Link), rest);
-        let shown = said(&inner);
-        self.sections.say(if shown == file {
+        let inner = take_until(&Event::End(TagEnd::Link), rest);
+        let shown = plain_text(&inner);
+        self.sections.push_text(if shown == file {
             self.site.page(file).map_or(file, |(title, _)| title)
         } else {
             &shown
@@ -269,24 +272,24 @@ impl<'a, S: Site> Writer<'a, S> {
                     .unwrap_or_default();
                 self.html(format!(
                     "<a href=\"{}\">",
-                    escaped(&format!("{path}{anchor}"))
+                    escape(&format!("{path}{anchor}"))
                 ));
-                // Here pages have titles, no file names.
+                // Links that show a file name show the title of the page instead.
                 if shown == file {
-                    self.html(escaped(title));
+                    self.html(escape(title));
                 } else {
                     self.out.extend(inner);
                 }
                 self.html("</a>");
             }
-            // A file of the repository, which the site does not have: its name.
+            // The site has no page for this file of the repository: show its path.
             None => {
                 let path = file.trim_start_matches("../");
                 if path.contains(&shown) {
-                    self.html(format!("<code>{}</code>", escaped(path)));
+                    self.html(format!("<code>{}</code>", escape(path)));
                 } else {
                     self.out.extend(inner);
-                    self.html(format!(" (<code>{}</code>)", escaped(path)));
+                    self.html(format!(" (<code>{}</code>)", escape(path)));
                 }
             }
         }
@@ -294,13 +297,13 @@ impl<'a, S: Site> Writer<'a, S> {
 
     fn listing(&mut self, kind: &CodeBlockKind<'_>) {
         self.listings += 1;
-        let what = match kind {
+        let label = match kind {
             CodeBlockKind::Fenced(language) if matches!(&**language, "sh" | "console") => {
                 "Commands"
             }
             CodeBlockKind::Fenced(_) | CodeBlockKind::Indented => "Listing",
         };
-        let label = escaped(&format!("{what} {}: {}", self.listings, self.heading));
+        let label = escape(&format!("{label} {}: {}", self.listings, self.heading));
         self.html(format!(
             "<pre tabindex=\"0\" role=\"group\" aria-label=\"{label}\"><code>"
         ));
@@ -309,7 +312,7 @@ impl<'a, S: Site> Writer<'a, S> {
     fn table(&mut self, columns: Vec<Alignment>) {
         self.tables += 1;
         self.columns = columns;
-        let label = escaped(&format!("Table {}: {}", self.tables, self.heading));
+        let label = escape(&format!("Table {}: {}", self.tables, self.heading));
         self.html(format!(
             "<div class=\"wide\" role=\"region\" aria-label=\"{label}\" tabindex=\"0\"><table class=\"plain\">"
         ));
@@ -329,8 +332,8 @@ impl<'a, S: Site> Writer<'a, S> {
     }
 }
 
-/// What comes before `end`, which goes with it.
-fn until<'a>(end: &Event<'_>, rest: &mut Parser<'a>) -> Vec<Event<'a>> {
+/// Events before `end`; consumes `end`.
+fn take_until<'a>(end: &Event<'_>, rest: &mut Parser<'a>) -> Vec<Event<'a>> {
     let inner = rest.by_ref().take_while(|event| event != end);
     inner.map(without_html).collect()
 }
@@ -342,14 +345,14 @@ fn without_html(event: Event<'_>) -> Event<'_> {
     }
 }
 
-/// The words of some events.
-fn said(events: &[Event<'_>]) -> String {
-    let words = events.iter().map(|event| match event {
+/// The text of events.
+fn plain_text(events: &[Event<'_>]) -> String {
+    let texts = events.iter().map(|event| match event {
         Event::Text(text) | Event::Code(text) => text,
         Event::SoftBreak | Event::HardBreak | Event::End(TagEnd::Paragraph) => " ",
         _ => "",
     });
-    words.collect::<String>().trim().to_owned()
+    texts.collect::<String>().trim().to_owned()
 }
 
 #[cfg(test)]

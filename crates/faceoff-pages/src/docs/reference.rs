@@ -1,4 +1,4 @@
-//! The API's reference, from the OpenAPI document that the server answers with.
+//! The API reference, from the OpenAPI document of the server.
 
 mod shape;
 
@@ -18,13 +18,13 @@ pub(super) struct Reference {
     pub(super) about: Prose,
     pub(super) groups: Vec<Group>,
     pub(super) schemas: Vec<Schema>,
-    /// The answers of many operations, by name.
-    pub(super) answers: Vec<Answer>,
-    /// How to show that one may ask, by name.
+    /// Responses shared by many operations, by name.
+    pub(super) responses: Vec<ResponseDoc>,
+    /// Kinds of tokens, by name.
     pub(super) tokens: Vec<(String, Prose)>,
 }
 
-/// The operations for somebody.
+/// Operations of a tag.
 #[derive(Debug)]
 pub(super) struct Group {
     pub(super) name: String,
@@ -42,8 +42,8 @@ pub(super) struct Operation {
     pub(super) tokens: Tokens,
     pub(super) parameters: Vec<Parameter>,
     pub(super) body: Option<Body>,
-    pub(super) answers: Vec<Answer>,
-    /// Those that other operations have, too: by status the name in [`Reference::answers`].
+    pub(super) responses: Vec<ResponseDoc>,
+    /// Shared responses: status, and name in [`Reference::responses`].
     pub(super) shared: Vec<(String, String)>,
 }
 
@@ -56,7 +56,8 @@ pub(super) enum Tokens {
 
 #[derive(Debug)]
 pub(super) struct Parameter {
-    pub(super) place: String,
+    /// `path` or `query`.
+    pub(super) location: String,
     pub(super) field: Field,
 }
 
@@ -68,22 +69,22 @@ pub(super) struct Body {
 }
 
 #[derive(Debug)]
-pub(super) struct Answer {
-    /// Its status; of one that many operations have, its name.
+pub(super) struct ResponseDoc {
+    /// The status; the name of a shared response.
     pub(super) name: String,
     pub(super) about: Prose,
     pub(super) media: Vec<Media>,
     pub(super) headers: Vec<String>,
 }
 
-/// Bytes of a media type, and what they are.
+/// A media type with its content.
 #[derive(Debug)]
 pub(super) struct Media {
     pub(super) name: String,
     pub(super) shape: Vec<Part>,
 }
 
-/// A type that has a name.
+/// A named type.
 #[derive(Debug)]
 pub(super) struct Schema {
     pub(super) name: String,
@@ -91,10 +92,10 @@ pub(super) struct Schema {
     pub(super) variants: Vec<Variant>,
 }
 
-/// One of the forms that a value may have.
+/// A variant of a type.
 #[derive(Debug)]
 pub(super) struct Variant {
-    /// Empty where there is one form alone, which its schema tells of.
+    /// Empty for a single variant; the description is that of the schema.
     pub(super) about: Prose,
     pub(super) shape: Vec<Part>,
     pub(super) fields: Vec<Field>,
@@ -107,7 +108,7 @@ impl Group {
 }
 
 impl Operation {
-    /// Without the base that all have.
+    /// Method and path, without the common base.
     pub(super) fn title(&self) -> String {
         format!("{} {}", self.method, self.path)
     }
@@ -124,46 +125,46 @@ pub(super) fn schema_path(name: &str) -> String {
 }
 
 impl Reference {
-    pub(super) fn of(document: &Value) -> Self {
+    pub(super) fn new(document: &Value) -> Self {
         let groups = list(&document["tags"]).map(|tag| {
             let name = text(&tag["name"]);
             Group {
                 operations: operations(document, &name),
-                about: markdown::prose(&text(&tag["description"])),
+                about: markdown::render_prose(&text(&tag["description"])),
                 name,
             }
         });
         let components = &document["components"];
         let tokens = entries(&components["securitySchemes"])
-            .map(|(name, scheme)| (name.clone(), markdown::prose(&text(&scheme["description"]))));
+            .map(|(name, scheme)| (name.clone(), markdown::render_prose(&text(&scheme["description"]))));
         Self {
-            about: markdown::prose(&text(&document["info"]["description"])),
+            about: markdown::render_prose(&text(&document["info"]["description"])),
             groups: groups.collect(),
             schemas: entries(&components["schemas"])
-                .map(|(name, schema)| Schema::of(name, schema))
+                .map(|(name, schema)| Schema::new(name, schema))
                 .collect(),
-            answers: entries(&components["responses"])
-                .map(|(name, answer)| Answer::of(name, answer))
+            responses: entries(&components["responses"])
+                .map(|(name, response)| ResponseDoc::new(name, response))
                 .collect(),
             tokens: tokens.collect(),
         }
     }
 
-    /// As the search finds it.
+    /// Sections for the search.
     pub(super) fn sections(&self) -> Vec<Section> {
         let operations = self.groups.iter().flat_map(|group| {
             group.operations.iter().map(|operation| Section {
                 page: format!("API reference: {}", group.name),
                 heading: operation.title(),
                 href: format!("{}#{}", group.path(), operation.id),
-                text: operation.said(),
+                text: operation.search_text(),
             })
         });
         let schemas = self.schemas.iter().map(|schema| Section {
             page: "API reference: schemas".into(),
             heading: schema.name.clone(),
             href: schema.path(),
-            text: schema.said(),
+            text: schema.search_text(),
         });
         operations.chain(schemas).collect()
     }
@@ -175,15 +176,15 @@ fn operations(document: &Value, tag: &str) -> Vec<Operation> {
         let methods = entries(item);
         methods.map(move |(method, operation)| (path, method, operation))
     });
-    all.filter(|(_, _, operation)| list(&operation["tags"]).any(|one| one == tag))
-        .map(|(path, method, operation)| Operation::of(path, method, operation))
+    all.filter(|(_, _, operation)| list(&operation["tags"]).any(|name| name == tag))
+        .map(|(path, method, operation)| Operation::new(path, method, operation))
         .collect()
 }
 
 impl Operation {
-    fn of(path: &str, method: &str, operation: &Value) -> Self {
+    fn new(path: &str, method: &str, operation: &Value) -> Self {
         let parameters = list(&operation["parameters"]).map(|parameter| Parameter {
-            place: text(&parameter["in"]),
+            location: text(&parameter["in"]),
             field: Field {
                 name: text(&parameter["name"]),
                 shape: shape(&parameter["schema"]),
@@ -197,55 +198,55 @@ impl Operation {
             media: media(body),
         });
         let (shared, own): (Vec<_>, Vec<_>) =
-            entries(&operation["responses"]).partition(|(_, answer)| answer["$ref"].is_string());
+            entries(&operation["responses"]).partition(|(_, response)| response["$ref"].is_string());
         let shared = shared
             .into_iter()
-            .map(|(status, answer)| (status.clone(), last(&answer["$ref"])));
-        let answers = own
+            .map(|(status, response)| (status.clone(), reference_name(&response["$ref"])));
+        let responses = own
             .into_iter()
-            .map(|(status, answer)| Answer::of(status, answer));
+            .map(|(status, response)| ResponseDoc::new(status, response));
         Self {
             id: text(&operation["operationId"]),
             method: method.to_uppercase(),
             path: path.to_owned(),
-            summary: markdown::prose(&text(&operation["summary"])),
+            summary: markdown::render_prose(&text(&operation["summary"])),
             about: about(operation),
-            tokens: Tokens::of(&operation["security"]),
+            tokens: Tokens::new(&operation["security"]),
             parameters: parameters.collect(),
             body,
-            answers: answers.collect(),
+            responses: responses.collect(),
             shared: shared.collect(),
         }
     }
 
-    fn said(&self) -> String {
-        let parameters = self.parameters.iter().map(|one| &one.field);
+    fn search_text(&self) -> String {
+        let parameters = self.parameters.iter().map(|parameter| &parameter.field);
         let parameters = parameters.map(|field| format!("{}: {}", field.name, field.about.plain));
-        let told = [&self.summary, &self.about].map(|told| told.plain.clone());
-        let told = told.into_iter().chain(parameters);
-        told.collect::<Vec<_>>().join(" ")
+        let texts = [&self.summary, &self.about].map(|prose| prose.plain.clone());
+        let texts = texts.into_iter().chain(parameters);
+        texts.collect::<Vec<_>>().join(" ")
     }
 }
 
-impl Answer {
-    fn of(name: &str, answer: &Value) -> Self {
-        let headers = entries(&answer["headers"]).map(|(name, _)| name.clone());
+impl ResponseDoc {
+    fn new(name: &str, response: &Value) -> Self {
+        let headers = entries(&response["headers"]).map(|(name, _)| name.clone());
         Self {
             name: name.to_owned(),
-            about: about(answer),
-            media: media(answer),
+            about: about(response),
+            media: media(response),
             headers: headers.collect(),
         }
     }
 }
 
 impl Tokens {
-    /// `[{}, {"team": []}]`: without a token, or with one of these.
-    fn of(security: &Value) -> Self {
+    /// From OpenAPI security requirements: `[{}, {"team": []}]` is an optional token.
+    fn new(security: &Value) -> Self {
         let names: Vec<&str> = list(security)
-            .flat_map(|one| entries(one).map(|(name, _)| name.as_str()))
+            .flat_map(|requirement| entries(requirement).map(|(name, _)| name.as_str()))
             .collect();
-        let is_optional = list(security).any(|one| one.as_object().is_some_and(Map::is_empty));
+        let is_optional = list(security).any(|requirement| requirement.as_object().is_some_and(Map::is_empty));
         match (names.join(" or "), is_optional) {
             (names, _) if names.is_empty() => Self::None,
             (names, true) => Self::Optional(names),
@@ -255,14 +256,14 @@ impl Tokens {
 }
 
 impl Schema {
-    fn of(name: &str, schema: &Value) -> Self {
+    fn new(name: &str, schema: &Value) -> Self {
         let forms = list(&schema["oneOf"]).map(|form| Variant {
             about: about(form),
-            ..Variant::of(form)
+            ..Variant::new(form)
         });
         let mut variants: Vec<Variant> = forms.collect();
         if variants.is_empty() {
-            variants.push(Variant::of(schema));
+            variants.push(Variant::new(schema));
         }
         Self {
             name: name.to_owned(),
@@ -271,20 +272,20 @@ impl Schema {
         }
     }
 
-    fn said(&self) -> String {
+    fn search_text(&self) -> String {
         let fields = self.variants.iter().flat_map(|variant| &variant.fields);
         let fields = fields.map(|field| format!("{}: {}", field.name, field.about.plain));
-        let told = std::iter::once(self.about.plain.clone());
-        told.chain(fields).collect::<Vec<_>>().join(" ")
+        let about = std::iter::once(self.about.plain.clone());
+        about.chain(fields).collect::<Vec<_>>().join(" ")
     }
 }
 
 impl Variant {
-    fn of(schema: &Value) -> Self {
+    fn new(schema: &Value) -> Self {
         let fields = fields(schema);
         Self {
             about: Prose::default(),
-            // Fields have a table of their own.
+            // Fields are shown in a table instead.
             shape: if fields.is_empty() {
                 shape(schema)
             } else {
@@ -295,7 +296,7 @@ impl Variant {
     }
 }
 
-/// What a body or an answer may be.
+/// Media types of a request or response body.
 fn media(body: &Value) -> Vec<Media> {
     let media = entries(&body["content"]).map(|(name, content)| Media {
         name: name.clone(),
@@ -304,8 +305,8 @@ fn media(body: &Value) -> Vec<Media> {
     media.collect()
 }
 
-/// Of a reference the name that it ends with.
-fn last(reference: &Value) -> String {
+/// The last part of a `$ref`: the name of the component.
+fn reference_name(reference: &Value) -> String {
     let name = reference.as_str().and_then(|path| path.rsplit('/').next());
     name.unwrap_or_default().to_owned()
 }

@@ -1,44 +1,42 @@
-//! Which sections have all words of a question, the best first.
+//! Full-text search: sections that contain all words of a query, ranked.
 
 use super::sections::Section;
 use std::{cmp::Reverse, ops::Range};
 
-/// So many are shown; who needs the next says more words.
-pub(super) const SHOWN: usize = 30;
-/// So much of a section is shown around the first word that was found, in bytes on each side.
-const AROUND: usize = 110;
+/// Largest number of results on the page.
+pub(super) const MAX_RESULTS: usize = 30;
+/// Length of a snippet on each side of the first match, in bytes.
+const SNIPPET_BYTES: usize = 110;
 
-/// A section that was found.
 #[derive(Debug, PartialEq, Eq)]
-pub(super) struct Found {
+pub(super) struct SearchResult {
     pub(super) page: String,
     pub(super) href: String,
     pub(super) heading: Vec<Piece>,
     pub(super) snippet: Vec<Piece>,
 }
 
-/// Text, one of the words or between them.
+/// A piece of text; matches are highlighted.
 #[derive(Debug, PartialEq, Eq)]
 pub(super) struct Piece {
     pub(super) text: String,
-    pub(super) is_word: bool,
+    pub(super) is_match: bool,
 }
 
-/// Sections as they are searched.
 #[derive(Debug)]
-pub(super) struct Index(Vec<Indexed>);
+pub(super) struct Index(Vec<IndexedSection>);
 
 #[derive(Debug)]
-struct Indexed {
+struct IndexedSection {
     section: Section,
-    /// In lower case, of ASCII alone: so a place in one is the same place in the other. The documents are English.
+    /// In ASCII lower case, so that byte positions are the same as in the original text. The documents are English.
     heading: String,
     text: String,
 }
 
 impl Index {
     pub(super) fn new(sections: impl IntoIterator<Item = Section>) -> Self {
-        let indexed = sections.into_iter().map(|section| Indexed {
+        let indexed = sections.into_iter().map(|section| IndexedSection {
             heading: section.heading.to_ascii_lowercase(),
             text: section.text.to_ascii_lowercase(),
             section,
@@ -46,61 +44,60 @@ impl Index {
         Self(indexed.collect())
     }
 
-    /// The first [`SHOWN`] of the sections that have all words, and how many there are.
+    /// The first [`MAX_RESULTS`] sections that contain all words, and the total number.
     ///
-    /// Sections with more of the words in their headings come first, of these the ones that say the words more often, of
-    /// these in the order of the pages.
-    pub(super) fn search(&self, question: &str) -> (Vec<Found>, usize) {
-        let question = question.to_ascii_lowercase();
-        let mut words: Vec<&str> = question.split_whitespace().collect();
+    /// Sections are ranked by the number of words in the heading, then by matches in the text, then by the order of the pages.
+    pub(super) fn search(&self, query: &str) -> (Vec<SearchResult>, usize) {
+        let query = query.to_ascii_lowercase();
+        let mut words: Vec<&str> = query.split_whitespace().collect();
         words.sort_unstable();
         words.dedup();
         if words.is_empty() {
             return (Vec::new(), 0);
         }
-        let mut found: Vec<(Reverse<(usize, usize)>, &Indexed)> = self
+        let mut results: Vec<(Reverse<(usize, usize)>, &IndexedSection)> = self
             .0
             .iter()
-            .filter_map(|one| one.rank(&words).map(|rank| (Reverse(rank), one)))
+            .filter_map(|section| section.rank(&words).map(|rank| (Reverse(rank), section)))
             .collect();
-        found.sort_by_key(|(rank, _)| *rank);
-        let shown = found.iter().take(SHOWN).map(|(_, one)| one.show(&words));
-        (shown.collect(), found.len())
+        results.sort_by_key(|(rank, _)| *rank);
+        let shown = results.iter().take(MAX_RESULTS).map(|(_, section)| section.result(&words));
+        (shown.collect(), results.len())
     }
 }
 
-impl Indexed {
-    /// How many words the heading has, and how often the text has them; nothing if one is in neither.
+impl IndexedSection {
+    /// Number of words in the heading, and number of matches in the text; `None` if a word is missing.
     fn rank(&self, words: &[&str]) -> Option<(usize, usize)> {
-        let (mut headed, mut said) = (0, 0);
+        let (mut words_in_heading, mut matches_in_text) = (0, 0);
         for word in words {
-            let is_headed = self.heading.contains(word);
+            let is_in_heading = self.heading.contains(word);
             let count = self.text.matches(word).count();
-            if !is_headed && count == 0 {
+            if !is_in_heading && count == 0 {
                 return None;
             }
-            headed += usize::from(is_headed);
-            said += count;
+            words_in_heading += usize::from(is_in_heading);
+            matches_in_text += count;
         }
-        Some((headed, said))
+        Some((words_in_heading, matches_in_text))
     }
 
-    fn show(&self, words: &[&str]) -> Found {
+    fn result(&self, words: &[&str]) -> SearchResult {
         let text = &self.section.text;
         let first = words.iter().filter_map(|word| self.text.find(word)).min();
-        let shown = around(text, first.unwrap_or(0));
+        let shown = snippet_range(text, first.unwrap_or(0));
         let mut snippet = pieces(&text[shown.clone()], &self.text[shown.clone()], words);
-        let dots = || Piece {
+        let ellipsis = || Piece {
             text: "…".into(),
-            is_word: false,
+            is_match: false,
         };
         if shown.start > 0 {
-            snippet.insert(0, dots());
+            snippet.insert(0, ellipsis());
         }
         if shown.end < text.len() {
-            snippet.push(dots());
+            snippet.push(ellipsis());
         }
-        Found {
+        SearchResult {
             page: self.section.page.clone(),
             href: self.section.href.clone(),
             heading: pieces(&self.section.heading, &self.heading, words),
@@ -109,30 +106,30 @@ impl Indexed {
     }
 }
 
-/// Whole words around a place.
-fn around(text: &str, at: usize) -> Range<usize> {
-    let from = text.floor_char_boundary(at.saturating_sub(AROUND));
+/// A range of whole words around a byte position.
+fn snippet_range(text: &str, at: usize) -> Range<usize> {
+    let from = text.floor_char_boundary(at.saturating_sub(SNIPPET_BYTES));
     let start = match text[from..at].find(' ') {
         Some(space) if from > 0 => from + space + 1,
         _ => from,
     };
-    let to = text.ceil_char_boundary((at + AROUND).min(text.len()));
+    let to = text.ceil_char_boundary((at + SNIPPET_BYTES).min(text.len()));
     let end = text[to..].find(' ').map_or(text.len(), |space| to + space);
-    // A word may be as long as a page.
-    start..end.min(text.ceil_char_boundary((to + AROUND).min(text.len())))
+    // Limits the range even if a single word is very long.
+    start..end.min(text.ceil_char_boundary((to + SNIPPET_BYTES).min(text.len())))
 }
 
-/// `text` cut where `lower`, the same in lower case, has one of the words.
+/// Splits `text` at matches of the words; `lower` is the same text in lower case.
 fn pieces(text: &str, lower: &str, words: &[&str]) -> Vec<Piece> {
     let mut pieces = Vec::new();
     let mut done = 0;
-    let mut push = |range: Range<usize>, is_word| {
+    let mut push = |range: Range<usize>, is_match| {
         if !range.is_empty() {
             let text = text[range].to_owned();
-            pieces.push(Piece { text, is_word });
+            pieces.push(Piece { text, is_match });
         }
     };
-    // The nearest word next, the longest of those that begin there.
+    // The nearest match next; the longest word if several start there.
     while let Some((at, Reverse(length))) = words
         .iter()
         .filter_map(|word| Some((done + lower[done..].find(word)?, Reverse(word.len()))))
@@ -159,23 +156,23 @@ mod tests {
         }
     }
 
-    fn headings(index: &Index, question: &str) -> Vec<String> {
-        let (found, count) = index.search(question);
-        assert_eq!(found.len(), count);
-        let headings = found.iter().map(|one| {
-            let texts = one.heading.iter().map(|piece| piece.text.as_str());
+    fn headings(index: &Index, query: &str) -> Vec<String> {
+        let (results, count) = index.search(query);
+        assert_eq!(results.len(), count);
+        let headings = results.iter().map(|result| {
+            let texts = result.heading.iter().map(|piece| piece.text.as_str());
             texts.collect()
         });
         headings.collect()
     }
 
     #[test]
-    fn headings_come_first_then_what_says_it_more_often() {
+    fn ranking_prefers_headings_then_match_count() {
         let index = Index::new([
             section("Once", "the puck"),
             section("Often", "puck, Puck and PUCK"),
             section("The puck", "round"),
-            section("Nothing", "of it"),
+            section("Other", "text"),
         ]);
         assert_eq!(headings(&index, "puck"), ["The puck", "Often", "Once"]);
         assert_eq!(headings(&index, "PUCK the"), ["The puck", "Once"]);
@@ -184,43 +181,43 @@ mod tests {
     }
 
     #[test]
-    fn words_are_marked_as_they_are_written() {
+    fn matches_keep_their_original_case() {
         let index = Index::new([section("A Puck", "Pucks: ≤ 2 puckish µ")]);
-        let (found, _) = index.search("puck PUCKS");
+        let (results, _) = index.search("puck PUCKS");
         let marked = |pieces: &[Piece]| {
-            let pieces = pieces.iter().map(|piece| match piece.is_word {
+            let pieces = pieces.iter().map(|piece| match piece.is_match {
                 true => format!("[{}]", piece.text),
                 false => piece.text.clone(),
             });
             pieces.collect::<String>()
         };
-        assert_eq!(marked(&found[0].snippet), "[Pucks]: ≤ 2 [puck]ish µ");
-        let (found, _) = index.search("puck µ");
-        assert_eq!(marked(&found[0].heading), "A [Puck]");
-        assert_eq!(marked(&found[0].snippet), "[Puck]s: ≤ 2 [puck]ish [µ]");
+        assert_eq!(marked(&results[0].snippet), "[Pucks]: ≤ 2 [puck]ish µ");
+        let (results, _) = index.search("puck µ");
+        assert_eq!(marked(&results[0].heading), "A [Puck]");
+        assert_eq!(marked(&results[0].snippet), "[Puck]s: ≤ 2 [puck]ish [µ]");
     }
 
     #[test]
-    fn a_long_section_is_shown_around_the_first_word_and_never_cut_within_a_character() {
+    fn snippet_surrounds_first_match_on_char_boundaries() {
         let filler = "äöü … ".repeat(200);
         let index = Index::new([section("Long", &format!("{filler}here {filler}"))]);
-        let (found, _) = index.search("here");
-        let texts: Vec<&str> = found[0].snippet.iter().map(|piece| &*piece.text).collect();
+        let (results, _) = index.search("here");
+        let texts: Vec<&str> = results[0].snippet.iter().map(|piece| &*piece.text).collect();
         assert_eq!(texts[0], "…");
         assert_eq!(texts[2], "here");
         assert_eq!(*texts.last().unwrap(), "…");
-        assert!(texts.concat().len() < 4 * AROUND, "{texts:?}");
-        // A single word without an end.
+        assert!(texts.concat().len() < 4 * SNIPPET_BYTES, "{texts:?}");
+        // A single long word.
         let index = Index::new([section("Word", &"ä".repeat(5000))]);
-        let (found, _) = index.search("ä");
-        let shown: usize = found[0].snippet.iter().map(|piece| piece.text.len()).sum();
-        assert!(shown < 4 * AROUND);
+        let (results, _) = index.search("ä");
+        let shown: usize = results[0].snippet.iter().map(|piece| piece.text.len()).sum();
+        assert!(shown < 4 * SNIPPET_BYTES);
     }
 
     #[test]
-    fn more_than_are_shown_are_counted() {
+    fn count_includes_results_that_are_not_shown() {
         let index = Index::new((0..100).map(|_| section("Same", "puck")));
-        let (found, count) = index.search("puck");
-        assert_eq!((found.len(), count), (SHOWN, 100));
+        let (results, count) = index.search("puck");
+        assert_eq!((results.len(), count), (MAX_RESULTS, 100));
     }
 }

@@ -1,24 +1,24 @@
-//! Pages cut at their headings: what a search finds.
+//! Sections of pages, split at headings, for the search.
 
 use pulldown_cmark::{Event, TagEnd};
 
-/// What stands below a heading of the second or third level, or above the first of them.
+/// Text below a heading of the second or third level, or before the first one.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Section {
     pub(super) page: String,
     pub(super) heading: String,
     pub(super) href: String,
-    /// Its words, in one line.
+    /// The text in one line.
     pub(super) text: String,
 }
 
-/// A page's sections while it is read.
+/// Collects the sections of a page while it is rendered.
 #[derive(Debug)]
 pub(super) struct Sections {
     path: String,
     title: String,
-    done: Vec<Section>,
-    now: Section,
+    finished: Vec<Section>,
+    current: Section,
 }
 
 impl Sections {
@@ -26,8 +26,8 @@ impl Sections {
         Self {
             path: path.to_owned(),
             title: title.to_owned(),
-            done: Vec::new(),
-            now: Section {
+            finished: Vec::new(),
+            current: Section {
                 page: title.to_owned(),
                 heading: title.to_owned(),
                 href: path.to_owned(),
@@ -36,40 +36,40 @@ impl Sections {
         }
     }
 
-    /// A heading with its id.
-    pub(super) fn begin(&mut self, heading: &str, id: &str) {
+    /// Starts a section at a heading.
+    pub(super) fn start(&mut self, heading: &str, id: &str) {
         let next = Section {
             page: self.title.clone(),
             heading: heading.to_owned(),
             href: format!("{}#{id}", self.path),
             text: String::new(),
         };
-        self.done.push(std::mem::replace(&mut self.now, next));
+        self.finished.push(std::mem::replace(&mut self.current, next));
     }
 
-    pub(super) fn say(&mut self, words: &str) {
-        self.now.text.push_str(words);
+    pub(super) fn push_text(&mut self, text: &str) {
+        self.current.text.push_str(text);
     }
 
-    /// What follows is another word.
-    pub(super) fn pause(&mut self) {
-        self.now.text.push(' ');
+    /// Separates the following text from the previous word.
+    pub(super) fn push_space(&mut self) {
+        self.current.text.push(' ');
     }
 
-    /// Likewise, where this ended a block; emphasis may end within a word.
-    pub(super) fn pause_after(&mut self, event: &Event<'_>) {
-        let within = [TagEnd::Emphasis, TagEnd::Strong];
-        if !matches!(event, Event::End(end) if within.contains(end)) {
-            self.pause();
+    /// Adds a space if the event ends a block; emphasis may end inside a word.
+    pub(super) fn push_space_after(&mut self, event: &Event<'_>) {
+        let inline = [TagEnd::Emphasis, TagEnd::Strong];
+        if !matches!(event, Event::End(end) if inline.contains(end)) {
+            self.push_space();
         }
     }
 
-    pub(super) fn done(mut self) -> Vec<Section> {
-        self.done.push(self.now);
-        for section in &mut self.done {
+    pub(super) fn finish(mut self) -> Vec<Section> {
+        self.finished.push(self.current);
+        for section in &mut self.finished {
             let words: Vec<&str> = section.text.split_whitespace().collect();
             section.text = words.join(" ");
         }
-        self.done
+        self.finished
     }
 }

@@ -1,42 +1,42 @@
-//! Where episodes began, and where limits were broken.
+//! Start positions and violations of episodes on the table.
 
 use crate::{
-    broken_places::Places,
+    violation_map::ViolationMarks,
     figures,
-    table_drawing::{self, Place},
+    table_drawing::{self, Position},
 };
 use faceoff_replay::{EpisodeLine, Group};
 use faceoff_types::Task;
 
-/// Where the puck was at the start of a task's episodes: solved ones as dots, others as crosses.
-pub(super) struct OutcomeMap {
+/// Start positions of the puck in the episodes of a task: solved ones as dots, others as crosses.
+pub(super) struct StartMap {
     pub(super) task: Task,
     pub(super) solved: String,
     pub(super) failed: String,
     pub(super) solved_count: usize,
     pub(super) failed_count: usize,
-    /// The same in numbers, by where across the table the puck began and how fast it was.
-    pub(super) tables: Vec<ShareTable>,
+    /// Success rates by the position across the table and the speed of the puck at the start.
+    pub(super) tables: Vec<SuccessTable>,
 }
 
-/// Shares by a value of the start.
-pub(super) struct ShareTable {
+/// Success rates by a value of the start.
+pub(super) struct SuccessTable {
     pub(super) id: String,
     pub(super) caption: &'static str,
-    pub(super) of: &'static str,
-    pub(super) shares: Vec<Share>,
+    pub(super) value: &'static str,
+    pub(super) rows: Vec<SuccessRow>,
 }
 
-/// How many of some episodes were solved.
-pub(super) struct Share {
-    pub(super) of: String,
+/// Solved episodes of a class.
+pub(super) struct SuccessRow {
+    pub(super) range: String,
     pub(super) solved: usize,
-    pub(super) all: usize,
+    pub(super) total: usize,
     pub(super) percent: String,
 }
 
-impl OutcomeMap {
-    pub(super) fn of(task: Task, lines: &[&EpisodeLine]) -> Option<Self> {
+impl StartMap {
+    pub(super) fn new(task: Task, lines: &[&EpisodeLine]) -> Option<Self> {
         let lines: Vec<&EpisodeLine> = lines
             .iter()
             .copied()
@@ -45,9 +45,9 @@ impl OutcomeMap {
         if lines.is_empty() {
             return None;
         }
-        let starts = |success: bool| -> Vec<Place> {
-            let those = lines.iter().filter(|line| line.success == success);
-            those.map(|line| [line.start[0], line.start[1]]).collect()
+        let starts = |success: bool| -> Vec<Position> {
+            let episodes = lines.iter().filter(|line| line.success == success);
+            episodes.map(|line| [line.start[0], line.start[1]]).collect()
         };
         let (solved, failed) = (starts(true), starts(false));
         Some(Self {
@@ -57,39 +57,39 @@ impl OutcomeMap {
             solved_count: solved.len(),
             failed_count: failed.len(),
             tables: [
-                ShareTable {
+                SuccessTable {
                     id: format!("across-{task}"),
-                    caption: "Solved, by where across the table the puck began.",
-                    of: "y",
-                    shares: shares(&lines, |line| line.start[1], "m", 0.2),
+                    caption: "Success by start position across the table",
+                    value: "y",
+                    rows: success_by(&lines, |line| line.start[1], "m", 0.2),
                 },
-                ShareTable {
+                SuccessTable {
                     id: format!("speed-{task}"),
-                    caption: "Solved, by the puck's speed at the start.",
-                    of: "Speed",
-                    shares: shares(&lines, speed, "m/s", 0.5),
+                    caption: "Success by speed of the puck at the start",
+                    value: "Speed",
+                    rows: success_by(&lines, speed, "m/s", 0.5),
                 },
             ]
             .into_iter()
-            .filter(|table| !table.shares.is_empty())
+            .filter(|table| !table.rows.is_empty())
             .collect(),
         })
     }
 }
 
-/// m/s. (Not `hypot`, which is not the same function of the C library everywhere.)
+/// Speed of the puck at the start, m/s. `hypot` is avoided: it differs between C libraries.
 fn speed(line: &EpisodeLine) -> f64 {
     let [_, _, vx, vy] = line.start;
     (vx * vx + vy * vy).sqrt()
 }
 
-/// By classes of a value, each `width` wide, that hold any episode. One class tells nothing: none then.
-fn shares(
+/// Success by classes of a value, each `width` wide. Empty classes are omitted; a single class gives no rows.
+fn success_by(
     lines: &[&EpisodeLine],
     value: impl Fn(&EpisodeLine) -> f64,
     unit: &str,
     width: f64,
-) -> Vec<Share> {
+) -> Vec<SuccessRow> {
     let class = |line: &EpisodeLine| (value(line) / width).floor();
     let mut classes: Vec<f64> = lines.iter().map(|line| class(line)).collect();
     classes.sort_by(f64::total_cmp);
@@ -105,44 +105,45 @@ fn shares(
                 .filter(|line| class(line).total_cmp(&from).is_eq())
                 .collect();
             let solved = inside.iter().filter(|line| line.success).count();
-            Share {
-                of: format!(
+            SuccessRow {
+                range: format!(
                     "{} … {} {unit}",
                     figures::signed(from * width).trim_start_matches('+'),
                     figures::signed((from + 1.0) * width).trim_start_matches('+'),
                 ),
                 solved,
-                all: inside.len(),
+                total: inside.len(),
                 percent: figures::percent(solved, inside.len()),
             }
         })
         .collect()
 }
 
-/// Where on the table and at which joint limits were broken first in an episode.
-pub(super) struct SafetyMap {
-    pub(super) places: Vec<Places>,
+/// First violations of episodes, by position on the table and by joint.
+pub(super) struct ViolationMap {
+    pub(super) marks: Vec<ViolationMarks>,
     pub(super) joints: Vec<Joint>,
     pub(super) episodes: usize,
 }
 
-/// How many episodes broke a joint's limits first at that joint.
+/// Episodes whose first violation of a joint limit was at this joint.
 pub(super) struct Joint {
     pub(super) joint: u32,
     pub(super) position: usize,
     pub(super) velocity: usize,
 }
 
-impl SafetyMap {
-    pub(super) fn of(lines: &[&EpisodeLine]) -> Self {
-        let broken = || lines.iter().flat_map(|line| &line.broken);
-        let places = Places::by_group(|group| {
-            let those = broken().filter(|one| one.group == group);
-            those.map(|one| one.at).collect()
+impl ViolationMap {
+    pub(super) fn new(lines: &[&EpisodeLine]) -> Self {
+        let violations = || lines.iter().flat_map(|line| &line.broken);
+        let marks = ViolationMarks::by_group(|group| {
+            let matching = violations().filter(|violation| violation.group == group);
+            matching.map(|violation| violation.at).collect()
         });
         let count = |group, joint| {
-            let those = broken().filter(|one| one.group == group && one.joint == Some(joint));
-            those.count()
+            let matching =
+                violations().filter(|violation| violation.group == group && violation.joint == Some(joint));
+            matching.count()
         };
         let joints = (1..=7)
             .map(|joint| Joint {
@@ -153,7 +154,7 @@ impl SafetyMap {
             .filter(|joint| joint.position + joint.velocity > 0)
             .collect();
         Self {
-            places,
+            marks,
             joints,
             episodes: lines.iter().filter(|line| !line.broken.is_empty()).count(),
         }

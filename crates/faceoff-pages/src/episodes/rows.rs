@@ -1,6 +1,6 @@
-//! An episode as a row of the table.
+//! Rows of the table of episodes.
 
-use crate::{episode_words::in_words, figures, replay::page_path};
+use crate::{episode_text::describe_violation, figures, replay::page_path};
 use faceoff_replay::{EpisodeLine, model::CONTROL_STEP_S};
 use faceoff_types::{EvaluationId, Task};
 
@@ -10,14 +10,14 @@ pub(super) struct Row {
     pub(super) path: String,
     pub(super) success: bool,
     pub(super) why: String,
-    pub(super) broken: Vec<String>,
+    pub(super) violations: Vec<String>,
     pub(super) duration_s: String,
-    /// ms; for whoever gets the dataset.
-    pub(super) longest_ms: Option<String>,
+    /// Slowest answer; only for viewers of the dataset.
+    pub(super) slowest_ms: Option<String>,
 }
 
 impl Row {
-    pub(super) fn of(id: EvaluationId, line: &EpisodeLine) -> Self {
+    pub(super) fn new(id: EvaluationId, line: &EpisodeLine) -> Self {
         let EpisodeLine { task, episode, .. } = line;
         Self {
             task: *task,
@@ -25,9 +25,9 @@ impl Row {
             path: page_path(id, *task, *episode),
             success: line.success,
             why: line.why.clone(),
-            broken: line.broken.iter().map(in_words).collect(),
+            violations: line.broken.iter().map(describe_violation).collect(),
             duration_s: format!("{:.2}", f64::from(line.steps) * CONTROL_STEP_S),
-            longest_ms: line.longest_s.map(figures::milliseconds),
+            slowest_ms: line.longest_s.map(figures::milliseconds),
         }
     }
 }

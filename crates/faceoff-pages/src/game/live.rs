@@ -1,111 +1,110 @@
-//! A game while it is played.
+//! A running game.
 
 use crate::{figures, table_drawing::Dot};
 use faceoff_replay::model::CONTROL_STEP_S;
-use faceoff_service::views::game_live::GameLive;
-use faceoff_types::{GameHappening, Side};
+use faceoff_service::views::live_game::LiveGameView;
+use faceoff_types::{GameEvent, Side};
 use jiff::{SignedDuration, Timestamp};
 
-pub(super) struct Live {
+pub(super) struct LiveGame {
     pub(super) score: [u32; 2],
     pub(super) fouls: [u32; 2],
-    /// Minutes that were played, and of the whole game.
     pub(super) played_min: String,
-    pub(super) whole_min: String,
-    /// When it is over, as fast as it has gone so far; none in its first seconds.
+    pub(super) total_min: String,
+    /// Expected end at the current pace; `None` in the first seconds.
     pub(super) expected_at: Option<Timestamp>,
     pub(super) puck: Dot,
     pub(super) mallets: [Dot; 2],
-    /// What happened, the newest first: minutes and seconds of the game, and words.
-    pub(super) happened: Vec<(String, String)>,
+    /// Game clock and text of each event, newest first.
+    pub(super) events: Vec<(String, String)>,
 }
 
-/// Before as many control steps nobody can tell how fast it goes.
-const FIRST_STEPS: u32 = 500;
+/// Control steps before the pace can be estimated.
+const MIN_STEPS_FOR_PACE: u32 = 500;
 
-impl Live {
-    pub(super) fn of(
-        live: &GameLive,
+impl LiveGame {
+    pub(super) fn new(
+        live: &LiveGameView,
         teams: &[String; 2],
         since: Timestamp,
         now: Timestamp,
     ) -> Self {
-        let stands = &live.stands;
-        let minutes = |steps: u32| figures::one(f64::from(steps) * CONTROL_STEP_S / 60.0);
-        let last = live.happenings.last().map_or(0, |last| last.step);
-        let step = stands.position.map_or(last, |position| position.step);
-        let places = stands
+        let state = &live.state;
+        let minutes = |steps: u32| figures::one_decimal(f64::from(steps) * CONTROL_STEP_S / 60.0);
+        let last = live.events.last().map_or(0, |last| last.step);
+        let step = state.position.map_or(last, |position| position.step);
+        let places = state
             .position
             .map_or([[0.0; 2], [-0.8, 0.0], [0.8, 0.0]], |position| {
                 let [x, y, _] = position.puck;
                 [[x, y], position.mallets[0], position.mallets[1]]
             });
         let [puck, home, away] = places.map(Dot::at);
-        let happened = live.happenings.iter().rev();
+        let events = live.events.iter().rev();
         Self {
-            score: stands.score,
-            fouls: stands.fouls,
+            score: state.score,
+            fouls: state.fouls,
             played_min: minutes(step),
-            whole_min: minutes(stands.steps),
-            expected_at: expected_at(since, now, step, stands.steps),
+            total_min: minutes(state.steps),
+            expected_at: expected_at(since, now, step, state.steps),
             puck,
             mallets: [home, away],
-            happened: happened
-                .filter_map(|one| Some((at(one.step), in_words(&one.what, teams)?)))
+            events: events
+                .filter_map(|event| Some((game_clock(event.step), event_text(&event.event, teams)?)))
                 .collect(),
         }
     }
 
-    /// In a sentence, for who listens.
-    pub(super) fn told(&self) -> String {
+    /// Text for screen readers after a live update.
+    pub(super) fn live_text(&self) -> String {
         let [home, away] = self.score;
-        match self.happened.first() {
-            Some((_, words)) => format!("{words}."),
+        match self.events.first() {
+            Some((_, text)) => format!("{text}."),
             None => format!("{home} : {away}."),
         }
     }
 }
 
 fn expected_at(since: Timestamp, now: Timestamp, step: u32, steps: u32) -> Option<Timestamp> {
-    if step < FIRST_STEPS {
+    if step < MIN_STEPS_FOR_PACE {
         return None;
     }
-    let so_far = now.duration_since(since).as_secs_f64();
-    let left = so_far * f64::from(steps.saturating_sub(step)) / f64::from(step);
+    let elapsed = now.duration_since(since).as_secs_f64();
+    let left = elapsed * f64::from(steps.saturating_sub(step)) / f64::from(step);
     now.checked_add(SignedDuration::try_from_secs_f64(left).ok()?)
         .ok()
 }
 
 /// Minutes and seconds of the game.
-pub(super) fn at(step: u32) -> String {
+pub(super) fn game_clock(step: u32) -> String {
     let seconds = f64::from(step) * CONTROL_STEP_S;
     let minutes = (seconds / 60.0).floor();
     format!("{minutes:.0}:{:04.1}", (seconds - 60.0 * minutes).min(59.9))
 }
 
-/// Where the replay is two seconds before a control step, as its script reads it from the address.
-pub(super) fn before(step: u32) -> String {
+/// Address fragment that opens the replay two seconds before a control step.
+pub(super) fn replay_link(step: u32) -> String {
     format!("#t={}", step.saturating_sub(100))
 }
 
-/// None of what is no news.
-fn in_words(what: &GameHappening, teams: &[String; 2]) -> Option<String> {
+/// Text of an event; `None` for events that are not listed.
+fn event_text(event: &GameEvent, teams: &[String; 2]) -> Option<String> {
     let name = |side: Side| &teams[side.index()];
-    let stands = |[home, away]: [u32; 2]| format!("{home} : {away}");
-    Some(match what {
-        GameHappening::RallyBegun { .. } | GameHappening::BrokenOff => return None,
-        GameHappening::Restarted { side } => {
-            format!("The agent of {} was started anew", name(*side))
+    let score_text = |[home, away]: [u32; 2]| format!("{home} : {away}");
+    Some(match event {
+        GameEvent::RallyBegun { .. } | GameEvent::Aborted => return None,
+        GameEvent::Restarted { side } => {
+            format!("The agent of {} was restarted", name(*side))
         }
-        GameHappening::Goal { by, score } => format!("Goal by {}: {}", name(*by), stands(*score)),
-        GameHappening::Foul { by, score } => format!("Foul by {}: {}", name(*by), stands(*score)),
-        GameHappening::Stuck => "The puck lay where nobody reaches it".to_owned(),
-        GameHappening::LeftTable => "The puck left the table".to_owned(),
-        GameHappening::Diverged => "The simulated world diverged".to_owned(),
-        GameHappening::Fault { side, count } => {
-            format!("Fault of {}, its number {count}", name(*side))
+        GameEvent::Goal { by, score } => format!("Goal by {}: {}", name(*by), score_text(*score)),
+        GameEvent::Foul { by, score } => format!("Foul by {}: {}", name(*by), score_text(*score)),
+        GameEvent::Stuck => "Puck out of reach".to_owned(),
+        GameEvent::LeftTable => "Puck left the table".to_owned(),
+        GameEvent::Diverged => "Simulation diverged".to_owned(),
+        GameEvent::Fault { side, count } => {
+            format!("Fault {count} of {}", name(*side))
         }
-        GameHappening::Ended { score, .. } => format!("The end: {}", stands(*score)),
+        GameEvent::Ended { score, .. } => format!("End of the game: {}", score_text(*score)),
     })
 }
 
@@ -114,15 +113,15 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_moment_of_a_game_is_told_in_minutes_and_seconds() {
+    fn game_clock_has_minutes_and_seconds() {
         assert_eq!(
-            [0, 50, 3000, 44_999].map(at),
+            [0, 50, 3000, 44_999].map(game_clock),
             ["0:00.0", "0:01.0", "1:00.0", "14:59.9"]
         );
     }
 
     #[test]
-    fn the_end_is_expected_by_the_pace_so_far() {
+    fn expected_end_follows_the_pace() {
         let since: Timestamp = "2026-03-01T10:00:00Z".parse().unwrap();
         let now: Timestamp = "2026-03-01T10:01:00Z".parse().unwrap();
         let at: Timestamp = "2026-03-01T10:04:00Z".parse().unwrap();

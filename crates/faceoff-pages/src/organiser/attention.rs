@@ -1,11 +1,11 @@
-//! `/organiser`: what needs somebody first, then how the season stands.
+//! `/organiser`: open tasks of the organisers and the status of the season.
 
 use crate::{
-    desk_frame::{self, Done, Head, Said},
-    figures::minute,
+    dashboard_frame::{self, DoneQuery, DashboardHeader, Notice},
+    figures::utc_minute,
     frame::{Frame, PageProblem, render},
-    signed_in::Organising,
-    standing,
+    page_auth::PageOrganiser,
+    board_status,
 };
 use askama::Template;
 use axum::{
@@ -17,7 +17,7 @@ use faceoff_service::{
     app::App,
     problem::Problem,
     views::{
-        capacity, day, evaluation, health, queue, season::SeasonHead, sight::Sight, stage, storage,
+        capacity, day, evaluation, health, queue, season::SeasonHead, visibility::Visibility, stage, storage,
         workers,
     },
 };
@@ -29,42 +29,42 @@ use std::collections::BTreeSet;
 #[template(path = "organiser_attention.html")]
 struct Page {
     frame: Frame,
-    head: Head,
+    head: DashboardHeader,
     season: String,
     items: Vec<Item>,
-    /// Units of work under way and waiting, where the queue tells.
+    /// Running and queued jobs, if known.
     queue: Option<(u32, u32)>,
     slots: u32,
     teams: usize,
-    stages: Vec<Standing>,
+    stages: Vec<StageSummary>,
 }
 
-/// Something that needs somebody.
+/// An open task or a problem.
 struct Item {
-    /// How grave it is, beside its words.
+    /// CSS class of the severity: `bad` or `waiting`.
     class: &'static str,
     title: String,
     detail: String,
-    /// Where something can be done about it.
+    /// Pages to act on it: path and label.
     links: Vec<(String, String)>,
 }
 
-/// A stage at a glance.
-struct Standing {
+struct StageSummary {
     id: StageId,
     name: StageName,
     phase: &'static str,
-    newest: Option<(jiff::civil::Date, u32, usize)>,
-    next_cut: Option<String>,
+    /// The latest day, with the number of done and of all evaluations.
+    latest: Option<(jiff::civil::Date, u32, usize)>,
+    next_cutoff: Option<String>,
 }
 
-/// Archives of a team that take this much of their quota are told of, in percent.
+/// Use of the storage quota from which a team is listed, in percent.
 const NEARLY_FULL: u64 = 90;
 
-async fn of_server(app: &App) -> Result<(Vec<Item>, Option<(u32, u32)>), Problem> {
+async fn server_items(app: &App) -> Result<(Vec<Item>, Option<(u32, u32)>), Problem> {
     let mut items = Vec::new();
     let mut queue = None;
-    match health::now(app).await {
+    match health::check(app).await {
         Ok(health) => {
             queue = Some((health.running, health.waiting));
             if let Some(ruling) = health.paused {
@@ -72,12 +72,12 @@ async fn of_server(app: &App) -> Result<(Vec<Item>, Option<(u32, u32)>), Problem
                     class: "waiting",
                     title: "The queue is paused".to_owned(),
                     detail: format!(
-                        "Since {} ({}). Nothing new is begun; units of work that wait: {}.",
-                        minute(ruling.at),
+                        "Since {} ({}). No new jobs start; queued jobs: {}.",
+                        utc_minute(ruling.at),
                         ruling.reason,
                         health.waiting
                     ),
-                    links: vec![("/organiser/decide/resume".into(), "Let it go on".into())],
+                    links: vec![("/organiser/decide/resume".into(), "Resume".into())],
                 });
             }
         }
@@ -92,15 +92,15 @@ async fn of_server(app: &App) -> Result<(Vec<Item>, Option<(u32, u32)>), Problem
         items.push(Item {
             class: "bad",
             title: format!("The worker {} is banned", ban.worker),
-            detail: format!("Since {}: {}.", minute(ban.at), ban.reason),
+            detail: format!("Since {}: {}.", utc_minute(ban.at), ban.reason),
             links: vec![("/organiser/workers".into(), "Workers".into())],
         });
     }
-    let workers = workers::now(app);
+    let workers = workers::current(app);
     for alarm in workers.alarms {
         items.push(Item {
             class: "waiting",
-            title: "Something takes long on another machine".to_owned(),
+            title: "A job on a remote worker takes long".to_owned(),
             detail: format!("{alarm}."),
             links: vec![("/organiser/workers".into(), "Workers".into())],
         });
@@ -108,8 +108,8 @@ async fn of_server(app: &App) -> Result<(Vec<Item>, Option<(u32, u32)>), Problem
     for trouble in workers.troubles {
         items.push(Item {
             class: "bad",
-            title: "Work on other machines is in trouble".to_owned(),
-            detail: format!("{trouble}. It is tried again until it can."),
+            title: "Problem with remote workers".to_owned(),
+            detail: format!("{trouble}. The server keeps retrying."),
             links: vec![("/organiser/workers".into(), "Workers".into())],
         });
     }
@@ -117,11 +117,11 @@ async fn of_server(app: &App) -> Result<(Vec<Item>, Option<(u32, u32)>), Problem
         if team.archive_bytes.saturating_mul(100) >= team.quota_bytes.saturating_mul(NEARLY_FULL) {
             items.push(Item {
                 class: "waiting",
-                title: format!("{} has little room left for uploads", team.team_name),
+                title: format!("{} has used up most of its upload quota", team.team_name),
                 detail: format!(
-                    "{} of {} of archives are kept.",
-                    desk_frame::bytes(team.archive_bytes),
-                    desk_frame::bytes(team.quota_bytes)
+                    "{} of {} used by bundles.",
+                    dashboard_frame::bytes(team.archive_bytes),
+                    dashboard_frame::bytes(team.quota_bytes)
                 ),
                 links: vec![("/organiser/storage".into(), "Storage".into())],
             });
@@ -130,73 +130,73 @@ async fn of_server(app: &App) -> Result<(Vec<Item>, Option<(u32, u32)>), Problem
     Ok((items, queue))
 }
 
-async fn of_people(app: &App) -> Result<Vec<Item>, Problem> {
+async fn request_items(app: &App) -> Result<Vec<Item>, Problem> {
     let mut items = Vec::new();
     let registrations = app.store.registrations().await?;
     let waiting = registrations
         .iter()
-        .filter(|one| one.state == RegistrationState::Waiting);
-    for one in waiting {
+        .filter(|registration| registration.state == RegistrationState::Pending);
+    for registration in waiting {
         items.push(Item {
             class: "waiting",
-            title: format!("{} wants to take part", one.team_name),
-            detail: format!("Registered {}. {}", minute(one.created_at), one.contact),
+            title: format!("{} has registered", registration.team_name),
+            detail: format!("Registered {}. Contact: {}", utc_minute(registration.created_at), registration.contact),
             links: vec![
                 (
-                    format!("/organiser/decide/approve/{}", one.id),
+                    format!("/organiser/decide/approve/{}", registration.id),
                     "Approve".into(),
                 ),
                 (
-                    format!("/organiser/decide/refuse/{}", one.id),
+                    format!("/organiser/decide/refuse/{}", registration.id),
                     "Refuse".into(),
                 ),
             ],
         });
     }
     let questions = app.store.questions().await?;
-    let open = questions.iter().filter(|one| one.answer.is_none()).count();
+    let open = questions.iter().filter(|question| question.answer.is_none()).count();
     if open > 0 {
         items.push(Item {
             class: "waiting",
             title: match open {
-                1 => "A team’s question waits for an answer".to_owned(),
-                open => format!("{open} questions of teams wait for an answer"),
+                1 => "1 open question".to_owned(),
+                open => format!("{open} open questions"),
             },
-            detail: "Its team reads the answer; everybody does, if you want that.".to_owned(),
+            detail: "The answer goes to the team; you can also publish it.".to_owned(),
             links: vec![("/organiser/messages".into(), "Messages".into())],
         });
     }
     Ok(items)
 }
 
-/// What of a stage's newest days failed by our fault, or was not played, and is not played again.
-async fn failures(app: &App, of: StageDay) -> Result<Vec<Item>, Problem> {
-    let sight = Sight::of_organiser(app).await?;
-    let views = evaluation::of_day(app, &sight, of).await?;
-    let replaced: BTreeSet<_> = views.iter().filter_map(|one| one.rerun_of).collect();
+/// Evaluations of a day that failed because of a platform fault or were not played, and are not repeated.
+async fn failures(app: &App, day: StageDay) -> Result<Vec<Item>, Problem> {
+    let visibility = Visibility::for_organiser(app).await?;
+    let views = evaluation::day_evaluations(app, &visibility, day).await?;
+    let replaced: BTreeSet<_> = views.iter().filter_map(|view| view.rerun_of).collect();
     let open = views
         .into_iter()
-        .filter(|one| one.voided.is_none() && !replaced.contains(&one.id));
-    let items = open.filter_map(|one| {
-        let (what, reason) = match one.status {
+        .filter(|view| view.voided.is_none() && !replaced.contains(&view.id));
+    let items = open.filter_map(|view| {
+        let (outcome, reason) = match view.status {
             EvaluationStatus::PlatformFailed { reason, .. } => {
-                ("failed by the server’s fault", reason)
+                ("failed because of a platform fault", reason)
             }
-            EvaluationStatus::NotPlayed { reason, .. } => ("was not played in time", reason),
+            EvaluationStatus::NotPlayed { reason, .. } => ("was not finished in time", reason),
             _ => return None,
         };
         Some(Item {
             class: "bad",
-            title: format!("{}’s evaluation of {} {what}", one.team_name, one.day),
+            title: format!("{}’s evaluation of {} {outcome}", view.team_name, view.day),
             detail: format!("{reason}."),
             links: vec![
                 (
-                    format!("/organiser/decide/rerun/{}", one.id),
-                    "Play it again".into(),
+                    format!("/organiser/decide/rerun/{}", view.id),
+                    "Repeat it".into(),
                 ),
                 (
-                    format!("/organiser/day?stage={}&day={}", of.stage, of.date),
-                    "The day".into(),
+                    format!("/organiser/day?stage={}&day={}", day.stage, day.date),
+                    "Evaluation day".into(),
                 ),
             ],
         })
@@ -204,84 +204,84 @@ async fn failures(app: &App, of: StageDay) -> Result<Vec<Item>, Problem> {
     Ok(items.collect())
 }
 
-async fn of_stage(app: &App, stage: Stage) -> Result<(Vec<Item>, Standing), Problem> {
+async fn stage_items(app: &App, stage: Stage) -> Result<(Vec<Item>, StageSummary), Problem> {
     let now = app.config.clock.now();
     let phase = stage.phase(now);
     let mut items = Vec::new();
-    if phase == StagePhase::Open && app.store.archived().is_none() {
-        for load in capacity::of(app, stage.id).await?.days {
+    if phase == StagePhase::Open && app.store.archived_season().is_none() {
+        for load in capacity::build(app, stage.id).await?.days {
             let (class, title) = match load.fit {
-                Fit::Not => ("bad", "does not fit into its time"),
-                Fit::Unknown => ("waiting", "may not fit into its time"),
+                Fit::Not => ("bad", "does not fit before its deadline"),
+                Fit::Unknown => ("waiting", "may not fit before its deadline"),
                 Fit::Probably | Fit::Surely => continue,
             };
             items.push(Item {
                 class,
-                title: format!("The day {} of {} {title}", load.day, stage.name),
+                title: format!("Evaluation day {} of {} {title}", load.day, stage.name),
                 detail: load.summary,
                 links: vec![(
                     format!("/organiser/stages/{}", stage.id),
-                    "Settings of the stage".into(),
+                    "Stage settings".into(),
                 )],
             });
         }
     }
-    let is_provisional = phase == StagePhase::Closed && stage.finalised.is_none();
+    let is_provisional = phase == StagePhase::Closed && stage.sign_off.is_none();
     if is_provisional {
         items.push(Item {
             class: "waiting",
-            title: format!("{} has closed, and its result is provisional", stage.name),
-            detail: "Nobody may rely on it before it is signed off.".to_owned(),
+            title: format!("{} has closed; its result is provisional", stage.name),
+            detail: "It is provisional until you sign it off.".to_owned(),
             links: vec![(
                 format!("/organiser/stages/{}", stage.id),
-                "The stage".into(),
+                "Stage".into(),
             )],
         });
     }
-    let newest = app.store.newest_day(stage.id).await?.map(|day| day.of);
-    let mut newest_day = None;
-    if let Some(of) = newest {
-        let evaluations = app.store.evaluations_of_day(of).await?;
-        let over = evaluations.iter().filter(|one| one.state.is_over()).count();
-        let over = u32::try_from(over).unwrap_or(u32::MAX);
-        newest_day = Some((of.date, over, evaluations.len()));
-        if stage.finalised.is_none() {
-            items.extend(failures(app, of).await?);
+    let latest = app.store.newest_day(stage.id).await?.map(|day| day.stage_day);
+    let mut latest_day = None;
+    if let Some(latest) = latest {
+        let evaluations = app.store.evaluations_of_day(latest).await?;
+        let done = evaluations.iter().filter(|evaluation| evaluation.state.is_over()).count();
+        let done = u32::try_from(done).unwrap_or(u32::MAX);
+        latest_day = Some((latest.date, done, evaluations.len()));
+        if stage.sign_off.is_none() {
+            items.extend(failures(app, latest).await?);
         }
     }
-    let next_cut = day::next_cut(app, &stage)
+    let next_cutoff = day::next_cutoff(app, &stage)
         .await?
         .map(|next| next.to_string());
-    let standing = Standing {
+    let summary = StageSummary {
         id: stage.id,
-        phase: standing::phase(stage::phase(phase), stage.finalised.is_some()),
+        phase: board_status::phase_label(stage::phase(phase), stage.sign_off.is_some()),
         name: stage.name,
-        newest: newest_day,
-        next_cut,
+        latest: latest_day,
+        next_cutoff,
     };
-    Ok((items, standing))
+    Ok((items, summary))
 }
 
 pub(super) async fn page(
-    organising: Organising,
+    user: PageOrganiser,
     State(app): State<App>,
-    Query(said): Query<Done>,
+    Query(notice): Query<DoneQuery>,
 ) -> Result<Response, PageProblem> {
-    let (mut items, queue) = of_server(&app).await?;
+    let (mut items, queue) = server_items(&app).await?;
     let mut stages = Vec::new();
     for stage in app.store.stages().await.map_err(Problem::from)? {
-        let (of_stage, standing) = of_stage(&app, stage).await?;
-        items.extend(of_stage);
-        stages.push(standing);
+        let (found, summary) = stage_items(&app, stage).await?;
+        items.extend(found);
+        stages.push(summary);
     }
-    items.extend(of_people(&app).await?);
-    // The gravest first, and otherwise as they came.
+    items.extend(request_items(&app).await?);
+    // Problems first; the sort is stable.
     items.sort_by_key(|item| item.class != "bad");
-    let season = SeasonHead::now(&app).await?.name;
+    let season = SeasonHead::load(&app).await?.name;
     let path = "/organiser";
     let page = Page {
-        frame: Frame::of(&app, season.clone(), path),
-        head: Head::of(&organising.caller, path, Said::Done(&said)),
+        frame: Frame::for_app(&app, season.clone(), path),
+        head: DashboardHeader::new(&user.caller, path, Notice::Done(&notice)),
         season,
         items,
         queue,

@@ -1,10 +1,10 @@
-//! `/organiser/day`: a day of a stage: its cut, its load, its evaluations, and what can be decided about them.
+//! `/organiser/day`: an evaluation day of a stage: cutoff, load, evaluations and decisions.
 
 use crate::{
-    desk_frame::{Done, Head, Said},
-    figures::{self, minute},
+    dashboard_frame::{DoneQuery, DashboardHeader, Notice},
+    figures::{self, utc_minute},
     frame::{Frame, PageProblem, render},
-    signed_in::Organising,
+    page_auth::PageOrganiser,
 };
 use askama::Template;
 use axum::{extract::State, response::Response};
@@ -28,30 +28,31 @@ use std::collections::BTreeSet;
 #[template(path = "organiser_day.html")]
 struct Page {
     frame: Frame,
-    head: Head,
-    of: StageDay,
+    head: DashboardHeader,
+    stage_day: StageDay,
     stage_name: StageName,
     /// The other stages, and the other days of this one.
     stages: Vec<(StageId, StageName)>,
     days: Vec<Date>,
-    cut_at: Option<String>,
+    cutoff_at: Option<String>,
     deadline_at: Option<String>,
     released_at: Option<String>,
     missed: Option<String>,
-    next_cut: Option<String>,
-    /// Does the organiser start the day now?
+    next_cutoff: Option<String>,
+    /// May an organiser start today's evaluation?
     can_start: bool,
-    /// A date of the past without a cut.
+    /// Is it a past date without a cutoff?
     was_missed: bool,
     is_signed_off: bool,
     paused: Option<RulingView>,
-    /// Slots; units under way and waiting, if the queue tells.
     slots: u32,
+    /// Running and queued jobs, if known.
     queue: Option<(u32, u32)>,
     load: Option<String>,
     rows: Vec<Row>,
-    over: usize,
-    left_out: Vec<(TeamId, TeamName, String)>,
+    done: usize,
+    /// Teams without an evaluation, with the reason.
+    excluded: Vec<(TeamId, TeamName, String)>,
     can_void: bool,
 }
 
@@ -62,7 +63,7 @@ struct Row {
     state: &'static str,
     class: &'static str,
     detail: Option<String>,
-    /// Episodes played and to play.
+    /// Episodes done and in total.
     progress: Option<(u32, u32)>,
     expected: Option<String>,
     score: Option<String>,
@@ -79,33 +80,33 @@ fn row(view: EvaluationView, replaced: &BTreeSet<EvaluationId>) -> Row {
         EvaluationStatus::Running => ("running", "waiting", None, None),
         EvaluationStatus::Finalising => ("scoring", "waiting", None, None),
         EvaluationStatus::Finished { ref result, .. } => {
-            let score = result.as_ref().map(|result| figures::one(result.score));
+            let score = result.as_ref().map(|result| figures::one_decimal(result.score));
             ("finished", "good", None, score)
         }
         EvaluationStatus::AgentFailed { .. } => ("agent failed", "bad", None, None),
         EvaluationStatus::PlatformFailed { ref reason, .. } => (
-            "failed by the server’s fault",
+            "platform fault",
             "bad",
             Some(reason.clone()),
             None,
         ),
         EvaluationStatus::NotPlayed { ref reason, .. } => {
-            ("not played", "bad", Some(reason.clone()), None)
+            ("not finished in time", "bad", Some(reason.clone()), None)
         }
         EvaluationStatus::Cancelled { ref reason, .. } => {
             ("cancelled", "plain", Some(reason.clone()), None)
         }
     };
-    let has_ended_by_itself = matches!(
+    let has_verdict = matches!(
         view.status,
         EvaluationStatus::Finished { .. } | EvaluationStatus::AgentFailed { .. }
     );
-    let counts = has_ended_by_itself && view.voided.is_none();
+    let counts = has_verdict && view.voided.is_none();
     let expected = view.queue.and_then(|queue| queue.expected_at);
     let voided = view.voided.map(|ruling| ruling.reason);
     let extra = view
         .extra_turn
-        .map(|reason| format!("extra turn: {reason}"));
+        .map(|reason| format!("extra evaluation: {reason}"));
     let detail = voided.or(detail).or(extra);
     Row {
         id: view.id,
@@ -116,7 +117,7 @@ fn row(view: EvaluationView, replaced: &BTreeSet<EvaluationId>) -> Row {
         detail,
         progress: (!is_final)
             .then_some((view.progress.episodes_done, view.progress.episodes_total)),
-        expected: expected.map(minute),
+        expected: expected.map(utc_minute),
         score,
         can_cancel: !is_final,
         can_void: counts,
@@ -132,9 +133,9 @@ pub(super) struct Query {
     done: Option<String>,
 }
 
-/// A day; without a query the newest of the stage that is open.
+/// Without a query: the latest day of the open stage.
 pub(super) async fn page(
-    organising: Organising,
+    user: PageOrganiser,
     State(app): State<App>,
     query: Result<QueryParams<Query>, Problem>,
 ) -> Result<Response, PageProblem> {
@@ -148,77 +149,77 @@ pub(super) async fn page(
     let today = stage.day(now);
     let all = store.days().await.map_err(Problem::from)?;
     let mut days: Vec<_> = all.into_iter().map(|(day, _)| day).collect();
-    days.retain(|day| day.of.stage == stage.id);
-    let newest = days.iter().map(|day| day.of.date).max();
+    days.retain(|day| day.stage_day.stage == stage.id);
+    let newest = days.iter().map(|day| day.stage_day.date).max();
     let date = query.day.or(newest).unwrap_or(today.date);
-    let of = StageDay {
+    let stage_day = StageDay {
         stage: stage.id,
         date,
     };
-    let day = days.iter().find(|day| day.of == of);
-    let view = day::of(&app, of).await?;
+    let day = days.iter().find(|day| day.stage_day == stage_day);
+    let view = day::build(&app, stage_day).await?;
     let replaced: BTreeSet<EvaluationId> =
-        view.created.iter().filter_map(|one| one.rerun_of).collect();
+        view.created.iter().filter_map(|evaluation| evaluation.rerun_of).collect();
     let rows: Vec<Row> = view
         .created
         .into_iter()
-        .map(|one| row(one, &replaced))
+        .map(|evaluation| row(evaluation, &replaced))
         .collect();
     let without = view.without_submission.into_iter();
-    let mut left_out: Vec<_> = without
+    let mut excluded: Vec<_> = without
         .filter(|team| team.retired_at.is_none() && team.disqualified.is_none())
-        .map(|team| (team.id, team.name, "has no valid submission".to_owned()))
+        .map(|team| (team.id, team.name, "no valid submission".to_owned()))
         .collect();
     let not_taken = view.not_taken.into_iter();
-    left_out.extend(not_taken.map(|one| (one.team, one.team_name, one.reason)));
-    let is_archive = store.archived().is_some();
+    excluded.extend(not_taken.map(|exclusion| (exclusion.team, exclusion.team_name, exclusion.reason)));
+    let is_archive = store.archived_season().is_some();
     let load = match is_archive {
         true => None,
         false => {
-            let loads = capacity::of(&app, stage.id).await?.days;
+            let loads = capacity::build(&app, stage.id).await?.days;
             loads.into_iter().find(|load| load.day == date)
         }
     };
-    let health = health::now(&app).await.ok();
+    let health = health::check(&app).await.ok();
     let missed = store.missed_days().await.map_err(Problem::from)?;
-    let mut dates: Vec<Date> = days.iter().map(|day| day.of.date).collect();
+    let mut dates: Vec<Date> = days.iter().map(|day| day.stage_day.date).collect();
     dates.sort_unstable_by(|a, b| b.cmp(a));
     let is_open = stage.phase(now) == StagePhase::Open;
-    let today_has_cut = dates.contains(&today.date);
-    let season = SeasonHead::now(&app).await?;
+    let today_has_cutoff = dates.contains(&today.date);
+    let season = SeasonHead::load(&app).await?;
     let stages = store.stages().await.map_err(Problem::from)?;
-    let said = Done { done: query.done };
+    let notice = DoneQuery { done: query.done };
     let page = Page {
-        frame: Frame::of(&app, season.name, "/organiser/day"),
-        head: Head::of(&organising.caller, "/organiser/day", Said::Done(&said)),
+        frame: Frame::for_app(&app, season.name, "/organiser/day"),
+        head: DashboardHeader::new(&user.caller, "/organiser/day", Notice::Done(&notice)),
         stages: stages
             .into_iter()
             .filter(|other| other.id != stage.id)
             .map(|other| (other.id, other.name))
             .collect(),
-        cut_at: day.map(|day| minute(day.cut_at)),
-        deadline_at: day.and_then(|day| day.deadline_at).map(minute),
-        released_at: day.and_then(|day| day.released_at).map(minute),
+        cutoff_at: day.map(|day| utc_minute(day.cutoff_at)),
+        deadline_at: day.and_then(|day| day.deadline_at).map(utc_minute),
+        released_at: day.and_then(|day| day.released_at).map(utc_minute),
         missed: missed
             .into_iter()
-            .find_map(|(day, reason)| (day == of).then_some(reason)),
-        next_cut: day::next_cut(&app, &stage)
+            .find_map(|(day, reason)| (day == stage_day).then_some(reason)),
+        next_cutoff: day::next_cutoff(&app, &stage)
             .await?
             .map(|next| next.to_string()),
-        can_start: is_open && !today_has_cut,
+        can_start: is_open && !today_has_cutoff,
         was_missed: is_open && day.is_none() && date < today.date,
-        is_signed_off: stage.finalised.is_some(),
+        is_signed_off: stage.sign_off.is_some(),
         paused: season.paused,
         slots: queue::slots(&app),
         queue: health.map(|health| (health.running, health.waiting)),
         load: load.map(|load| load.summary),
-        over: rows.iter().filter(|row| !row.can_cancel).count(),
+        done: rows.iter().filter(|row| !row.can_cancel).count(),
         can_void: rows.iter().any(|row| row.can_void || row.can_cancel),
         rows,
-        left_out,
+        excluded,
         days: dates,
         stage_name: stage.name,
-        of,
+        stage_day,
     };
     render(&page)
 }

@@ -1,10 +1,10 @@
-//! `/organiser/log`: every change and its author.
+//! `/organiser/log`: all changes with their authors.
 
 use crate::{
-    desk_frame::{Head, Said, render_desk},
+    dashboard_frame::{DashboardHeader, Notice, render_dashboard},
     frame::{Frame, PageProblem},
-    query::asking,
-    signed_in::Organising,
+    query::with_query,
+    page_auth::PageOrganiser,
 };
 use askama::Template;
 use axum::{
@@ -28,7 +28,7 @@ const PATH: &str = "/organiser/log";
 #[template(path = "organiser_log.html")]
 struct Page {
     frame: Frame,
-    head: Head,
+    head: DashboardHeader,
     events: EventsView,
     query: EventsQuery,
 }
@@ -45,22 +45,22 @@ impl Page {
             .join(" · ")
     }
 
-    /// The log of one value of a field.
-    fn only(&self, field: &str, value: &str) -> String {
-        asking(PATH, &[(field, value)])
+    /// Address of the log filtered by a field.
+    fn filter_link(&self, field: &str, value: &str) -> String {
+        with_query(PATH, &[(field, value)])
     }
 
-    fn older(&self) -> Option<String> {
+    fn older_link(&self) -> Option<String> {
         let older = EventsQuery {
             before: Some(self.events.next_before?),
             ..self.query.clone()
         };
-        Some(asking(PATH, &older))
+        Some(with_query(PATH, &older))
     }
 }
 
-/// The log was at `/log`.
-pub(super) async fn moved(RawQuery(query): RawQuery) -> Redirect {
+/// Redirects from `/log`, the address in older versions.
+pub(super) async fn redirect_old_path(RawQuery(query): RawQuery) -> Redirect {
     match query {
         Some(query) => Redirect::permanent(&format!("{PATH}?{query}")),
         None => Redirect::permanent(PATH),
@@ -68,16 +68,16 @@ pub(super) async fn moved(RawQuery(query): RawQuery) -> Redirect {
 }
 
 pub(super) async fn page(
-    organising: Organising,
+    user: PageOrganiser,
     State(app): State<App>,
     query: Result<QueryParams<EventsQuery>, Problem>,
 ) -> Result<Response, PageProblem> {
     let QueryParams(mut query) = query?;
-    // A form sends what was left empty, too.
+    // A form also sends empty fields.
     for field in [&mut query.actor, &mut query.subject, &mut query.kind] {
         field.take_if(|text| text.trim().is_empty());
     }
-    let season = SeasonHead::now(&app).await?.name;
+    let season = SeasonHead::load(&app).await?.name;
     let (events, refused) = match event::page(&app, query.clone()).await {
         Ok(events) => (events, None),
         Err(problem) => {
@@ -88,12 +88,12 @@ pub(super) async fn page(
             (none, Some(problem))
         }
     };
-    let said = refused.as_ref().map_or(Said::Nothing, Said::Refused);
+    let notice = refused.as_ref().map_or(Notice::None, Notice::Refused);
     let page = Page {
-        frame: Frame::of(&app, season, PATH),
-        head: Head::of(&organising.caller, PATH, said),
+        frame: Frame::for_app(&app, season, PATH),
+        head: DashboardHeader::new(&user.caller, PATH, notice),
         events,
         query,
     };
-    render_desk(&page, said)
+    render_dashboard(&page, notice)
 }

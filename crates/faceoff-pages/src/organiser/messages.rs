@@ -1,10 +1,10 @@
-//! `/organiser/messages`: questions to answer, announcements, and the terms.
+//! `/organiser/messages`: questions of teams, announcements and terms.
 
 use crate::{
-    desk_frame::{Done, Head, Said, done, render_desk},
-    figures::minute,
+    dashboard_frame::{DoneQuery, DashboardHeader, Notice, redirect_done, render_dashboard},
+    figures::utc_minute,
     frame::{Frame, PageProblem},
-    signed_in::Organising,
+    page_auth::PageOrganiser,
 };
 use askama::Template;
 use axum::{
@@ -16,7 +16,7 @@ use faceoff_api::{
     views::announcement::{AnnouncementView, QuestionView, TermsView},
 };
 use faceoff_service::{
-    acts::telling,
+    services::announcements,
     app::App,
     extract::{PageForm, PathParam},
     problem::Problem,
@@ -27,25 +27,25 @@ use serde::Deserialize;
 use std::collections::BTreeMap;
 
 const PATH: &str = "/organiser/messages";
-/// Announcements that are listed.
-const SHOWN: u32 = 20;
+/// Number of announcements in the list.
+const LISTED_ANNOUNCEMENTS: u32 = 20;
 
 #[derive(Template)]
 #[template(path = "organiser_messages.html")]
 struct Page {
     frame: Frame,
-    head: Head,
+    head: DashboardHeader,
     open: Vec<QuestionView>,
     answered: Vec<QuestionView>,
     announcements: Vec<AnnouncementView>,
     terms: Option<TermsView>,
     names: BTreeMap<String, String>,
-    typed: Typed,
+    form: FormValues,
 }
 
-/// What was typed into the form that was refused.
+/// Values of a refused form, to be shown again.
 #[derive(Default)]
-struct Typed {
+struct FormValues {
     title: String,
     text: String,
     terms: String,
@@ -54,7 +54,7 @@ struct Typed {
 
 impl Page {
     fn at(&self, at: &jiff::Timestamp) -> String {
-        minute(*at)
+        utc_minute(*at)
     }
 
     fn team(&self, question: &QuestionView) -> &str {
@@ -64,7 +64,7 @@ impl Page {
     }
 
     fn answer<'a>(&'a self, question: &'a QuestionView) -> &'a str {
-        match &self.typed.answer {
+        match &self.form.answer {
             Some((id, text)) if *id == question.id => text,
             _ => question.answer.as_deref().unwrap_or_default(),
         }
@@ -73,52 +73,52 @@ impl Page {
 
 async fn page_with(
     app: &App,
-    organising: &Organising,
-    said: Said<'_>,
-    typed: Typed,
+    user: &PageOrganiser,
+    notice: Notice<'_>,
+    values: FormValues,
 ) -> Result<Response, PageProblem> {
-    let all = telling::questions(app, Some(&organising.caller)).await?;
-    let (open, answered) = all.into_iter().partition(|one| one.answer.is_none());
-    let announcements = app.store.announcements(SHOWN).await;
+    let all = announcements::questions(app, Some(&user.caller)).await?;
+    let (open, answered) = all.into_iter().partition(|question| question.answer.is_none());
+    let announcements = app.store.announcements(LISTED_ANNOUNCEMENTS).await;
     let announcements = announcements.map_err(Problem::from)?.into_iter();
     let terms = app.store.terms().await.map_err(Problem::from)?;
-    let season = SeasonHead::now(app).await?.name;
+    let season = SeasonHead::load(app).await?.name;
     let page = Page {
-        frame: Frame::of(app, season, PATH),
-        head: Head::of(&organising.caller, PATH, said),
+        frame: Frame::for_app(app, season, PATH),
+        head: DashboardHeader::new(&user.caller, PATH, notice),
         open,
         answered,
-        announcements: announcements.map(announcement::of).collect(),
+        announcements: announcements.map(announcement::view).collect(),
         terms: terms.into_iter().next().map(announcement::terms),
-        names: event::names(app).await?,
-        typed,
+        names: event::actor_names(app).await?,
+        form: values,
     };
-    render_desk(&page, said)
+    render_dashboard(&page, notice)
 }
 
 pub(super) async fn page(
-    organising: Organising,
+    user: PageOrganiser,
     State(app): State<App>,
-    Query(said): Query<Done>,
+    Query(notice): Query<DoneQuery>,
 ) -> Result<Response, PageProblem> {
-    page_with(&app, &organising, Said::Done(&said), Typed::default()).await
+    page_with(&app, &user, Notice::Done(&notice), FormValues::default()).await
 }
 
 pub(super) async fn announce(
-    organising: Organising,
+    user: PageOrganiser,
     State(app): State<App>,
     form: Result<PageForm<NewAnnouncement>, Problem>,
 ) -> Result<Response, PageProblem> {
     let PageForm(form) = form?;
-    match telling::announce(&app, organising.organiser.actor(), &form).await {
-        Ok(_) => Ok(done(PATH, "announced")),
+    match announcements::announce(&app, user.organiser.actor(), &form).await {
+        Ok(_) => Ok(redirect_done(PATH, "announced")),
         Err(problem) => {
-            let typed = Typed {
+            let values = FormValues {
                 title: form.title,
                 text: form.text,
-                ..Typed::default()
+                ..FormValues::default()
             };
-            page_with(&app, &organising, Said::Refused(&problem), typed).await
+            page_with(&app, &user, Notice::Refused(&problem), values).await
         }
     }
 }
@@ -126,13 +126,13 @@ pub(super) async fn announce(
 #[derive(Deserialize)]
 pub(super) struct AnswerForm {
     text: String,
-    /// Ticked, or not sent.
+    /// Checkbox: not sent if it is not ticked.
     #[serde(default)]
     public: String,
 }
 
 pub(super) async fn answer(
-    organising: Organising,
+    user: PageOrganiser,
     State(app): State<App>,
     id: Result<PathParam<QuestionId>, Problem>,
     form: Result<PageForm<AnswerForm>, Problem>,
@@ -142,33 +142,33 @@ pub(super) async fn answer(
         text: form.text,
         public: !form.public.is_empty(),
     };
-    match telling::answer(&app, organising.organiser.actor(), id, &new).await {
-        Ok(_) => Ok(done(PATH, "answered")),
+    match announcements::answer(&app, user.organiser.actor(), id, &new).await {
+        Ok(_) => Ok(redirect_done(PATH, "answered")),
         Err(problem) => {
-            let typed = Typed {
+            let values = FormValues {
                 answer: Some((id, new.text)),
-                ..Typed::default()
+                ..FormValues::default()
             };
-            page_with(&app, &organising, Said::Refused(&problem), typed).await
+            page_with(&app, &user, Notice::Refused(&problem), values).await
         }
     }
 }
 
 /// Publishes other terms.
 pub(super) async fn publish_terms(
-    organising: Organising,
+    user: PageOrganiser,
     State(app): State<App>,
     form: Result<PageForm<NewTerms>, Problem>,
 ) -> Result<Response, PageProblem> {
     let PageForm(form) = form?;
-    match telling::publish_terms(&app, organising.organiser.actor(), &form).await {
-        Ok(_) => Ok(done(PATH, "published")),
+    match announcements::publish_terms(&app, user.organiser.actor(), &form).await {
+        Ok(_) => Ok(redirect_done(PATH, "published")),
         Err(problem) => {
-            let typed = Typed {
+            let values = FormValues {
                 terms: form.text,
-                ..Typed::default()
+                ..FormValues::default()
             };
-            page_with(&app, &organising, Said::Refused(&problem), typed).await
+            page_with(&app, &user, Notice::Refused(&problem), values).await
         }
     }
 }

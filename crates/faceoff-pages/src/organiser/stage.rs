@@ -1,11 +1,11 @@
-//! `/organiser/stages/{id}`: a stage's state, its settings, and what can be decided about it.
+//! `/organiser/stages/{id}`: status, settings and decisions of a stage.
 
 use super::stage_form::StageForm;
 use crate::{
-    desk_frame::{Done, Head, Said, done, render_desk},
-    figures::minute,
+    dashboard_frame::{DoneQuery, DashboardHeader, Notice, redirect_done, render_dashboard},
+    figures::utc_minute,
     frame::{Frame, PageProblem},
-    signed_in::Organising,
+    page_auth::PageOrganiser,
 };
 use askama::Template;
 use axum::{
@@ -14,24 +14,24 @@ use axum::{
 };
 use faceoff_api::views::stage::{PhaseView, StageView};
 use faceoff_service::{
-    acts::staging,
+    services::stages,
     app::App,
     extract::{PageForm, PathParam},
     problem::{Problem, ProblemKind},
     viewer::Viewer,
     views::{season::SeasonHead, stage},
 };
-use faceoff_types::{Profile, StageId, Standings};
+use faceoff_types::{Profile, StageId, CountingResult};
 
 #[derive(Template)]
 #[template(path = "organiser_stage.html")]
 struct Page {
     frame: Frame,
-    head: Head,
+    head: DashboardHeader,
     stage: StageView,
     form: StageForm,
     profiles: [Profile; 7],
-    /// The name that confirms what the refusal told.
+    /// The name that confirms a change with consequences; the refusal lists them.
     confirm: Option<String>,
     is_closed: bool,
     has_final_day: bool,
@@ -39,62 +39,62 @@ struct Page {
 
 impl Page {
     fn at(&self, at: &jiff::Timestamp) -> String {
-        minute(*at)
+        utc_minute(*at)
     }
 }
 
 async fn page_with(
     app: &App,
-    organising: &Organising,
+    user: &PageOrganiser,
     id: StageId,
-    said: Said<'_>,
+    notice: Notice<'_>,
     form: Option<StageForm>,
 ) -> Result<Response, PageProblem> {
     let stage = app.store.stage(id).await.map_err(Problem::from)?;
-    let form = form.unwrap_or_else(|| StageForm::of(&stage));
-    let season = SeasonHead::now(app).await?.name;
-    let view = stage::of(app, stage).await?;
-    let view = stage::seen_by(view, app, Viewer::Organiser).await?;
-    let is_asked =
-        matches!(said, Said::Refused(problem) if problem.kind() == ProblemKind::NotConfirmed);
+    let form = form.unwrap_or_else(|| StageForm::from_stage(&stage));
+    let season = SeasonHead::load(app).await?.name;
+    let view = stage::build(app, stage).await?;
+    let view = stage::for_viewer(view, app, Viewer::Organiser).await?;
+    let needs_confirmation =
+        matches!(notice, Notice::Refused(problem) if problem.kind() == ProblemKind::NotConfirmed);
     let page = Page {
-        frame: Frame::of(app, season, ""),
-        head: Head::of(&organising.caller, "/organiser/stages", said),
+        frame: Frame::for_app(app, season, ""),
+        head: DashboardHeader::new(&user.caller, "/organiser/stages", notice),
         form,
         profiles: Profile::ALL,
-        confirm: is_asked.then(|| view.name.to_string()),
+        confirm: needs_confirmation.then(|| view.name.to_string()),
         is_closed: view.phase == PhaseView::Closed,
-        has_final_day: view.settings.standings == Standings::Final,
+        has_final_day: view.settings.standings == CountingResult::Final,
         stage: view,
     };
-    render_desk(&page, said)
+    render_dashboard(&page, notice)
 }
 
 pub(super) async fn page(
-    organising: Organising,
+    user: PageOrganiser,
     State(app): State<App>,
     id: Result<PathParam<StageId>, Problem>,
-    Query(said): Query<Done>,
+    Query(notice): Query<DoneQuery>,
 ) -> Result<Response, PageProblem> {
-    page_with(&app, &organising, id?.0, Said::Done(&said), None).await
+    page_with(&app, &user, id?.0, Notice::Done(&notice), None).await
 }
 
-/// Changes the stage, or says on the same page why not, or what is to be confirmed.
+/// Changes the stage, or shows on the same page an error or the effects to confirm.
 pub(super) async fn change(
-    organising: Organising,
+    user: PageOrganiser,
     State(app): State<App>,
     id: Result<PathParam<StageId>, Problem>,
     form: Result<PageForm<StageForm>, Problem>,
 ) -> Result<Response, PageProblem> {
     let (PathParam(id), PageForm(form)) = (id?, form?);
     let stage = app.store.stage(id).await.map_err(Problem::from)?;
-    let actor = organising.organiser.actor();
+    let actor = user.organiser.actor();
     let changed = match form.change(&stage) {
-        Ok(change) => staging::change_stage(&app, actor, id, change).await,
+        Ok(change) => stages::change_stage(&app, actor, id, change).await,
         Err(problem) => Err(problem),
     };
     match changed {
-        Ok(_) => Ok(done(&format!("/organiser/stages/{id}"), "stage-changed")),
-        Err(problem) => page_with(&app, &organising, id, Said::Refused(&problem), Some(form)).await,
+        Ok(_) => Ok(redirect_done(&format!("/organiser/stages/{id}"), "stage-changed")),
+        Err(problem) => page_with(&app, &user, id, Notice::Refused(&problem), Some(form)).await,
     }
 }

@@ -1,4 +1,4 @@
-//! The most used settings of a stage as fields of a form, and what of them is to be another.
+//! A form with the most important settings of a stage, and the conversion into requests of the API.
 
 use faceoff_api::requests::{NewStage, StageChange};
 use faceoff_service::problem::Problem;
@@ -9,14 +9,14 @@ use serde::Deserialize;
 use serde_json::{Value, json};
 use std::fmt::Display;
 
-/// The fields, as they are typed.
+/// Fields as typed.
 #[derive(Debug, Clone, Default, PartialEq, Deserialize)]
 #[serde(default)]
 pub(super) struct StageForm {
     pub(super) name: String,
-    /// In UTC, as the browser's field has it: `2026-03-01T10:00`.
+    /// In UTC, in the format of an input `datetime-local`: `2026-03-01T10:00`.
     pub(super) opens_at: String,
-    /// Likewise; empty: it has no end yet.
+    /// As `opens_at`; empty: no date set.
     pub(super) closes_at: String,
     pub(super) zone: String,
     pub(super) profile: String,
@@ -25,7 +25,7 @@ pub(super) struct StageForm {
     pub(super) task_prepare: String,
     pub(super) episodes_per_task: String,
     pub(super) max_faults: String,
-    /// A time, five fields of a cron expression, or nothing.
+    /// A time, a cron expression of five fields, or empty.
     pub(super) schedule: String,
     pub(super) days_off: String,
     pub(super) day_deadline: String,
@@ -33,43 +33,42 @@ pub(super) struct StageForm {
     pub(super) publishes: String,
     pub(super) blind: String,
     pub(super) ablation_episodes: String,
-    /// The stage's name, where something is to be confirmed.
+    /// Name of the stage, if the change needs a confirmation.
     pub(super) confirm: String,
 }
 
-/// What a field of a browser has for a time.
-fn typed(at: Timestamp) -> String {
+/// A time in the format of an input `datetime-local`.
+fn datetime_local(at: Timestamp) -> String {
     at.strftime("%Y-%m-%dT%H:%M").to_string()
 }
 
 const TICKED: &str = "on";
 
-fn ticked(is: bool) -> String {
-    if is { TICKED.to_owned() } else { String::new() }
+fn checkbox_value(is_ticked: bool) -> String {
+    if is_ticked { TICKED.to_owned() } else { String::new() }
 }
 
-/// A value that does not fit its field.
-fn wrong(field: &str, error: impl Display) -> Problem {
+fn invalid_field(field: &str, error: impl Display) -> Problem {
     Problem::invalid(field, error)
 }
 
-fn time(field: &str, text: &str) -> Result<Option<Timestamp>, Problem> {
+fn parse_time(field: &str, text: &str) -> Result<Option<Timestamp>, Problem> {
     if text.is_empty() {
         return Ok(None);
     }
-    let at: DateTime = text.parse().map_err(|error| wrong(field, error))?;
+    let at: DateTime = text.parse().map_err(|error| invalid_field(field, error))?;
     let at = at.to_zoned(TimeZone::UTC);
-    Ok(Some(at.map_err(|error| wrong(field, error))?.timestamp()))
+    Ok(Some(at.map_err(|error| invalid_field(field, error))?.timestamp()))
 }
 
-fn number(field: &str, text: &str) -> Result<u32, Problem> {
-    let wrong = |_| wrong(field, format!("expected a whole number, got {text:?}"));
-    text.parse().map_err(wrong)
+fn parse_number(field: &str, text: &str) -> Result<u32, Problem> {
+    let invalid = |_| invalid_field(field, format!("expected a whole number, got {text:?}"));
+    text.parse().map_err(invalid)
 }
 
 impl StageForm {
-    /// As a stage is now.
-    pub(super) fn of(stage: &Stage) -> Self {
+    /// The current settings of a stage.
+    pub(super) fn from_stage(stage: &Stage) -> Self {
         let (rules, settings) = (&stage.rules.rules, &stage.settings);
         let schedule = serde_json::to_value(&settings.schedule).unwrap_or_default();
         let text = |value: &Value| value.as_str().unwrap_or_default().to_owned();
@@ -77,33 +76,33 @@ impl StageForm {
             Value::String(daily) => daily.strip_suffix(":00").unwrap_or(daily).to_owned(),
             _ => text(&schedule["cron"]),
         };
-        let off = schedule["days_off"].as_array();
-        let off = off.map(|dates| dates.iter().map(text).collect::<Vec<_>>().join(" "));
-        let has = |task| ticked(rules.tasks.contains(&task));
+        let days_off = schedule["days_off"].as_array();
+        let days_off = days_off.map(|dates| dates.iter().map(text).collect::<Vec<_>>().join(" "));
+        let task_checkbox = |task| checkbox_value(rules.tasks.contains(&task));
         Self {
             name: stage.name.to_string(),
-            opens_at: typed(stage.opens_at),
-            closes_at: stage.closes_at.map(typed).unwrap_or_default(),
+            opens_at: datetime_local(stage.opens_at),
+            closes_at: stage.closes_at.map(datetime_local).unwrap_or_default(),
             zone: stage.zone.to_string(),
             profile: rules.profile.to_string(),
-            task_hit: has(Task::Hit),
-            task_defend: has(Task::Defend),
-            task_prepare: has(Task::Prepare),
+            task_hit: task_checkbox(Task::Hit),
+            task_defend: task_checkbox(Task::Defend),
+            task_prepare: task_checkbox(Task::Prepare),
             episodes_per_task: rules.episodes_per_task.to_string(),
             max_faults: rules.max_faults.to_string(),
             schedule: at,
-            days_off: off.unwrap_or_default(),
+            days_off: days_off.unwrap_or_default(),
             day_deadline: settings.day_deadline.to_string(),
             standings: settings.standings.to_string(),
             publishes: settings.publishes.to_string(),
-            blind: ticked(settings.blind),
+            blind: checkbox_value(settings.blind),
             ablation_episodes: settings.ablation_episodes.to_string(),
             confirm: String::new(),
         }
     }
 
-    /// Like another stage, for one to be made.
-    pub(super) fn like(stage: &Stage) -> Self {
+    /// Default settings for a new stage: those of `stage` without name and dates.
+    pub(super) fn defaults_from(stage: &Stage) -> Self {
         Self {
             name: String::new(),
             opens_at: String::new(),
@@ -112,7 +111,7 @@ impl StageForm {
             days_off: String::new(),
             ablation_episodes: "0".to_owned(),
             blind: String::new(),
-            ..Self::of(stage)
+            ..Self::from_stage(stage)
         }
     }
 
@@ -129,14 +128,14 @@ impl StageForm {
     fn profile(&self) -> Result<Profile, Problem> {
         self.profile
             .parse()
-            .map_err(|error| wrong("profile", error))
+            .map_err(|error| invalid_field("profile", error))
     }
 
     fn zone(&self) -> Result<Zone, Problem> {
         self.zone
             .trim()
             .parse()
-            .map_err(|error| wrong("zone", error))
+            .map_err(|error| invalid_field("zone", error))
     }
 
     fn schedule(&self) -> Result<Option<Schedule>, Problem> {
@@ -149,75 +148,75 @@ impl StageForm {
         } else {
             "daily"
         };
-        let off = self.days_off.split([' ', ',', '\n', '\r']);
-        let off: Vec<&str> = off.filter(|date| !date.is_empty()).collect();
-        let fields = json!({ kind: at, "days_off": off });
+        let dates = self.days_off.split([' ', ',', '\n', '\r']);
+        let dates: Vec<&str> = dates.filter(|date| !date.is_empty()).collect();
+        let fields = json!({ kind: at, "days_off": dates });
         let parsed = serde_json::from_value(fields);
-        parsed.map(Some).map_err(|error| wrong("schedule", error))
+        parsed.map(Some).map_err(|error| invalid_field("schedule", error))
     }
 
-    /// What of the stage is another in the form: what is the same stays unsaid, since much of it may not be changed at
+    /// The differences between the form and the stage. Unchanged settings are omitted, since many of them cannot be changed at
     /// any time.
     pub(super) fn change(&self, stage: &Stage) -> Result<StageChange, Problem> {
-        let is = Self::of(stage);
+        let current = Self::from_stage(stage);
         let mut change = StageChange::default();
-        if self.name != is.name {
+        if self.name != current.name {
             change.name = Some(self.name.clone());
         }
-        if self.opens_at != is.opens_at {
-            change.opens_at = time("opens_at", &self.opens_at)?;
+        if self.opens_at != current.opens_at {
+            change.opens_at = parse_time("opens_at", &self.opens_at)?;
         }
-        if self.closes_at != is.closes_at {
-            change.closes_at = Some(time("closes_at", &self.closes_at)?);
+        if self.closes_at != current.closes_at {
+            change.closes_at = Some(parse_time("closes_at", &self.closes_at)?);
         }
-        if self.zone != is.zone {
+        if self.zone != current.zone {
             change.zone = Some(self.zone()?);
         }
-        if self.profile != is.profile {
+        if self.profile != current.profile {
             change.profile = Some(self.profile()?);
         }
-        if self.tasks() != is.tasks() {
+        if self.tasks() != current.tasks() {
             change.tasks = Some(self.tasks());
         }
-        if self.episodes_per_task != is.episodes_per_task {
-            change.episodes_per_task = Some(number("episodes_per_task", &self.episodes_per_task)?);
+        if self.episodes_per_task != current.episodes_per_task {
+            change.episodes_per_task = Some(parse_number("episodes_per_task", &self.episodes_per_task)?);
         }
-        if self.max_faults != is.max_faults {
-            change.max_faults = Some(number("max_faults", &self.max_faults)?);
+        if self.max_faults != current.max_faults {
+            change.max_faults = Some(parse_number("max_faults", &self.max_faults)?);
         }
-        if (&self.schedule, &self.days_off) != (&is.schedule, &is.days_off) {
+        if (&self.schedule, &self.days_off) != (&current.schedule, &current.days_off) {
             change.schedule = Some(self.schedule()?);
         }
         let parsed = self.day_deadline.parse();
-        let deadline = parsed.map_err(|error| wrong("day_deadline", error))?;
+        let deadline = parsed.map_err(|error| invalid_field("day_deadline", error))?;
         change.day_deadline = (deadline != stage.settings.day_deadline).then_some(deadline);
         let parsed = self.standings.parse();
-        let standings = parsed.map_err(|error| wrong("standings", error))?;
+        let standings = parsed.map_err(|error| invalid_field("standings", error))?;
         change.standings = (standings != stage.settings.standings).then_some(standings);
         let parsed = self.publishes.parse();
-        let publishes = parsed.map_err(|error| wrong("publishes", error))?;
+        let publishes = parsed.map_err(|error| invalid_field("publishes", error))?;
         change.publishes = (publishes != stage.settings.publishes).then_some(publishes);
-        if self.blind.is_empty() != is.blind.is_empty() {
+        if self.blind.is_empty() != current.blind.is_empty() {
             change.blind = Some(!self.blind.is_empty());
         }
-        if self.ablation_episodes != is.ablation_episodes {
-            change.ablation_episodes = Some(number("ablation_episodes", &self.ablation_episodes)?);
+        if self.ablation_episodes != current.ablation_episodes {
+            change.ablation_episodes = Some(parse_number("ablation_episodes", &self.ablation_episodes)?);
         }
         change.confirm = Some(self.confirm.clone()).filter(|name| !name.is_empty());
         Ok(change)
     }
 
-    /// A stage to be made.
+    /// The request for a new stage.
     pub(super) fn new_stage(&self) -> Result<NewStage, Problem> {
         Ok(NewStage {
             name: self.name.clone(),
-            opens_at: time("opens_at", &self.opens_at)?,
-            closes_at: time("closes_at", &self.closes_at)?,
+            opens_at: parse_time("opens_at", &self.opens_at)?,
+            closes_at: parse_time("closes_at", &self.closes_at)?,
             zone: Some(self.zone()?),
             profile: Some(self.profile()?),
             tasks: Some(self.tasks()),
-            episodes_per_task: Some(number("episodes_per_task", &self.episodes_per_task)?),
-            max_faults: Some(number("max_faults", &self.max_faults)?),
+            episodes_per_task: Some(parse_number("episodes_per_task", &self.episodes_per_task)?),
+            max_faults: Some(parse_number("max_faults", &self.max_faults)?),
             weights: None,
             tier_bounds: None,
             perturbations: None,
@@ -225,23 +224,23 @@ impl StageForm {
             runtimes: None,
             uploads: None,
             schedule: self.schedule()?,
-            ablation_episodes: Some(number("ablation_episodes", &self.ablation_episodes)?),
+            ablation_episodes: Some(parse_number("ablation_episodes", &self.ablation_episodes)?),
             episodes_per_shard: None,
             day_deadline: Some(
                 self.day_deadline
                     .parse()
-                    .map_err(|error| wrong("day_deadline", error))?,
+                    .map_err(|error| invalid_field("day_deadline", error))?,
             ),
             blind: Some(!self.blind.is_empty()),
             publishes: Some(
                 self.publishes
                     .parse()
-                    .map_err(|error| wrong("publishes", error))?,
+                    .map_err(|error| invalid_field("publishes", error))?,
             ),
             standings: Some(
                 self.standings
                     .parse()
-                    .map_err(|error| wrong("standings", error))?,
+                    .map_err(|error| invalid_field("standings", error))?,
             ),
             retention: None,
         })

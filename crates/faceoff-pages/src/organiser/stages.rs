@@ -1,12 +1,12 @@
-//! `/organiser/stages`: the season's stages, and the making of another.
+//! `/organiser/stages`: the stages of the season, and a form for a new stage.
 
 use super::stage_form::StageForm;
 use crate::{
-    desk_frame::{Done, Head, Said, done, render_desk},
-    figures::minute,
+    dashboard_frame::{DoneQuery, DashboardHeader, Notice, redirect_done, render_dashboard},
+    figures::utc_minute,
     frame::{Frame, PageProblem},
-    signed_in::Organising,
-    standing,
+    page_auth::PageOrganiser,
+    board_status,
 };
 use askama::Template;
 use axum::{
@@ -15,7 +15,7 @@ use axum::{
 };
 use faceoff_api::views::stage::StageView;
 use faceoff_service::{
-    acts::staging,
+    services::stages,
     app::App,
     extract::PageForm,
     problem::Problem,
@@ -27,70 +27,70 @@ use faceoff_types::Profile;
 #[template(path = "organiser_stages.html")]
 struct Page {
     frame: Frame,
-    head: Head,
+    head: DashboardHeader,
     stages: Vec<StageView>,
     form: StageForm,
     profiles: [Profile; 7],
-    /// Nothing is to be confirmed of what is only made.
+    /// Always `None`: creating a stage needs no confirmation. `stage_fields.html` expects the field.
     confirm: Option<String>,
     is_refused: bool,
 }
 
 impl Page {
     fn phase(&self, stage: &StageView) -> &'static str {
-        standing::phase(stage.phase, stage.finalised.is_some())
+        board_status::phase_label(stage.phase, stage.finalised.is_some())
     }
 
     fn at(&self, at: &jiff::Timestamp) -> String {
-        minute(*at)
+        utc_minute(*at)
     }
 }
 
 async fn page_with(
     app: &App,
-    organising: &Organising,
-    said: Said<'_>,
+    user: &PageOrganiser,
+    notice: Notice<'_>,
     form: Option<StageForm>,
 ) -> Result<Response, PageProblem> {
-    let season = SeasonHead::now(app).await?.name;
+    let season = SeasonHead::load(app).await?.name;
     let path = "/organiser/stages";
     let form = match form {
         Some(form) => form,
-        None => StageForm::like(&stage::current(app).await?),
+        None => StageForm::defaults_from(&stage::current(app).await?),
     };
     let page = Page {
-        frame: Frame::of(app, season, path),
-        head: Head::of(&organising.caller, path, said),
+        frame: Frame::for_app(app, season, path),
+        head: DashboardHeader::new(&user.caller, path, notice),
         stages: stage::all(app).await?,
         form,
         profiles: Profile::ALL,
         confirm: None,
-        is_refused: matches!(said, Said::Refused(_)),
+        is_refused: matches!(notice, Notice::Refused(_)),
     };
-    render_desk(&page, said)
+    render_dashboard(&page, notice)
 }
 
 pub(super) async fn page(
-    organising: Organising,
+    user: PageOrganiser,
     State(app): State<App>,
-    Query(said): Query<Done>,
+    Query(notice): Query<DoneQuery>,
 ) -> Result<Response, PageProblem> {
-    page_with(&app, &organising, Said::Done(&said), None).await
+    page_with(&app, &user, Notice::Done(&notice), None).await
 }
 
 pub(super) async fn create(
-    organising: Organising,
+    user: PageOrganiser,
     State(app): State<App>,
     form: Result<PageForm<StageForm>, Problem>,
 ) -> Result<Response, PageProblem> {
     let PageForm(form) = form?;
-    let actor = organising.organiser.actor();
-    let made = match form.new_stage() {
-        Ok(new) => staging::create_stage(&app, actor, new).await,
+    let actor = user.organiser.actor();
+    let created = match form.new_stage() {
+        Ok(new) => stages::create_stage(&app, actor, new).await,
         Err(problem) => Err(problem),
     };
-    match made {
-        Ok(_) => Ok(done("/organiser/stages", "stage-made")),
-        Err(problem) => page_with(&app, &organising, Said::Refused(&problem), Some(form)).await,
+    match created {
+        Ok(_) => Ok(redirect_done("/organiser/stages", "stage-made")),
+        Err(problem) => page_with(&app, &user, Notice::Refused(&problem), Some(form)).await,
     }
 }

@@ -1,9 +1,9 @@
-//! `/organiser/storage`: what the disks have, and what the teams' files take.
+//! `/organiser/storage`: free space of the disks, and storage by team.
 
 use crate::{
-    desk_frame::{self, Head, Said},
+    dashboard_frame::{self, DashboardHeader, Notice},
     frame::{Frame, PageProblem, render},
-    signed_in::Organising,
+    page_auth::PageOrganiser,
 };
 use askama::Template;
 use axum::{extract::State, response::Response};
@@ -19,12 +19,12 @@ use faceoff_types::{StageId, StageName};
 #[template(path = "organiser_storage.html")]
 struct Page {
     frame: Frame,
-    head: Head,
+    head: DashboardHeader,
     disks: Vec<Disk>,
-    kept_free: String,
+    min_free: String,
     is_short: bool,
     teams: Vec<StorageView>,
-    /// Each with what is kept of its files.
+    /// Stages with their retention rule.
     stages: Vec<(StageId, StageName, String)>,
 }
 
@@ -37,18 +37,18 @@ struct Disk {
 
 impl Page {
     fn bytes(&self, bytes: &u64) -> String {
-        desk_frame::bytes(*bytes)
+        dashboard_frame::bytes(*bytes)
     }
 }
 
 pub(super) async fn page(
-    organising: Organising,
+    user: PageOrganiser,
     State(app): State<App>,
 ) -> Result<Response, PageProblem> {
-    let room = app.store.room();
-    let disks = room.disks().into_iter().flatten().map(|disk| Disk {
-        free: desk_frame::bytes(disk.free_bytes),
-        size: desk_frame::bytes(disk.size_bytes),
+    let space = app.store.free_space();
+    let disks = space.disks().into_iter().flatten().map(|disk| Disk {
+        free: dashboard_frame::bytes(disk.free_bytes),
+        size: dashboard_frame::bytes(disk.size_bytes),
         used: 100
             - (100 * disk.free_bytes)
                 .checked_div(disk.size_bytes)
@@ -56,27 +56,27 @@ pub(super) async fn page(
                 .min(100),
     });
     let mut disks: Vec<Disk> = disks.collect();
-    // Folders that are watched may be on the same disk.
-    disks.dedup_by(|one, other| (&one.free, &one.size) == (&other.free, &other.size));
+    // Monitored folders may be on the same disk.
+    disks.dedup_by(|disk, other| (&disk.free, &disk.size) == (&other.free, &other.size));
     let mut stages = Vec::new();
     for stage in app.store.stages().await.map_err(Problem::from)? {
-        let kept = app
+        let retention = app
             .store
             .stage_retention(stage.id)
             .await
             .map_err(Problem::from)?;
-        stages.push((stage.id, stage.name, kept.to_string()));
+        stages.push((stage.id, stage.name, retention.to_string()));
     }
     let mut teams = storage::all(&app).await?;
     teams.sort_by_key(|team| std::cmp::Reverse(team.archive_bytes + team.dataset_bytes));
-    let season = SeasonHead::now(&app).await?.name;
+    let season = SeasonHead::load(&app).await?.name;
     let path = "/organiser/storage";
     let page = Page {
-        frame: Frame::of(&app, season, path),
-        head: Head::of(&organising.caller, path, Said::Nothing),
+        frame: Frame::for_app(&app, season, path),
+        head: DashboardHeader::new(&user.caller, path, Notice::None),
         disks,
-        kept_free: desk_frame::bytes(room.min_free_bytes()),
-        is_short: room.is_short(),
+        min_free: dashboard_frame::bytes(space.min_free_bytes()),
+        is_short: space.is_short(),
         teams,
         stages,
     };

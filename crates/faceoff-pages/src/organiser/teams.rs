@@ -1,10 +1,10 @@
-//! `/organiser/teams`: who takes part, who wants to, in which division, and who asks for it.
+//! `/organiser/teams`: teams, registrations and divisions.
 
 use crate::{
-    desk_frame::{Done, Head, Said, done, render_desk},
-    figures::minute,
+    dashboard_frame::{DoneQuery, DashboardHeader, Notice, redirect_done, render_dashboard},
+    figures::utc_minute,
     frame::{Frame, PageProblem},
-    signed_in::Organising,
+    page_auth::PageOrganiser,
 };
 use askama::Template;
 use axum::{
@@ -16,7 +16,7 @@ use faceoff_api::{
     views::{invitation::RegistrationView, team::TeamView},
 };
 use faceoff_service::{
-    acts::teams,
+    services::teams,
     app::App,
     extract::{PageForm, PathParam},
     problem::Problem,
@@ -29,7 +29,7 @@ use serde::Deserialize;
 #[template(path = "organiser_teams.html")]
 struct Page {
     frame: Frame,
-    head: Head,
+    head: DashboardHeader,
     teams: Vec<TeamView>,
     waiting: Vec<RegistrationView>,
     decided: Vec<RegistrationView>,
@@ -39,7 +39,7 @@ struct Page {
 
 impl Page {
     fn at(&self, at: &jiff::Timestamp) -> String {
-        minute(*at)
+        utc_minute(*at)
     }
 }
 
@@ -47,17 +47,17 @@ const PATH: &str = "/organiser/teams";
 
 async fn page_with(
     app: &App,
-    organising: &Organising,
-    said: Said<'_>,
-    filled: Option<SeasonForm>,
+    user: &PageOrganiser,
+    notice: Notice<'_>,
+    form: Option<SeasonForm>,
 ) -> Result<Response, PageProblem> {
     let registrations = app.store.registrations().await.map_err(Problem::from)?;
     let registrations = registrations.into_iter().map(invitation::registration);
-    let (waiting, decided) = registrations.partition(|one| one.state == "waiting");
+    let (waiting, decided) = registrations.partition(|registration| registration.state == "waiting");
     let divisions = app.store.divisions().await.map_err(Problem::from)?;
     let season = app.store.season().await.map_err(Problem::from)?;
-    let form = filled.unwrap_or_else(|| SeasonForm {
-        takes_registrations: match season.takes_registrations {
+    let form = form.unwrap_or_else(|| SeasonForm {
+        takes_registrations: match season.registration_open {
             true => "on".to_owned(),
             false => String::new(),
         },
@@ -67,33 +67,33 @@ async fn page_with(
             .collect::<Vec<_>>()
             .join("\n"),
     });
-    let name = SeasonHead::now(app).await?.name;
+    let name = SeasonHead::load(app).await?.name;
     let page = Page {
-        frame: Frame::of(app, name, PATH),
-        head: Head::of(&organising.caller, PATH, said),
+        frame: Frame::for_app(app, name, PATH),
+        head: DashboardHeader::new(&user.caller, PATH, notice),
         teams: team::all(app).await?,
         waiting,
         decided,
         divisions,
         season: form,
     };
-    render_desk(&page, said)
+    render_dashboard(&page, notice)
 }
 
 pub(super) async fn page(
-    organising: Organising,
+    user: PageOrganiser,
     State(app): State<App>,
-    Query(said): Query<Done>,
+    Query(notice): Query<DoneQuery>,
 ) -> Result<Response, PageProblem> {
-    page_with(&app, &organising, Said::Done(&said), None).await
+    page_with(&app, &user, Notice::Done(&notice), None).await
 }
 
-/// What of a team only organisers change.
+/// Settings of a team that only organisers can change.
 #[derive(Deserialize)]
 pub(super) struct TeamForm {
     #[serde(default)]
     division: String,
-    /// Ticked, or not sent.
+    /// Checkbox: not sent if it is not ticked.
     #[serde(default)]
     baseline: String,
 }
@@ -108,21 +108,21 @@ fn team_change(form: &TeamForm) -> Result<TeamChange, Problem> {
     })
 }
 
-/// Puts a team into a division, or makes it a reference agent.
+/// Changes the division of a team and whether it is a reference agent.
 pub(super) async fn change(
-    organising: Organising,
+    user: PageOrganiser,
     State(app): State<App>,
     id: Result<PathParam<TeamId>, Problem>,
     form: Result<PageForm<TeamForm>, Problem>,
 ) -> Result<Response, PageProblem> {
     let (PathParam(id), PageForm(form)) = (id?, form?);
     let changed = match team_change(&form) {
-        Ok(change) => teams::change_team(&app, &organising.caller, id, change).await,
+        Ok(change) => teams::change_team(&app, &user.caller, id, change).await,
         Err(problem) => Err(problem),
     };
     match changed {
-        Ok(_) => Ok(done(PATH, "team-changed")),
-        Err(problem) => page_with(&app, &organising, Said::Refused(&problem), None).await,
+        Ok(_) => Ok(redirect_done(PATH, "team-changed")),
+        Err(problem) => page_with(&app, &user, Notice::Refused(&problem), None).await,
     }
 }
 
@@ -130,7 +130,7 @@ pub(super) async fn change(
 pub(super) struct SeasonForm {
     #[serde(default)]
     pub(super) takes_registrations: String,
-    /// A name a line.
+    /// One name per line.
     #[serde(default)]
     pub(super) divisions: String,
 }
@@ -145,20 +145,20 @@ fn season_change(form: &SeasonForm) -> Result<SeasonChange, Problem> {
     })
 }
 
-/// Changes whether teams may register, and the divisions.
+/// Opens or closes registration, and changes the divisions.
 pub(super) async fn change_season(
-    organising: Organising,
+    user: PageOrganiser,
     State(app): State<App>,
     form: Result<PageForm<SeasonForm>, Problem>,
 ) -> Result<Response, PageProblem> {
     let PageForm(form) = form?;
-    let actor = organising.organiser.actor();
+    let actor = user.organiser.actor();
     let changed = match season_change(&form) {
         Ok(change) => teams::change_season(&app, actor, &change).await,
         Err(problem) => Err(problem),
     };
     match changed {
-        Ok(()) => Ok(done(PATH, "season-changed")),
-        Err(problem) => page_with(&app, &organising, Said::Refused(&problem), Some(form)).await,
+        Ok(()) => Ok(redirect_done(PATH, "season-changed")),
+        Err(problem) => page_with(&app, &user, Notice::Refused(&problem), Some(form)).await,
     }
 }

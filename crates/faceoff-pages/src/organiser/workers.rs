@@ -1,9 +1,9 @@
-//! `/organiser/workers`: who plays, on this machine and on others.
+//! `/organiser/workers`: local slots, remote workers and bans.
 
 use crate::{
-    desk_frame::{Done, Head, Said},
+    dashboard_frame::{DoneQuery, DashboardHeader, Notice},
     frame::{Frame, PageProblem, render},
-    signed_in::Organising,
+    page_auth::PageOrganiser,
 };
 use askama::Template;
 use axum::{
@@ -21,17 +21,17 @@ use jiff::Timestamp;
 #[template(path = "organiser_workers.html")]
 struct Page {
     frame: Frame,
-    head: Head,
-    of: WorkersView,
+    head: DashboardHeader,
+    workers: WorkersView,
 }
 
 impl Page {
-    /// The sign of its state, and what that is called.
+    /// CSS class and label of the state.
     fn state(&self, worker: &WorkerView) -> (&'static str, &'static str) {
         match worker.state {
-            WorkerState::Working => ("good", "works"),
-            WorkerState::Idle => ("good", "waits for work"),
-            WorkerState::Refused => ("bad", "gets no work"),
+            WorkerState::Working => ("good", "working"),
+            WorkerState::Idle => ("good", "idle"),
+            WorkerState::Refused => ("bad", "gets no jobs"),
             WorkerState::Silent => ("waiting", "silent"),
         }
     }
@@ -42,15 +42,15 @@ impl Page {
 }
 
 pub(super) async fn page(
-    organising: Organising,
+    user: PageOrganiser,
     State(app): State<App>,
-    Query(done): Query<Done>,
+    Query(done): Query<DoneQuery>,
 ) -> Result<Response, PageProblem> {
-    let season = SeasonHead::now(&app).await?.name;
+    let season = SeasonHead::load(&app).await?.name;
     let path = "/organiser/workers";
     render(&Page {
-        frame: Frame::of(&app, season, path),
-        head: Head::of(&organising.caller, path, Said::Done(&done)),
-        of: workers::with_bans(&app).await?,
+        frame: Frame::for_app(&app, season, path),
+        head: DashboardHeader::new(&user.caller, path, Notice::Done(&done)),
+        workers: workers::with_bans(&app).await?,
     })
 }

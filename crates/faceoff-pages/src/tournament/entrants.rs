@@ -1,7 +1,7 @@
-//! Who is in a tournament, and with what each plays.
+//! Teams of a tournament with their submissions by round.
 
-use super::{schedule::is_withheld, standings};
-use crate::{figures::minute, spoilers::Spoilers};
+use super::{schedule::is_hidden, standings};
+use crate::{figures::utc_minute, spoilers::Spoilers};
 use faceoff_api::views::tournament::TournamentView;
 use faceoff_service::{app::AppState, problem::Problem};
 use faceoff_types::{RoundNumber, SubmissionId, TeamId, TeamName};
@@ -11,55 +11,55 @@ pub(super) struct Entrant {
     pub(super) team: TeamName,
     pub(super) team_id: TeamId,
     pub(super) entered_at: String,
-    /// How and why it left.
+    /// Since when and why the team is out of the tournament.
     pub(super) left: Option<String>,
-    pub(super) plays: Vec<Plays>,
+    pub(super) submissions: Vec<RoundsSubmission>,
 }
 
-/// What it plays some rounds with.
-pub(super) struct Plays {
+/// A submission with the rounds in which the team plays with it.
+pub(super) struct RoundsSubmission {
     pub(super) rounds: String,
     pub(super) submission: SubmissionId,
     pub(super) agent: Option<String>,
 }
 
-/// The teams, by name.
-pub(super) async fn of(
+/// The teams, sorted by name.
+pub(super) async fn entrants(
     app: &AppState,
     view: &TournamentView,
     spoilers: &Spoilers,
 ) -> Result<Vec<Entrant>, Problem> {
     let mut entrants = Vec::new();
     for entrant in &view.entrants {
-        let mut plays = Vec::new();
+        let mut submissions = Vec::new();
         for (submission, rounds) in rounds_of(view, entrant.team, spoilers) {
             let agent = app.store.submission(submission).await?.agent_name;
-            plays.push(Plays {
-                rounds: in_words(&rounds),
+            submissions.push(RoundsSubmission {
+                rounds: rounds_text(&rounds),
                 submission,
-                agent: agent.map(|name| faceoff_types::harmless(&name).into_owned()),
+                agent: agent.map(|name| faceoff_types::escape_unprintable(&name).into_owned()),
             });
         }
         let left = entrant.left.as_ref().map(|left| {
-            let how = standings::left(left.r#as);
+            let how = standings::left_label(left.r#as);
             let from = left.from_round;
-            match spoilers.hide() {
-                true => format!("{how} from round {from} on"),
-                false => format!("{how} from round {from} on: {}", left.reason),
+            match spoilers.hides_results() {
+                true => format!("{how} from round {from}"),
+                false => format!("{how} from round {from}: {}", left.reason),
             }
         });
         entrants.push(Entrant {
             team: entrant.team_name.clone(),
             team_id: entrant.team,
-            entered_at: minute(entrant.entered_at),
+            entered_at: utc_minute(entrant.entered_at),
             left,
-            plays,
+            submissions,
         });
     }
     Ok(entrants)
 }
 
-/// What a team plays which rounds with, the first one first.
+/// Rounds of a team by submission, in order.
 fn rounds_of(
     view: &TournamentView,
     team: TeamId,
@@ -67,10 +67,10 @@ fn rounds_of(
 ) -> Vec<(SubmissionId, Vec<RoundNumber>)> {
     let mut played = Vec::<(SubmissionId, Vec<RoundNumber>)>::new();
     for round in &view.rounds {
-        if is_withheld(view, round.number, spoilers) {
+        if is_hidden(view, round.number, spoilers) {
             continue;
         }
-        let own = round.submissions.iter().find(|one| one.team == team);
+        let own = round.submissions.iter().find(|submission| submission.team == team);
         let Some(own) = own else { continue };
         match played.iter_mut().find(|(id, _)| *id == own.submission) {
             Some((_, rounds)) => rounds.push(round.number),
@@ -80,22 +80,22 @@ fn rounds_of(
     played
 }
 
-/// Of each submission, by its id as ratings have it, the rounds that it plays.
+/// Rounds by submission id, for the ratings.
 pub(super) fn rounds_by_submission(view: &TournamentView) -> BTreeMap<String, String> {
     let mut rounds = BTreeMap::<String, Vec<RoundNumber>>::new();
     for round in &view.rounds {
-        for one in &round.submissions {
-            let of_one = rounds.entry(one.submission.to_string()).or_default();
-            of_one.push(round.number);
+        for submission in &round.submissions {
+            let entry = rounds.entry(submission.submission.to_string()).or_default();
+            entry.push(round.number);
         }
     }
     rounds
         .into_iter()
-        .map(|(id, rounds)| (id, in_words(&rounds)))
+        .map(|(id, rounds)| (id, rounds_text(&rounds)))
         .collect()
 }
 
-fn in_words(rounds: &[RoundNumber]) -> String {
+fn rounds_text(rounds: &[RoundNumber]) -> String {
     let numbers: Vec<_> = rounds.iter().map(ToString::to_string).collect();
     match numbers.as_slice() {
         [only] => format!("round {only}"),

@@ -1,4 +1,4 @@
-//! How strong the submissions are, apart from the standings.
+//! Ratings of the submissions, independent of the standings.
 
 use faceoff_scoring::tournament::rating::{Pool, Ratings};
 use faceoff_types::TeamName;
@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 pub(super) struct RatingTable {
     pub(super) id: String,
     pub(super) caption: String,
-    /// The strongest first.
+    /// Highest rating first.
     pub(super) rows: Vec<Row>,
 }
 
@@ -21,27 +21,27 @@ pub(super) struct Row {
     pub(super) games: u32,
 }
 
-/// By results, then by goals; more than one of each where no chain of games connects all submissions.
+/// Tables by results and by goals; several of each if no chain of games connects all submissions.
 pub(super) fn tables(ratings: &Ratings, rounds: &BTreeMap<String, String>) -> Vec<RatingTable> {
     let mut tables = Vec::new();
-    for (by, what, pools) in [
+    for (by, basis, pools) in [
         (
             "results",
-            "who won: a draw is half a win for each",
+            "results; a draw is half a win for each team",
             &ratings.results,
         ),
-        ("goals", "goals alone, whoever won the game", &ratings.goals),
+        ("goals", "goals only", &ratings.goals),
     ] {
         for (number, pool) in (1..).zip(pools) {
-            let of_many = match pools.len() {
+            let pool_note = match pools.len() {
                 1 => String::new(),
                 many => format!(
-                    " Pool {number} of {many}, which no game connects: their numbers cannot be compared."
+                    " Pool {number} of {many}: no games between the pools, so their ratings cannot be compared."
                 ),
             };
             tables.push(RatingTable {
                 id: format!("ratings-by-{by}-{number}"),
-                caption: format!("By {what}.{of_many}"),
+                caption: format!("By {basis}.{pool_note}"),
                 rows: rows(pool, rounds),
             });
         }
@@ -79,7 +79,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn an_end_that_games_do_not_give_is_said() {
+    fn open_interval_ends_are_described() {
         assert_eq!(interval([Some(1400.4), Some(1600.0)]), "1400 – 1600");
         assert_eq!(interval([Some(1870.0), None]), "above 1870");
         assert_eq!(interval([None, Some(1180.0)]), "below 1180");

@@ -1,16 +1,14 @@
-//! Who plays whom, round by round.
+//! Schedule of a tournament, round by round.
 
-use crate::{figures::minute, game_row::GameRow, spoilers::Spoilers, tournament_words};
+use crate::{figures::utc_minute, game_row::GameRow, spoilers::Spoilers, tournament_text};
 use faceoff_api::views::tournament::{RoundView, TournamentView};
 use faceoff_types::{RoundNumber, TeamName};
 
-/// A round, as it was drawn.
 pub(super) struct Round {
     pub(super) number: RoundNumber,
-    /// How far it is.
-    pub(super) told: String,
-    /// Who plays in it follows from results that are hidden.
-    pub(super) is_withheld: bool,
+    pub(super) progress: String,
+    /// The pairings depend on hidden results.
+    pub(super) is_hidden: bool,
     /// In the order of play.
     pub(super) games: Vec<GameRow>,
     pub(super) byes: Vec<(u32, TeamName)>,
@@ -19,19 +17,19 @@ pub(super) struct Round {
 }
 
 impl Round {
-    pub(super) fn of(
+    pub(super) fn new(
         view: &TournamentView,
         round: &RoundView,
         games: &[GameRow],
         spoilers: &Spoilers,
     ) -> Self {
-        let is_withheld = is_withheld(view, round.number, spoilers);
+        let is_hidden = is_hidden(view, round.number, spoilers);
         let own = games.iter().filter(|game| game.round == round.number);
         let byes = round.byes.iter();
-        let mut drawn = Self {
+        let mut shown = Self {
             number: round.number,
-            told: told(round),
-            is_withheld,
+            progress: progress_text(round),
+            is_hidden,
             games: own.cloned().collect(),
             byes: byes
                 .map(|bye| (bye.matchday, bye.team_name.clone()))
@@ -39,43 +37,43 @@ impl Round {
             groups: round.groups.clone(),
             has_halves: view.rules.mirrored,
         };
-        if is_withheld {
-            drawn.games.clear();
-            drawn.byes.clear();
-            drawn.groups.clear();
+        if is_hidden {
+            shown.games.clear();
+            shown.byes.clear();
+            shown.groups.clear();
         }
-        drawn
+        shown
     }
 }
 
-/// Would who plays in a round tell how games ended that are hidden?
-pub(super) fn is_withheld(view: &TournamentView, round: RoundNumber, spoilers: &Spoilers) -> bool {
-    tournament_words::is_drawn_from_results(&view.rules, round) && !spoilers.tell_round(round)
+/// Would the pairings of a round reveal hidden results?
+pub(super) fn is_hidden(view: &TournamentView, round: RoundNumber, spoilers: &Spoilers) -> bool {
+    tournament_text::is_drawn_from_results(&view.rules, round) && !spoilers.shows_round(round)
 }
 
-fn told(round: &RoundView) -> String {
+fn progress_text(round: &RoundView) -> String {
     let progress = &round.progress;
     let mut parts = vec![format!(
         "{} of {} games played",
         progress.played, progress.games
     )];
     for (count, words) in [
-        (progress.running, "being played"),
-        (progress.queued, "to come"),
-        (progress.to_be_rerun, "void or broken, to be played again"),
-        (progress.cancelled, "called off"),
+        (progress.running, "running"),
+        (progress.queued, "queued"),
+        (progress.to_be_rerun, "void or failed, to be played again"),
+        (progress.cancelled, "not played"),
     ] {
         if count > 0 {
             parts.push(format!("{count} {words}"));
         }
     }
-    let over = match round.over_at {
-        Some(at) => format!(", over {}", minute(at)),
+    let end = match round.over_at {
+        Some(at) => format!(", finished {}", utc_minute(at)),
         None => String::new(),
     };
     format!(
-        "{}. Started {}{over}.",
+        "{}. Started {}{end}.",
         parts.join(", "),
-        minute(round.started_at)
+        utc_minute(round.started_at)
     )
 }

@@ -1,19 +1,18 @@
-//! Tables of a tournament as its page has them.
+//! Standings of a tournament for its page.
 
 use crate::figures;
-use faceoff_scoring::tournament::schedule::{Table, TableOf};
-use faceoff_service::{problem::Problem, views::tournament_sheet::TournamentSheet};
-use faceoff_types::{LeftAs, TeamId, TeamName};
+use faceoff_scoring::tournament::schedule::{Table, TableScope};
+use faceoff_service::{problem::Problem, views::tournament_state::TournamentState};
+use faceoff_types::{DepartureKind, TeamId, TeamName};
 
-/// A table: of all rounds, of the final, of a group.
+/// Standings of all rounds, of the final or of a group.
 pub(super) struct Standings {
     pub(super) title: String,
     pub(super) id: String,
     /// Best first.
     pub(super) rows: Vec<Row>,
-    /// Has a team points by a bye?
     pub(super) has_byes: bool,
-    /// The rounds whose points stand apart.
+    /// Rounds with a column of points.
     pub(super) rounds: Vec<usize>,
 }
 
@@ -33,17 +32,17 @@ pub(super) struct Row {
     pub(super) left: Option<&'static str>,
 }
 
-/// As tables are called.
-pub(super) fn title(of: TableOf) -> String {
+/// Title of a table.
+pub(super) fn title(of: TableScope) -> String {
     match of {
-        TableOf::Tournament => "Standings".to_owned(),
-        TableOf::Group(number) => format!("Group {number}"),
-        TableOf::Final => "Final round".to_owned(),
+        TableScope::Tournament => "Standings".to_owned(),
+        TableScope::Group(number) => format!("Group {number}"),
+        TableScope::Final => "Final round".to_owned(),
     }
 }
 
 impl Standings {
-    pub(super) fn of(sheet: &TournamentSheet, table: &Table) -> Result<Self, Problem> {
+    pub(super) fn new(state: &TournamentState, table: &Table) -> Result<Self, Problem> {
         let rows: Vec<Row> = table
             .standings
             .iter()
@@ -51,7 +50,7 @@ impl Standings {
                 Ok(Row {
                     rank: standing.rank,
                     team: standing.team.clone(),
-                    team_id: sheet.team(&standing.team)?,
+                    team_id: state.team(&standing.team)?,
                     points: standing.points,
                     per_round: standing.points_per_round.clone(),
                     wins: standing.wins,
@@ -60,19 +59,19 @@ impl Standings {
                     byes: standing.byes,
                     goals: [standing.goals_for, standing.goals_against],
                     difference: difference(standing.goals_for, standing.goals_against),
-                    penalty_points: figures::one(standing.penalty_points),
-                    left: standing.left.map(left),
+                    penalty_points: figures::one_decimal(standing.penalty_points),
+                    left: standing.departure.map(left_label),
                 })
             })
             .collect::<Result<_, Problem>>()?;
         let rounds = rows.first().map_or(0, |row| row.per_round.len());
-        let is_of_all = table.of == TableOf::Tournament;
-        let title = title(table.of);
+        let is_overall = table.scope == TableScope::Tournament;
+        let title = title(table.scope);
         Ok(Self {
             id: title.to_lowercase().replace(' ', "-"),
             title,
             has_byes: rows.iter().any(|row| row.byes > 0),
-            rounds: if is_of_all && rounds > 1 {
+            rounds: if is_overall && rounds > 1 {
                 (1..=rounds).collect()
             } else {
                 Vec::new()
@@ -82,10 +81,10 @@ impl Standings {
     }
 }
 
-pub(super) const fn left(left_as: LeftAs) -> &'static str {
+pub(super) const fn left_label(left_as: DepartureKind) -> &'static str {
     match left_as {
-        LeftAs::Withdrawn => "withdrawn",
-        LeftAs::Disqualified => "disqualified",
+        DepartureKind::Withdrawn => "withdrawn",
+        DepartureKind::Disqualified => "disqualified",
     }
 }
 

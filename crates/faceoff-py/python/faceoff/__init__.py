@@ -1,6 +1,6 @@
 """Develop, train and evaluate agents for the robot air hockey competition.
 
-Importing this package is cheap: what needs the simulator or another package is imported when it is used.
+Importing this package is cheap: the simulator and other packages are imported on first use.
 
 - :mod:`faceoff.agent`: the protocol loop of an agent, standard library only.
 - :mod:`faceoff.kinematics`: the robot's geometry.

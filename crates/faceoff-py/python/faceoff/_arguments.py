@@ -1,4 +1,4 @@
-"""Checks of what users pass in, and the setup that the native half reads."""
+"""Checks of arguments, and the environment setup that the native half reads."""
 
 from __future__ import annotations
 
@@ -24,22 +24,22 @@ PROFILES: dict[str, tuple[str, ...]] = {
     **{factor: (factor,) for factor in FACTORS},
     "evaluation": FACTORS[:4],
 }
-#: Seeds are below this, so that they fit into arrays of NumPy.
+#: Seeds are below this, so that they fit into int64 arrays.
 SEED_BOUND = 2**63
 
 
 def one_of(name: str, value: object, known: Iterable[str]) -> str:
-    """``value`` if it is one of the known words."""
-    words = list(known)
+    """``value`` if it is one of ``known``."""
+    names = list(known)
     if not isinstance(value, str):
-        raise ArgumentTypeError(f"{name}: expected one of {', '.join(words)}, got {value!r}")
-    if value not in words:
-        raise ArgumentError(f"{name}: expected one of {', '.join(words)}, got {value!r}")
+        raise ArgumentTypeError(f"{name}: expected one of {', '.join(names)}, got {value!r}")
+    if value not in names:
+        raise ArgumentError(f"{name}: expected one of {', '.join(names)}, got {value!r}")
     return value
 
 
 def integer(name: str, value: object, least: int, most: int) -> int:
-    """``value`` as an int in these bounds; a bool is none."""
+    """``value`` as an int from ``least`` to ``most``, both included; a bool is refused."""
     if isinstance(value, (bool, np.bool_)) or not isinstance(value, (int, np.integer)):
         raise ArgumentTypeError(
             f"{name}: expected a whole number from {least} to {most}, got {value!r}"
@@ -50,12 +50,12 @@ def integer(name: str, value: object, least: int, most: int) -> int:
 
 
 def seed_number(name: str, value: object) -> int:
-    """``value`` as a seed of an environment."""
+    """``value`` as a seed of an environment: 0 to ``SEED_BOUND`` - 1."""
     return integer(name, value, 0, SEED_BOUND - 1)
 
 
 def numbers(name: str, value: object, shape: tuple[int, ...]) -> npt.NDArray[np.float64]:
-    """``value`` as a contiguous array of this shape; numbers are not looked at."""
+    """``value`` as a contiguous float64 array of this shape; NaN and infinity are not refused here."""
     try:
         array = np.asarray(value)
     except ValueError as error:
@@ -68,7 +68,7 @@ def numbers(name: str, value: object, shape: tuple[int, ...]) -> npt.NDArray[np.
 
 
 def mask(name: str, value: object, length: int) -> npt.NDArray[np.bool_]:
-    """``value`` as a mask that is true somewhere."""
+    """``value`` as a mask of this length with at least one true element."""
     if not isinstance(value, np.ndarray) or value.dtype != np.bool_:
         raise ArgumentTypeError(f"{name}: expected a NumPy array of bool, got {value!r:.80}")
     if value.shape != (length,):
@@ -79,7 +79,7 @@ def mask(name: str, value: object, length: int) -> npt.NDArray[np.bool_]:
 
 
 def interpolation_code(value: object) -> int | None:
-    """``value`` as the protocol's code of an interpolation."""
+    """``value`` as an interpolation code of the protocol: 1 to 5, -1 or None."""
     if value is None:
         return None
     code = integer("interpolation", value, -1, 5)
@@ -88,7 +88,7 @@ def interpolation_code(value: object) -> int | None:
 
 
 def factor_names(profile: object) -> list[str]:
-    """The factors of a profile's name, or of a sequence of factors' names."""
+    """The factors of a named profile, or of a sequence of factor names, in the order of ``FACTORS``."""
     if isinstance(profile, str):
         return list(PROFILES[one_of("profile", profile, PROFILES)])
     if not isinstance(profile, Iterable):
@@ -100,7 +100,7 @@ def factor_names(profile: object) -> list[str]:
 
 
 def perturbations_json(perturbations: object) -> Any:
-    """Magnitudes of perturbations, as JSON has them."""
+    """Magnitudes of perturbations as a dictionary for JSON."""
     if perturbations is None:
         return {}
     if not isinstance(perturbations, Mapping):
@@ -111,15 +111,15 @@ def perturbations_json(perturbations: object) -> Any:
     return dict(perturbations)
 
 
-def season_seed(value: object) -> str | None:
-    """A seed of the model mismatch: a number or 64 hexadecimal digits."""
+def mismatch_seed_text(value: object) -> str | None:
+    """The seed of the model mismatch as text, or None to derive it from the episode's seed."""
     if value is None:
         return None
-    return any_seed("mismatch_seed", value)
+    return seed_text("mismatch_seed", value)
 
 
-def any_seed(name: str, value: object) -> str:
-    """A seed as the command line takes it: a number below 2**64 or 64 hexadecimal digits."""
+def seed_text(name: str, value: object) -> str:
+    """A seed as text, as the command line accepts it: a number below 2**64 or 64 hexadecimal digits."""
     if isinstance(value, str):
         if len(value) == 64 and all(digit in "0123456789abcdefABCDEF" for digit in value):
             return value
@@ -138,7 +138,7 @@ def write_setup(
     mismatch_seed: object,
     max_episode_steps: object,
 ) -> str:
-    """What the native half reads: checked, as JSON."""
+    """Checks the arguments of an environment and returns them as JSON for the native half."""
     steps = _native.EPISODE_STEPS
     horizon = steps if max_episode_steps is None else max_episode_steps
     setup = {
@@ -148,7 +148,7 @@ def write_setup(
         "clip_actions": bool(clip_actions),
         "factors": factor_names(profile),
         "perturbations": perturbations_json(perturbations),
-        "mismatch_seed": season_seed(mismatch_seed),
+        "mismatch_seed": mismatch_seed_text(mismatch_seed),
         "max_episode_steps": integer("max_episode_steps", horizon, 1, steps),
     }
     try:
@@ -158,5 +158,5 @@ def write_setup(
 
 
 def action_len(interpolation: int | None) -> int:
-    """Numbers in an action."""
+    """Count of numbers in an action."""
     return math.prod(_native.action_shape(interpolation))

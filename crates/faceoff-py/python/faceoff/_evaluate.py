@@ -18,20 +18,20 @@ from faceoff._arguments import (
     PROFILES,
     TASKS,
     ActionMode,
-    any_seed,
     integer,
     interpolation_code,
+    mismatch_seed_text,
     numbers,
     one_of,
     perturbations_json,
-    season_seed,
+    seed_text,
 )
 from faceoff.errors import ArgumentError, ArgumentTypeError
 
 #: From an observation, (20,) or (23,) float64 as the protocol has it, to an action.
 Policy = Callable[[npt.NDArray[np.float64]], Any]
 
-#: As the server's.
+#: The server has the same limit.
 MAX_EPISODES = 100_000
 
 
@@ -49,74 +49,74 @@ def evaluate(
     perturbations: Mapping[str, Any] | None = None,
     workers: int = 1,
 ) -> dict[str, Any]:
-    """Plays and scores episodes as ``faceoff eval`` does, without a process for the agent.
+    """Runs and scores episodes as ``faceoff eval`` does, with the policy in this process.
 
     Args:
-        policy: from an observation, (20,) or (23,) float64 (docs/protocol.md), to an action; or one for each task. If
-            it has a method ``reset(task, episode)``, that is called before each episode.
-        tasks: what is played.
-        episodes: of each task; those that ``faceoff eval --episodes N --seed S`` plays.
-        profile: what perturbs the world.
+        policy: from an observation, (20,) or (23,) float64 (docs/protocol.md), to an action; or a mapping with
+            one policy per task. A method ``reset(task, episode)``, if there is one, is called before each episode.
+        tasks: one or more of ``hit``, ``defend`` and ``prepare``.
+        episodes: number per task; the same episodes as those of ``faceoff eval --episodes N --seed S``.
+        profile: name of the profile of perturbations.
         seed: a number, or 64 hexadecimal digits.
-        mismatch_seed: of the arm's deviation from its model; derived from the seed if left out.
-        interpolation, action_mode, clip_actions: as of the environments; ``raw`` actions are what an agent sends. The
-            action may have any shape, such as (2, 7), with the right count of numbers.
-        perturbations: magnitudes other than the ruleset's.
-        workers: processes, started anew (spawn), so that the policy must be one that can be pickled. Results do not
-            depend on it.
+        mismatch_seed: seed of the arm's deviation from its model; derived from ``seed`` by default.
+        interpolation, action_mode, clip_actions: as for the environments; ``raw`` actions are those that an agent
+            sends. The action may have any shape with the right count of numbers, such as (2, 7).
+        perturbations: magnitudes that replace those of the ruleset.
+        workers: number of processes, started by spawning, so the policy must be picklable. Results do not depend on
+            it.
 
     Returns:
-        What ``faceoff eval`` writes to ``results.json``, with None for computation times, which only an agent has; and
-        ``episodes``, a list with the outcome of each. A step after which the world diverged is the agent's fault, and
-        ends its episode, as on the server.
+        The content of ``results.json`` as ``faceoff eval`` writes it, with None for computation times, which are not
+        measured here; and ``episodes``, a list with the outcome of each. A step that makes the world diverge is an
+        agent fault and ends the episode, as on the server.
 
     Raises:
-        ArgumentError, ArgumentTypeError: for an argument, or for an action that the server would not take.
+        ArgumentError, ArgumentTypeError: for an invalid argument, or for an action that the server would refuse.
     """
     names = [tasks] if isinstance(tasks, str) else list(tasks)
-    played = [task for task in TASKS if task in [one_of("tasks", name, TASKS) for name in names]]
-    if not played:
+    selected = [task for task in TASKS if task in [one_of("tasks", name, TASKS) for name in names]]
+    if not selected:
         raise ArgumentError("tasks: expected hit, defend or prepare, got none")
-    policies = _policies(policy, played)
+    policies = _policies(policy, selected)
     count = integer("episodes", episodes, 1, MAX_EPISODES)
     setup = _Setup(
         profile=one_of("profile", profile, PROFILES),
-        seed=any_seed("seed", seed),
-        mismatch_seed=season_seed(mismatch_seed),
-        perturbations=_json(perturbations),
+        seed=seed_text("seed", seed),
+        mismatch_seed=mismatch_seed_text(mismatch_seed),
+        perturbations=_perturbations_text(perturbations),
         interpolation=interpolation_code(interpolation),
         action_mode=one_of("action_mode", action_mode, ACTION_MODES),
         clip_actions=bool(clip_actions),
     )
     processes = integer("workers", workers, 1, 256)
     evaluation = setup.evaluation()
-    jobs = [(task, range(first, count, processes)) for task in played for first in range(processes)]
+    jobs = [(task, range(first, count, processes)) for task in selected for first in range(processes)]
     outcomes: list[str] = []
     if processes == 1:
-        for task, numbers_ in jobs:
-            outcomes += _play(evaluation, setup, policies[task], task, numbers_)
+        for task, indices in jobs:
+            outcomes += _run_episodes(evaluation, setup, policies[task], task, indices)
     else:
         with ProcessPoolExecutor(processes, mp_context=get_context("spawn")) as pool:
             shards = [
-                pool.submit(_play_elsewhere, setup, policies[task], task, numbers_)
-                for task, numbers_ in jobs
-                if len(numbers_) > 0
+                pool.submit(_run_in_worker, setup, policies[task], task, indices)
+                for task, indices in jobs
+                if len(indices) > 0
             ]
             for shard in shards:
                 outcomes += shard.result()
     result: dict[str, Any] = json.loads(evaluation.score(outcomes))
-    for scored in result["tasks"].values():
-        scored["computation_time_s"] = None
-    told = [json.loads(outcome) for outcome in outcomes]
-    for outcome in told:
+    for task_result in result["tasks"].values():
+        task_result["computation_time_s"] = None
+    parsed = [json.loads(outcome) for outcome in outcomes]
+    for outcome in parsed:
         outcome["computation_time"] = None
-    order = {task: index for index, task in enumerate(TASKS)}
-    result["episodes"] = sorted(told, key=lambda one: (order[one["task"]], one["episode"]))
+    position = {task: index for index, task in enumerate(TASKS)}
+    result["episodes"] = sorted(parsed, key=lambda outcome: (position[outcome["task"]], outcome["episode"]))
     return result
 
 
 class _Setup:
-    """Checked arguments; other processes get them, too."""
+    """Checked arguments, picklable for worker processes."""
 
     def __init__(
         self,
@@ -143,44 +143,44 @@ class _Setup:
 
 
 def _policies(policy: object, tasks: Iterable[str]) -> dict[str, Policy]:
-    of_task = policy if isinstance(policy, Mapping) else dict.fromkeys(tasks, policy)
-    missing = [task for task in tasks if task not in of_task]
+    by_task = policy if isinstance(policy, Mapping) else dict.fromkeys(tasks, policy)
+    missing = [task for task in tasks if task not in by_task]
     if missing:
         raise ArgumentError(f"policy: expected one for each task, got none for {missing[0]}")
     for task in tasks:
-        if not callable(of_task[task]):
+        if not callable(by_task[task]):
             raise ArgumentTypeError(
-                f"policy: expected a function from an observation to an action, got {of_task[task]!r:.80}"
+                f"policy: expected a function from an observation to an action, got {by_task[task]!r:.80}"
             )
-    return dict(of_task)
+    return dict(by_task)
 
 
-def _json(perturbations: object) -> str:
+def _perturbations_text(perturbations: object) -> str:
     try:
         return json.dumps(perturbations_json(perturbations), allow_nan=False)
     except (TypeError, ValueError) as error:
         raise ArgumentError(f"perturbations: expected finite numbers in mappings, got {error}") from None
 
 
-def _play_elsewhere(setup: _Setup, policy: Policy, task: str, episodes: range) -> list[str]:
-    return _play(setup.evaluation(), setup, policy, task, episodes)
+def _run_in_worker(setup: _Setup, policy: Policy, task: str, episodes: range) -> list[str]:
+    return _run_episodes(setup.evaluation(), setup, policy, task, episodes)
 
 
-def _play(
+def _run_episodes(
     evaluation: _native.Evaluation, setup: _Setup, policy: Policy, task: str, episodes: range
 ) -> list[str]:
     outcomes = []
     reset = getattr(policy, "reset", None)
     for episode in episodes:
-        course = evaluation.begin(
+        running = evaluation.begin(
             task, episode, setup.interpolation, setup.action_mode, setup.clip_actions
         )
         if reset is not None:
             reset(task, episode)
         outcome = None
         while outcome is None:
-            given = policy(course.observation())
-            flat = np.asarray(given).reshape(-1) if np.size(given) == setup.action_len else given
-            outcome = course.answer(numbers("action", flat, (setup.action_len,)))
+            action = policy(running.observation())
+            flat = np.asarray(action).reshape(-1) if np.size(action) == setup.action_len else action
+            outcome = running.answer(numbers("action", flat, (setup.action_len,)))
         outcomes.append(outcome)
     return outcomes

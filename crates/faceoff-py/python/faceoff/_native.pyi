@@ -1,4 +1,4 @@
-"""The native half: what the package's modules are made of. Use those; this interface changes without notice."""
+"""The native half of the package. It is internal and changes without notice: use the package's modules."""
 
 from typing import Any
 
@@ -62,7 +62,7 @@ def arm_inverse(
     target: npt.NDArray[np.float64],
     q0: npt.NDArray[np.float64] | None,
     q: npt.NDArray[np.float64],
-    is_good: npt.NDArray[np.bool_],
+    is_solved: npt.NDArray[np.bool_],
 ) -> None: ...
 def arm_posture_velocities(
     target: npt.NDArray[np.float64], velocity: npt.NDArray[np.float64], dq: npt.NDArray[np.float64]
@@ -73,7 +73,7 @@ def arm_velocities(
 def arm_constraints(
     q: npt.NDArray[np.float64], dq: npt.NDArray[np.float64], values: npt.NDArray[np.float64]
 ) -> None: ...
-def arm_numbers() -> dict[str, Any]: ...
+def arm_constants() -> dict[str, Any]: ...
 
 class Game:
     def __new__(cls, setup: str) -> Game: ...
@@ -97,10 +97,10 @@ class Evaluation:
         interpolation: int | None,
         action_mode: str,
         clip_actions: bool,
-    ) -> PolicyCourse: ...
+    ) -> PolicyEpisode: ...
     def score(self, outcomes: list[str]) -> str: ...
 
-class PolicyCourse:
+class PolicyEpisode:
     def observation(self) -> npt.NDArray[np.float64]: ...
     def answer(self, action: npt.NDArray[np.float64]) -> str | None: ...
 

@@ -1,17 +1,17 @@
-"""What goes wrong. Every error of this package is an :class:`Error`; its message says what was expected, what came and
-what to do."""
+"""The errors of this package, all derived from :class:`Error`. A message says what was expected, what came and what to
+do."""
 
 
 class Error(Exception):
-    """Anything that this package refuses, or fails at."""
+    """Base class of all errors that this package raises."""
 
 
 class ArgumentError(Error, ValueError):
-    """An argument has a value that it cannot have."""
+    """An argument has an invalid value."""
 
 
 class ArgumentTypeError(Error, TypeError):
-    """An argument is of a type that it cannot be of."""
+    """An argument has an invalid type."""
 
 
 class OrderError(Error, RuntimeError):
@@ -23,4 +23,4 @@ class ClosedError(OrderError):
 
 
 class MissingError(Error, ImportError):
-    """Something that is not installed is needed."""
+    """A package that is needed is not installed."""

@@ -17,10 +17,10 @@ from faceoff._arguments import (
     factor_names,
     integer,
     interpolation_code,
+    mismatch_seed_text,
     numbers,
     one_of,
     perturbations_json,
-    season_seed,
     seed_number,
 )
 from faceoff.errors import ArgumentError, ArgumentTypeError, ClosedError, MissingError, OrderError
@@ -45,25 +45,25 @@ Opponent = Callable[[Observation], Any]
 
 @dataclass(frozen=True)
 class GameTransition:
-    """A control step of a game, for a reward function. Pairs are robot 1's first."""
+    """A control step of a game, for a reward function. In pairs robot 1 comes first."""
 
-    #: (2, 23) what both were told before, float32.
+    #: (2, 23) observations of both robots before the step, float32.
     observations: Observation
-    #: (2, 23) what the step led to; of the next rally, where one has begun.
+    #: (2, 23) observations after the step, float32; those of the next rally if one has begun.
     next_observations: Observation
-    #: (6,) the puck after the step, before a next rally: x, y, yaw, vx, vy, yaw rate in the table's frame.
+    #: (6,) the puck after the step, before the next rally begins: x, y, yaw, vx, vy, yaw rate in the table's frame.
     puck: npt.NDArray[np.float64]
-    #: (2, 17) of each robot joint positions and velocities, and the end effector in its own base frame.
+    #: (2, 17) joint positions (7) and velocities (7), and the end effector (3) in the robot's own base frame.
     robots: npt.NDArray[np.float64]
-    #: (2, 4) values in the order of :data:`faceoff.gym.CONSTRAINTS`; broken where above 0.
+    #: (2, 4) values in the order of :data:`faceoff.gym.CONSTRAINTS`; above 0 is a violation.
     constraints: npt.NDArray[np.float64]
     #: How the rally ended: goal, foul, stuck, left_table or diverged; None while it is under way.
     rally_end: str | None
     #: The robot (0 or 1) that scored, or on whose side the puck stayed too long.
     by: int | None
-    #: (2,) what the step added to each side's score: goals, and one point for every third foul of the other.
+    #: (2,) points that the step added to each side: goals, and one for every third foul of the opponent.
     points: npt.NDArray[np.int64]
-    #: (2,) whether each made the world diverge.
+    #: (2,) whether the robot's commands made the world diverge.
     diverged: npt.NDArray[np.bool_]
 
 
@@ -71,23 +71,23 @@ GameReward = Callable[[GameTransition], Any]
 
 
 def default_reward(transition: GameTransition) -> npt.NDArray[np.float64]:
-    """(2,): the points that a side gained less those of the other; -10 for who made the world diverge."""
+    """(2,): points gained minus the opponent's; minus 10 for a robot that made the world diverge."""
     gained = transition.points.astype(np.float64)
     return gained - gained[::-1] - 10.0 * transition.diverged
 
 
 class AirHockeyGame(ParallelEnv[str, Observation, Any]):  # type: ignore[misc]
-    """A game as the competition plays it, for agents ``robot_1`` and ``robot_2``.
+    """A game under the competition's rules, for agents ``robot_1`` and ``robot_2``.
 
-    Each sees the table from its own side, (23,) float32. A rally that ends is followed by the next one with the next
-    step; the game is cut off (``truncations``) after ``max_steps``. A robot whose commands make the world diverge is
-    out (``terminations``): it leaves ``agents``, its arm holds still, and the other plays on.
+    Each observes the table from its own side, (23,) float32. After the end of a rally the next step begins the next
+    one; the game is truncated after ``max_steps``. A robot whose commands make the world diverge is terminated: it
+    leaves ``agents``, its arm holds still, and the other robot continues.
 
     Args:
         max_steps: control steps of a game.
-        interpolation, action_mode: as of :class:`faceoff.gym.AirHockeyEnv`, for both or one for each.
-        clip_actions, profile, perturbations, mismatch_seed: as of :class:`faceoff.gym.AirHockeyEnv`.
-        reward: from a :class:`GameTransition` to two numbers, robot 1's first, instead of :func:`default_reward`.
+        interpolation, action_mode: as for :class:`faceoff.gym.AirHockeyEnv`; one value for both robots, or a pair.
+        clip_actions, profile, perturbations, mismatch_seed: as for :class:`faceoff.gym.AirHockeyEnv`.
+        reward: from a :class:`GameTransition` to two numbers, robot 1 first, instead of :func:`default_reward`.
         render_mode: ``rgb_array``, ``human`` or None.
     """
 
@@ -126,7 +126,7 @@ class AirHockeyGame(ParallelEnv[str, Observation, Any]):  # type: ignore[misc]
             "clip_actions": bool(clip_actions),
             "factors": factor_names(profile),
             "perturbations": perturbations_json(perturbations),
-            "mismatch_seed": season_seed(mismatch_seed),
+            "mismatch_seed": mismatch_seed_text(mismatch_seed),
         }
         try:
             self._game: _native.Game | None = _native.Game(json.dumps(setup, allow_nan=False))
@@ -151,11 +151,11 @@ class AirHockeyGame(ParallelEnv[str, Observation, Any]):  # type: ignore[misc]
         self._window: Any = None
 
     def observation_space(self, agent: str) -> gymnasium.spaces.Box:
-        """(23,), the same object each time."""
+        """(23,) float32; the same object on each call."""
         return self._observation_spaces[one_of("agent", agent, AGENTS)]
 
     def action_space(self, agent: str) -> gymnasium.spaces.Box:
-        """The same object each time."""
+        """(n,) float32 by the agent's interpolation; the same object on each call."""
         return self._action_spaces[one_of("agent", agent, AGENTS)]
 
     def _open(self) -> _native.Game:
@@ -166,7 +166,7 @@ class AirHockeyGame(ParallelEnv[str, Observation, Any]):  # type: ignore[misc]
     def reset(
         self, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[dict[str, Observation], dict[str, dict[str, Any]]]:
-        """Begins a game: the seed's own, and without a seed another one of the last seed. ``options`` are not used."""
+        """Begins the first game of ``seed``; without one, the next game of the last seed. ``options`` are ignored."""
         game = self._open()
         if seed is not None:
             self._seed, self._number = seed_number("seed", seed), 0
@@ -178,9 +178,9 @@ class AirHockeyGame(ParallelEnv[str, Observation, Any]):  # type: ignore[misc]
         self.agents = list(AGENTS)
         self._score = np.zeros(2, np.int64)
         self._steps = 0
-        self._show()
+        self._render_human()
         info = {"seed": self._seed, "game_number": self._number}
-        return self._told(self.agents), {agent: dict(info) for agent in self.agents}
+        return self._observations_of(self.agents), {agent: dict(info) for agent in self.agents}
 
     def step(
         self, actions: dict[str, Any]
@@ -191,10 +191,10 @@ class AirHockeyGame(ParallelEnv[str, Observation, Any]):  # type: ignore[misc]
         dict[str, bool],
         dict[str, dict[str, Any]],
     ]:
-        """One control step, 20 ms. ``actions`` has one for each of ``agents``.
+        """One control step, 20 ms. ``actions`` has an action for each of ``agents``.
 
-        Infos have ``constraints``, ``score``, ``goals`` and ``fouls`` (robot 1's first), and ``rally_end`` where a
-        rally has ended.
+        Infos have ``constraints``, ``score``, ``goals`` and ``fouls`` (robot 1 first), and ``rally_end`` if a rally
+        has ended.
         """
         game = self._open()
         if not self.agents:
@@ -207,26 +207,26 @@ class AirHockeyGame(ParallelEnv[str, Observation, Any]):  # type: ignore[misc]
         for agent in self.agents:
             if agent not in actions:
                 raise ArgumentError(f"actions: expected one for each of {', '.join(self.agents)}, got none for {agent}")
-        given = [
+        checked = [
             numbers(f"action of {agent}", actions[agent], self._action_spaces[agent].shape)  # type: ignore[arg-type]
             if agent in self.agents
             else None
             for agent in AGENTS
         ]
         before = self._observations.copy()
-        told = game.step(given, self._observations)
+        result = game.step(checked, self._observations)
         self._steps += 1
-        score = np.array(told["score"], np.int64)
+        score = np.array(result["score"], np.int64)
         transition = GameTransition(
             observations=before,
             next_observations=self._observations.copy(),
-            puck=np.array(told["puck"]),
-            robots=np.array(told["robots"]),
-            constraints=np.array(told["constraints"]),
-            rally_end=told["rally_end"],
-            by=told["by"],
+            puck=np.array(result["puck"]),
+            robots=np.array(result["robots"]),
+            constraints=np.array(result["constraints"]),
+            rally_end=result["rally_end"],
+            by=result["by"],
             points=score - self._score,
-            diverged=np.array(told["diverged"], np.bool_),
+            diverged=np.array(result["diverged"], np.bool_),
         )
         self._score = score
         rewards = np.asarray(self._reward(transition), np.float64)
@@ -236,27 +236,27 @@ class AirHockeyGame(ParallelEnv[str, Observation, Any]):  # type: ignore[misc]
         live = self.agents
         terminations = {agent: bool(transition.diverged[AGENTS.index(agent)]) for agent in live}
         truncations = {agent: is_over and not terminations[agent] for agent in live}
-        infos = {agent: self._info(transition, told, AGENTS.index(agent)) for agent in live}
+        infos = {agent: self._info(transition, result, AGENTS.index(agent)) for agent in live}
         self.agents = [agent for agent in live if not (terminations[agent] or truncations[agent])]
-        self._show()
+        self._render_human()
         return (
-            self._told(live),
+            self._observations_of(live),
             {agent: float(rewards[AGENTS.index(agent)]) for agent in live},
             terminations,
             truncations,
             infos,
         )
 
-    def _told(self, agents: Sequence[str]) -> dict[str, Observation]:
+    def _observations_of(self, agents: Sequence[str]) -> dict[str, Observation]:
         return {agent: self._observations[AGENTS.index(agent)].copy() for agent in agents}
 
     @staticmethod
-    def _info(transition: GameTransition, told: dict[str, Any], robot: int) -> dict[str, Any]:
+    def _info(transition: GameTransition, result: dict[str, Any], robot: int) -> dict[str, Any]:
         info: dict[str, Any] = {
             "constraints": transition.constraints[robot].copy(),
-            "score": tuple(told["score"]),
-            "goals": tuple(told["goals"]),
-            "fouls": tuple(told["fouls"]),
+            "score": tuple(result["score"]),
+            "goals": tuple(result["goals"]),
+            "fouls": tuple(result["fouls"]),
         }
         if transition.rally_end is not None:
             info["rally_end"] = transition.rally_end
@@ -264,7 +264,7 @@ class AirHockeyGame(ParallelEnv[str, Observation, Any]):  # type: ignore[misc]
         return info
 
     def render(self) -> npt.NDArray[np.uint8] | None:
-        """(360, 640, 3) uint8 of the table from above for ``rgb_array``; a window for ``human``."""
+        """A picture of the table from above, (360, 640, 3) uint8; None for ``human``, which shows a window."""
         if self.render_mode is None:
             raise ArgumentError(
                 "render: expected an environment made with render_mode='rgb_array' or 'human', got None"
@@ -284,12 +284,12 @@ class AirHockeyGame(ParallelEnv[str, Observation, Any]):  # type: ignore[misc]
         self._window.show(frame)
         return None
 
-    def _show(self) -> None:
+    def _render_human(self) -> None:
         if self.render_mode == "human":
             self.render()
 
     def close(self) -> None:
-        """Gives up the game and the window; may be called again."""
+        """Releases the game and the window; may be called more than once."""
         if self._game is not None:
             self._game.close()
             self._game = None
@@ -303,13 +303,13 @@ class SelfPlayEnv(gymnasium.Env[Any, Any]):
     """One side of a game, against an opponent drawn from a pool at each reset.
 
     Args:
-        opponents: functions from an observation, (23,) float32 of their own side, to an action. One with a method
-            ``reset()`` is told when a game begins.
-        side: ``robot_1``, ``robot_2``, or ``random`` for another one in each game.
-        max_steps: control steps of a game; the default is a minute.
-        others: as of :class:`AirHockeyGame`; with ``random`` sides both must have the same actions.
+        opponents: functions from an observation, (23,) float32 of their own side, to an action. A
+            method ``reset()``, if there is one, is called when a game begins.
+        side: ``robot_1``, ``robot_2``, or ``random`` to draw the side of each game.
+        max_steps: control steps of a game; the default is one minute.
+        others: as for :class:`AirHockeyGame`; with ``random`` sides both robots must have the same action space.
 
-    The pool may grow while one trains: ``env.unwrapped.opponents.append(policy)`` counts from the next reset.
+    The pool may grow during training: ``env.unwrapped.opponents.append(policy)`` takes effect at the next reset.
     """
 
     metadata: ClassVar[dict[str, Any]] = {  # type: ignore[misc]
@@ -353,29 +353,29 @@ class SelfPlayEnv(gymnasium.Env[Any, Any]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observation, dict[str, Any]]:
-        """Begins a game. ``options={"opponent": i}`` plays against that one; info tells ``opponent`` and ``side``."""
+        """Begins a game. ``options={"opponent": i}`` selects an opponent; info has ``opponent`` and ``side``."""
         if seed is not None:
             seed_number("seed", seed)
         super().reset(seed=seed)
         self._check_pool()
-        chosen = (options or {}).get("opponent")
-        if chosen is None:
-            chosen = int(self.np_random.integers(len(self.opponents)))
-        chosen = integer("options['opponent']", chosen, 0, len(self.opponents) - 1)
+        index = (options or {}).get("opponent")
+        if index is None:
+            index = int(self.np_random.integers(len(self.opponents)))
+        index = integer("options['opponent']", index, 0, len(self.opponents) - 1)
         if self._side == "random":
             self._own = AGENTS[int(self.np_random.integers(2))]
             self._other = _other(self._own)
         if seed is None and self.game._seed is None:
             seed = int(self.np_random.integers(2**63))
-        self._opponent = self.opponents[chosen]
-        restart = getattr(self._opponent, "reset", None)
-        if restart is not None:
-            restart()
+        self._opponent = self.opponents[index]
+        reset_opponent = getattr(self._opponent, "reset", None)
+        if reset_opponent is not None:
+            reset_opponent()
         self._observations, infos = self.game.reset(seed=seed)
-        return self._observations[self._own], infos[self._own] | {"opponent": chosen, "side": self._own}
+        return self._observations[self._own], infos[self._own] | {"opponent": index, "side": self._own}
 
     def step(self, action: Any) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
-        """One control step of both; rewards and infos are the own side's."""
+        """One control step of both robots; reward and info are those of the own side."""
         actions = {self._own: action}
         if self._other in self.game.agents:
             actions[self._other] = self._opponent(self._observations[self._other])
@@ -389,7 +389,7 @@ class SelfPlayEnv(gymnasium.Env[Any, Any]):
         return self.game.render()
 
     def close(self) -> None:
-        """Gives up the game; may be called again."""
+        """Releases the game; may be called more than once."""
         self.game.close()
 
 

@@ -1,14 +1,14 @@
 """The vector environment as Stable-Baselines3 expects it.
 
-Stable-Baselines3 has vector environments of its own kind, older than Gymnasium's. :func:`make_vec_env` makes one of
-ours::
+Stable-Baselines3 has its own interface for vector environments, older than Gymnasium's. :func:`make_vec_env` returns
+a Faceoff environment with that interface::
 
     from stable_baselines3 import PPO
     import faceoff.sb3
     envs = faceoff.sb3.make_vec_env("defend", 64, profile="evaluation", clip_actions=True)
     PPO("MlpPolicy", envs).learn(1_000_000)
 
-It is not imported before that: it needs torch.
+Stable-Baselines3 needs torch and is only imported by that call.
 """
 
 from __future__ import annotations
@@ -22,16 +22,16 @@ import numpy.typing as npt
 from faceoff.errors import ArgumentError, ArgumentTypeError, MissingError
 from faceoff.gym.vector import AirHockeyVectorEnv
 
-#: What a step returns there: observations, rewards, dones, and infos of each world.
+#: Result of a step in Stable-Baselines3: observations, rewards, dones, and the infos of each world.
 Step = tuple[npt.NDArray[np.float32], npt.NDArray[np.float32], npt.NDArray[np.bool_], list[dict[str, Any]]]
 
 
 class VecEnvMethods:
-    """What Stable-Baselines3's ``VecEnv`` asks for, apart from that class itself.
+    """The methods of Stable-Baselines3's ``VecEnv``, without that base class.
 
-    A world whose episode has ended begins the next one in the same step; its info then has ``terminal_observation``,
-    ``TimeLimit.truncated`` (cut off, rather than ended) and ``is_success``, as Stable-Baselines3 reads them, and all
-    that :class:`faceoff.gym.AirHockeyEnv` tells.
+    The step that ends an episode also begins the next one. Its info has ``terminal_observation``,
+    ``TimeLimit.truncated`` (truncated, not terminated) and ``is_success`` for Stable-Baselines3, and all keys of
+    :class:`faceoff.gym.AirHockeyEnv`.
     """
 
     envs: AirHockeyVectorEnv
@@ -47,17 +47,17 @@ class VecEnvMethods:
         self.envs = envs
         self.num_envs = envs.num_envs
         self.render_mode = envs.render_mode
-        # Stable-Baselines3's own constructor asks for attributes; without it these are all there is.
-        self._begin(envs)
+        # The constructor of Stable-Baselines3's class reads attributes, so they are set first.
+        self._init_spaces(envs)
         self.reset_infos = [{} for _ in range(self.num_envs)]
         self._seeds = [None] * self.num_envs
 
-    def _begin(self, envs: AirHockeyVectorEnv) -> None:
+    def _init_spaces(self, envs: AirHockeyVectorEnv) -> None:
         self.observation_space = envs.single_observation_space
         self.action_space = envs.single_action_space
 
     def seed(self, seed: int | None = None) -> list[int | None]:
-        """Seeds of the next reset: s, s + 1, …; drawn if left out."""
+        """Sets the seeds of the next reset: s, s + 1, …; s is random if left out."""
         if seed is None:
             seed = int(np.random.default_rng().integers(2**32))
         self._seeds = list(self.envs._read_seeds(seed))
@@ -72,14 +72,14 @@ class VecEnvMethods:
         return observations
 
     def step_async(self, actions: Any) -> None:
-        """Begins a step, which goes on in other threads."""
+        """Begins a step in other threads."""
         self.envs.send(actions)
 
     def step_wait(self) -> Step:
-        """Waits for it."""
-        observations, rewards, terminated, truncated, together = self.envs.recv()
+        """Waits for the step that :meth:`step_async` began."""
+        observations, rewards, terminated, truncated, batched = self.envs.recv()
         dones = terminated | truncated
-        infos = split_infos(together, self.num_envs)
+        infos = split_infos(batched, self.num_envs)
         for world in np.flatnonzero(dones):
             final = infos[world].pop("final_info")
             self.reset_infos[world] = {
@@ -93,25 +93,25 @@ class VecEnvMethods:
         return observations, rewards.astype(np.float32), dones, infos
 
     def close(self) -> None:
-        """Gives up worlds and threads."""
+        """Releases worlds and threads."""
         self.envs.close()
 
     def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
-        """An attribute of the vector environment, for each of the worlds."""
+        """An attribute of the vector environment, once per world."""
         return [getattr(self.envs, attr_name) for _ in self._indices(indices)]
 
     def has_attr(self, attr_name: str) -> bool:
-        """Whether the vector environment has it."""
+        """Whether the vector environment has the attribute."""
         return hasattr(self.envs, attr_name)
 
     def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
-        """Refused: worlds are made alike and stay so."""
+        """Refused: all worlds have the same fixed arguments."""
         raise ArgumentError(
             f"set_attr: expected no change to a world, got {attr_name!r}: make the environments with other arguments"
         )
 
     def env_method(self, method_name: str, *args: Any, indices: Any = None, **kwargs: Any) -> list[Any]:
-        """Refused but for ``render``: worlds have no methods of their own."""
+        """Only ``render`` is supported: worlds have no other methods of their own."""
         if method_name != "render":
             raise ArgumentError(
                 f"env_method: expected render, since worlds have no other method of their own, got {method_name!r}"
@@ -120,7 +120,7 @@ class VecEnvMethods:
         return [frames[index] for index in self._indices(indices)]
 
     def env_is_wrapped(self, wrapper_class: type, indices: Any = None) -> list[bool]:
-        """Worlds are never wrapped."""
+        """False for each world: worlds have no wrappers."""
         return [False for _ in self._indices(indices)]
 
     def get_images(self) -> Sequence[npt.NDArray[np.uint8] | None]:
@@ -133,31 +133,31 @@ class VecEnvMethods:
         return [indices] if isinstance(indices, int) else list(indices)
 
 
-def split_infos(together: dict[str, Any], count: int) -> list[dict[str, Any]]:
-    """From arrays with a mask each to a dictionary for each world."""
+def split_infos(batched: dict[str, Any], count: int) -> list[dict[str, Any]]:
+    """Converts arrays with masks into one dictionary per world."""
     infos: list[dict[str, Any]] = [{} for _ in range(count)]
-    for name, values in together.items():
+    for name, values in batched.items():
         if name.startswith("_"):
             continue
-        told = np.flatnonzero(together[f"_{name}"])
+        present = np.flatnonzero(batched[f"_{name}"])
         if isinstance(values, dict):
             inner = split_infos(values, count)
-            for world in told:
+            for world in present:
                 infos[world][name] = inner[world]
         else:
-            for world in told:
+            for world in present:
                 value = values[world]
                 infos[world][name] = value.item() if isinstance(value, np.generic) else value
     return infos
 
 
 def make_vec_env(task: str = "defend", n_envs: int = 1, *, seed: int | None = None, **others: Any) -> Any:
-    """A ``stable_baselines3.common.vec_env.VecEnv`` of so many worlds.
+    """A ``stable_baselines3.common.vec_env.VecEnv`` of ``n_envs`` worlds.
 
     Args:
-        task, others: as of :class:`faceoff.gym.AirHockeyVectorEnv`, but for ``autoreset_mode``.
+        task, others: as for :class:`faceoff.gym.AirHockeyVectorEnv`, without ``autoreset_mode``.
         n_envs: number of worlds.
-        seed: of the first reset: s, s + 1, …
+        seed: s for the seeds s, s + 1, … of the first reset.
 
     Raises:
         MissingError: if Stable-Baselines3 is not installed.
@@ -172,10 +172,10 @@ def make_vec_env(task: str = "defend", n_envs: int = 1, *, seed: int | None = No
     class FaceoffVecEnv(VecEnvMethods, VecEnv):  # type: ignore[misc]
         """Worlds of a task, for Stable-Baselines3."""
 
-        def _begin(self, envs: AirHockeyVectorEnv) -> None:
+        def _init_spaces(self, envs: AirHockeyVectorEnv) -> None:
             VecEnv.__init__(self, envs.num_envs, envs.single_observation_space, envs.single_action_space)
 
-    made = FaceoffVecEnv(AirHockeyVectorEnv(n_envs, task, autoreset_mode="SameStep", **others))  # type: ignore[arg-type]
+    env = FaceoffVecEnv(AirHockeyVectorEnv(n_envs, task, autoreset_mode="SameStep", **others))  # type: ignore[arg-type]
     if seed is not None:
-        made.seed(seed)
-    return made
+        env.seed(seed)
+    return env

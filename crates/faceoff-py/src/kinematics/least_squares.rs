@@ -1,47 +1,47 @@
-//! The inverse from a start: damped least squares, each joint weighted by its velocity limit.
+//! Inverse kinematics from a start pose: damped least squares, each joint weighted by its velocity limit.
 
 use super::{
-    numbers::{Arm, DAMPING, GOAL_M, ITERATIONS, LOWEST_M, STEP_LIMIT_RAD},
-    pose::{at, jacobian},
+    constants::{Arm, DAMPING, GOAL_M, ITERATIONS, LOWEST_M, STEP_LIMIT_RAD},
+    pose::{kinematics_at, jacobian},
 };
 use faceoff_sim::{JOINTS, dynamics::spatial::Vec3};
 use std::array::from_fn;
 
-/// Joint positions, rad, near `start` that put the end effector at a point, m; the last iterate where none are found.
-pub fn near(arm: &Arm, point: Vec3<f64>, start: &[f64; JOINTS]) -> [f64; JOINTS] {
+/// Joint positions, rad, near `start` that put the end effector at a point, m; the last iterate if there is no solution.
+pub fn solve_near(arm: &Arm, point: Vec3<f64>, start: &[f64; JOINTS]) -> [f64; JOINTS] {
     let within = |joint: usize, angle: f64| {
         let bound = arm.bound_rad[joint];
         angle.clamp(-bound, bound)
     };
     let mut q = from_fn(|joint| within(joint, start[joint]));
     for _ in 0..ITERATIONS {
-        let kinematics = at(&q);
+        let kinematics = kinematics_at(&q);
         let wrist = kinematics.links[JOINTS - 1].origin;
         let error = point - kinematics.end_effector.origin;
         let deficit = LOWEST_M - wrist.z;
         if error.dot(error).sqrt() < GOAL_M && deficit <= 0.0 {
             break;
         }
-        let task = Task {
+        let linearisation = Linearisation {
             columns: jacobian(&kinematics),
             rise: from_fn(|joint| kinematics.axes[joint].at(wrist).z),
             error,
             deficit,
         };
-        let mut step = task.step(&arm.weight);
+        let mut step = linearisation.step(&arm.weight);
         let is_stuck: [bool; JOINTS] = from_fn(|joint| {
             let (angle, bound) = (q[joint], arm.bound_rad[joint]);
             (angle + step[joint]).abs() > bound && angle.abs() >= bound && angle * step[joint] > 0.0
         });
         if is_stuck.contains(&true) {
-            let left = from_fn(|joint| {
+            let usable = from_fn(|joint| {
                 if is_stuck[joint] {
                     0.0
                 } else {
                     arm.weight[joint]
                 }
             });
-            step = task.step(&left);
+            step = linearisation.step(&usable);
         }
         let length = inner(&step, &step).sqrt();
         let share = (STEP_LIMIT_RAD / length.max(1e-300)).min(1.0);
@@ -50,42 +50,43 @@ pub fn near(arm: &Arm, point: Vec3<f64>, start: &[f64; JOINTS]) -> [f64; JOINTS]
     q
 }
 
-/// What a step is to do, at one pose.
-struct Task {
-    /// How the end effector moves with each joint, m/rad.
+/// The problem of one step, linearised at a pose.
+struct Linearisation {
+    /// Derivative of the end effector's position by each joint, m/rad.
     columns: [Vec3<f64>; JOINTS],
-    /// How the wrist's height changes with each joint, m/rad.
+    /// Derivative of the wrist's height by each joint, m/rad.
     rise: [f64; JOINTS],
-    /// From the end effector to where it shall be, m.
+    /// From the end effector to its target, m.
     error: Vec3<f64>,
-    /// How much too low the wrist is, m.
+    /// How far the wrist is below its minimum height, m.
     deficit: f64,
 }
 
-impl Task {
-    /// Towards the target, rad; where the wrist is too low, it also rises, the end effector staying.
+impl Linearisation {
+    /// Step towards the target, rad. A low wrist is raised without moving the end effector.
     fn step(&self, weight: &[f64; JOINTS]) -> [f64; JOINTS] {
-        let step = weighted(&self.columns, self.error, weight);
+        let step = least_change(&self.columns, self.error, weight);
         if self.deficit <= 0.0 {
             return step;
         }
-        let wish: [f64; JOINTS] = from_fn(|joint| weight[joint] * self.rise[joint]);
+        let desired: [f64; JOINTS] = from_fn(|joint| weight[joint] * self.rise[joint]);
         let moved = self
             .columns
             .iter()
-            .zip(wish)
-            .fold(Vec3::zero(), |sum, (column, wish)| sum + column.scale(wish));
-        let held = weighted(&self.columns, moved, weight);
-        let free: [f64; JOINTS] = from_fn(|joint| wish[joint] - held[joint]);
+            .zip(desired)
+            .fold(Vec3::zero(), |sum, (column, desired)| sum + column.scale(desired));
+        let held = least_change(&self.columns, moved, weight);
+        let free: [f64; JOINTS] = from_fn(|joint| desired[joint] - held[joint]);
         let share = self.deficit / inner(&self.rise, &free).max(1e-3);
         from_fn(|joint| step[joint] + share * free[joint])
     }
 }
 
-/// The least joint changes that move the end effector by a wish: W Jᵀ (J W Jᵀ + λ I)⁻¹ wish, where the columns are J's.
-pub fn weighted(
+/// The smallest weighted joint change that moves the end effector by `desired`, d: W Jᵀ (J W Jᵀ + λ I)⁻¹ d, where the
+/// columns are those of J.
+pub fn least_change(
     columns: &[Vec3<f64>; JOINTS],
-    wish: Vec3<f64>,
+    desired: Vec3<f64>,
     weight: &[f64; JOINTS],
 ) -> [f64; JOINTS] {
     let mut a = Vec3::new(DAMPING, 0.0, 0.0);
@@ -98,7 +99,7 @@ pub fn weighted(
     }
     // The inverse of a symmetric matrix by its rows' vector products.
     let (bc, ca, ab) = (b.cross(c), c.cross(a), a.cross(b));
-    let force = (bc.scale(wish.x) + ca.scale(wish.y) + ab.scale(wish.z)).scale(1.0 / a.dot(bc));
+    let force = (bc.scale(desired.x) + ca.scale(desired.y) + ab.scale(desired.z)).scale(1.0 / a.dot(bc));
     from_fn(|joint| weight[joint] * columns[joint].dot(force))
 }
 

@@ -1,4 +1,4 @@
-//! Where a pose puts the arm, and how the end effector moves with it, as the simulator has it.
+//! Forward kinematics and Jacobian of the simulator.
 
 use faceoff_sim::{
     JOINTS,
@@ -7,14 +7,14 @@ use faceoff_sim::{
 };
 use std::array::from_fn;
 
-/// Where everything is at a pose, rad; the universal joint, which none of this depends on, at zero. Inlined, what a caller
-/// does not use is not computed, which is a third of the time of `arm_forward`.
+/// The kinematics at a pose, rad, with the universal joint at zero. Inlining lets the compiler drop unused results, a
+/// third of the time of `arm_forward`.
 #[inline(always)]
-pub fn at(q: &[f64; JOINTS]) -> Kinematics<f64> {
+pub fn kinematics_at(q: &[f64; JOINTS]) -> Kinematics<f64> {
     Kinematics::new(&full(q))
 }
 
-/// How the end effector moves with each joint, m/rad.
+/// Derivative of the end effector's position by each joint, m/rad.
 pub fn jacobian(kinematics: &Kinematics<f64>) -> [Vec3<f64>; JOINTS] {
     from_fn(|joint| kinematics.axes[joint].at(kinematics.end_effector.origin))
 }

@@ -1,12 +1,12 @@
-//! The inverse in closed form: one posture for each point, in a vertical plane, elbow up.
+//! Inverse kinematics in closed form: one posture per point, in a vertical plane, elbow up.
 
-use super::numbers::{
+use super::constants::{
     Arm, FOREARM_M, HAND_M, HAND_PER_REACH_RAD_M, SHOULDER_M, START_HAND_RAD, UPPER_ARM_M,
 };
 use faceoff_sim::JOINTS;
 use std::f64::consts::PI;
 
-/// Joint positions, rad, that put the end effector at a point, m, or as near as the posture gets.
+/// Joint positions, rad, that put the end effector at a point, m, or the nearest posture.
 pub fn posture(arm: &Arm, [x, y, z]: [f64; 3]) -> [f64; JOINTS] {
     let reach = libm::hypot(x, y);
     let hand = START_HAND_RAD - HAND_PER_REACH_RAD_M * (reach - arm.start_reach_m);
@@ -15,8 +15,8 @@ pub fn posture(arm: &Arm, [x, y, z]: [f64; 3]) -> [f64; JOINTS] {
     let above = z - HAND_M * cos_hand - SHOULDER_M;
     // Shoulder, elbow and wrist are a triangle of known sides.
     let side = libm::hypot(ahead, above);
-    let elbow = corner(side, UPPER_ARM_M, FOREARM_M);
-    let upper = libm::atan2(ahead, above) - corner(FOREARM_M, UPPER_ARM_M, side.max(1e-9));
+    let elbow = triangle_angle(side, UPPER_ARM_M, FOREARM_M);
+    let upper = libm::atan2(ahead, above) - triangle_angle(FOREARM_M, UPPER_ARM_M, side.max(1e-9));
     let forearm = upper + PI - elbow;
     [
         libm::atan2(y, x),
@@ -29,10 +29,10 @@ pub fn posture(arm: &Arm, [x, y, z]: [f64; 3]) -> [f64; JOINTS] {
     ]
 }
 
-/// Joint velocities, rad/s, that keep the posture on a point, m, that moves, m/s.
-pub fn rates(arm: &Arm, point: [f64; 3], [vx, vy, vz]: [f64; 3]) -> [f64; JOINTS] {
+/// Joint velocities, rad/s, that keep the posture on a moving point (m, m/s).
+pub fn velocities(arm: &Arm, point: [f64; 3], [vx, vy, vz]: [f64; 3]) -> [f64; JOINTS] {
     let [x, y, _] = point;
-    // On joint 1's axis there is no outwards.
+    // On joint 1's axis the outward direction is undefined.
     let reach = libm::hypot(x, y).max(1e-6);
     let outwards = (x * vx + y * vy) / reach;
     let [_, upper, _, elbow, _, wrist, _] = posture(arm, point);
@@ -42,7 +42,7 @@ pub fn rates(arm: &Arm, point: [f64; 3], [vx, vy, vz]: [f64; 3]) -> [f64; JOINTS
     let (sin_hand, cos_hand) = libm::sincos(hand);
     let ahead_rate = outwards - HAND_M * cos_hand * hand_rate;
     let above_rate = vz + HAND_M * sin_hand * hand_rate;
-    // Stretched out there is no speed that would do; a large one says so.
+    // A stretched arm cannot move outwards; the result is a large joint velocity.
     let span = libm::sin(upper - forearm);
     let span = span.abs().max(1e-6).copysign(span);
     let (sin_forearm, cos_forearm) = libm::sincos(forearm);
@@ -60,8 +60,8 @@ pub fn rates(arm: &Arm, point: [f64; 3], [vx, vy, vz]: [f64; 3]) -> [f64; JOINTS
     ]
 }
 
-/// The angle of a triangle between sides a and b, as far as there is such a triangle.
-fn corner(opposite: f64, a: f64, b: f64) -> f64 {
+/// The angle between the sides a and b of a triangle; 0 or π if there is no such triangle.
+fn triangle_angle(opposite: f64, a: f64, b: f64) -> f64 {
     let cosine = (a * a + b * b - opposite * opposite) / (2.0 * a * b);
     libm::acos(cosine.clamp(-1.0, 1.0))
 }

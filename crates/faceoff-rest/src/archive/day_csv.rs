@@ -1,14 +1,14 @@
-//! The evaluations of a day, for spreadsheets.
+//! The evaluations of a day as CSV.
 
 use faceoff_api::views::{
     evaluation::{EvaluationStatus, EvaluationView},
     task::TaskView,
 };
-use faceoff_service::csv::{Table, or_empty, words};
+use faceoff_service::csv::{Table, escape_formula, or_empty};
 use faceoff_types::Task;
 use std::collections::BTreeMap;
 
-const OF_TASK: [&str; 7] = [
+const TASK_COLUMNS: [&str; 7] = [
     "episodes",
     "successes",
     "success_rate",
@@ -18,20 +18,20 @@ const OF_TASK: [&str; 7] = [
     "tier",
 ];
 
-/// The columns of all tasks, whether a row has them or not.
+/// These columns, followed by those of all tasks.
 fn with_tasks(columns: &[&str]) -> Vec<String> {
     let mut all: Vec<String> = columns.iter().map(|column| (*column).to_owned()).collect();
     for task in Task::ALL {
-        all.extend(OF_TASK.map(|column| format!("{task}_{column}")));
+        all.extend(TASK_COLUMNS.map(|column| format!("{task}_{column}")));
     }
     all
 }
 
-fn of_tasks(tasks: Option<&BTreeMap<Task, TaskView>>) -> impl Iterator<Item = String> + '_ {
+fn task_fields(tasks: Option<&BTreeMap<Task, TaskView>>) -> impl Iterator<Item = String> + '_ {
     Task::ALL
         .into_iter()
         .flat_map(move |task| match tasks.and_then(|tasks| tasks.get(&task)) {
-            None => vec![String::new(); OF_TASK.len()],
+            None => vec![String::new(); TASK_COLUMNS.len()],
             Some(result) => vec![
                 result.episodes.to_string(),
                 result.successes.to_string(),
@@ -44,8 +44,8 @@ fn of_tasks(tasks: Option<&BTreeMap<Task, TaskView>>) -> impl Iterator<Item = St
         })
 }
 
-/// A day, evaluation by evaluation.
-pub(super) fn day(evaluations: &[EvaluationView]) -> Vec<u8> {
+/// A table with one line per evaluation.
+pub(super) fn day_table(evaluations: &[EvaluationView]) -> Vec<u8> {
     let columns = with_tasks(&[
         "evaluation",
         "team",
@@ -86,16 +86,16 @@ pub(super) fn day(evaluations: &[EvaluationView]) -> Vec<u8> {
         };
         let fields = [
             evaluation.id.to_string(),
-            words(evaluation.team_name.as_str()),
+            escape_formula(evaluation.team_name.as_str()),
             evaluation.team.to_string(),
             state.to_owned(),
-            words(
+            escape_formula(
                 evaluation
                     .voided
                     .as_ref()
                     .map_or("", |ruling| ruling.reason.as_str()),
             ),
-            words(evaluation.extra_turn.as_deref().unwrap_or_default()),
+            escape_formula(evaluation.extra_turn.as_deref().unwrap_or_default()),
             or_empty(finished_at),
             or_empty(result.map(|result| result.score)),
             or_empty(result.map(|result| result.penalty_points)),
@@ -105,7 +105,7 @@ pub(super) fn day(evaluations: &[EvaluationView]) -> Vec<u8> {
         table.row(
             fields
                 .into_iter()
-                .chain(of_tasks(result.map(|result| &result.tasks))),
+                .chain(task_fields(result.map(|result| &result.tasks))),
         );
     }
     table.into_bytes()

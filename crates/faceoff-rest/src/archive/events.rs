@@ -1,39 +1,39 @@
-//! The log of an archive.
+//! The event log of an archive.
 
 use super::files::Files;
 use faceoff_service::{
     app::AppState,
     problem::Problem,
-    room,
-    views::event::{self, names},
+    free_space,
+    views::event::{self, actor_names},
 };
 use tokio::io::{AsyncWriteExt, BufWriter};
 
-const AT_ONCE: u32 = 1000;
+const PAGE_EVENTS: u32 = 1000;
 
-/// All events of the snapshot, one per line, the oldest first: a page of them at a time is in memory.
+/// Writes all events of the snapshot, one per line, oldest first. Only one page of them is in memory at a time.
 pub(super) async fn put(app: &AppState, files: &mut Files) -> Result<(), Problem> {
-    let place = files.fresh();
-    let file = tokio::fs::File::create(&place)
+    let path = files.new_path();
+    let file = tokio::fs::File::create(&path)
         .await
-        .map_err(room::unwritten)?;
+        .map_err(free_space::write_problem)?;
     let mut writer = BufWriter::new(file);
-    let names = names(app).await?;
+    let names = actor_names(app).await?;
     let mut after = 0;
     loop {
-        let events = app.store.events_after(after, AT_ONCE).await?;
+        let events = app.store.events_after(after, PAGE_EVENTS).await?;
         let Some(last) = events.last() else {
             break;
         };
         after = last.id;
         for event in events {
-            let mut view = event::of(event);
+            let mut view = event::view(event);
             view.actor_name = names.get(&view.actor).cloned();
             let mut line = serde_json::to_vec(&view).map_err(Problem::internal)?;
             line.push(b'\n');
-            writer.write_all(&line).await.map_err(room::unwritten)?;
+            writer.write_all(&line).await.map_err(free_space::write_problem)?;
         }
     }
-    writer.flush().await.map_err(room::unwritten)?;
-    files.add("events.jsonl", place).await
+    writer.flush().await.map_err(free_space::write_problem)?;
+    files.add("events.jsonl", path).await
 }

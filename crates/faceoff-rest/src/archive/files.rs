@@ -1,41 +1,41 @@
-//! The files of an archive as they are gathered.
+//! The files of an archive while it is prepared.
 
 use faceoff_archive::Entry;
-use faceoff_service::{problem::Problem, room};
+use faceoff_service::{problem::Problem, free_space};
 use serde::Serialize;
 use std::{
     fs::File,
     path::{Path, PathBuf},
 };
 
-/// Entries and where their content lies.
+/// Entries of the manifest, and the paths of their contents.
 pub(super) struct Files {
     folder: PathBuf,
     entries: Vec<Entry>,
-    places: Vec<PathBuf>,
+    paths: Vec<PathBuf>,
 }
 
 impl Files {
-    /// None yet; what is made lies in `folder`.
+    /// An empty list; new files are created in `folder`.
     pub(super) fn new(folder: &Path) -> Self {
         Self {
             folder: folder.to_owned(),
             entries: Vec::new(),
-            places: Vec::new(),
+            paths: Vec::new(),
         }
     }
 
     pub(super) async fn put(&mut self, path: &str, content: Vec<u8>) -> Result<(), Problem> {
-        let place = self.fresh();
+        let source = self.new_path();
         let (bytes, blake3) = (content.len() as u64, blake3::hash(&content).to_string());
-        tokio::fs::write(&place, content)
+        tokio::fs::write(&source, content)
             .await
-            .map_err(room::unwritten)?;
-        self.add_known(path, place, bytes, blake3);
+            .map_err(free_space::write_problem)?;
+        self.add_hashed(path, source, bytes, blake3);
         Ok(())
     }
 
-    /// Makes a file of JSON, as the API would send it.
+    /// Adds a JSON file with a response of the API.
     pub(super) async fn put_json(
         &mut self,
         path: &str,
@@ -45,38 +45,38 @@ impl Files {
         self.put(path, json).await
     }
 
-    /// Where another file can be made.
-    pub(super) fn fresh(&self) -> PathBuf {
+    /// A path for a new file.
+    pub(super) fn new_path(&self) -> PathBuf {
         self.folder.join(format!("file-{}", self.entries.len()))
     }
 
-    /// A file that lies somewhere: it is read for its hash.
-    pub(super) async fn add(&mut self, path: &str, place: PathBuf) -> Result<(), Problem> {
-        let (bytes, blake3) = hash(place.clone()).await?;
-        self.add_known(path, place, bytes, blake3);
+    /// Adds an existing file, which is read for its hash.
+    pub(super) async fn add(&mut self, path: &str, source: PathBuf) -> Result<(), Problem> {
+        let (bytes, blake3) = hash(source.clone()).await?;
+        self.add_hashed(path, source, bytes, blake3);
         Ok(())
     }
 
-    /// A file that lies somewhere, with its hash.
-    pub(super) fn add_known(&mut self, path: &str, place: PathBuf, bytes: u64, blake3: String) {
+    /// Adds an existing file with its known hash.
+    pub(super) fn add_hashed(&mut self, path: &str, source: PathBuf, bytes: u64, blake3: String) {
         self.entries.push(Entry {
             path: path.to_owned(),
             bytes,
             blake3,
         });
-        self.places.push(place);
+        self.paths.push(source);
     }
 
     pub(super) fn into_parts(self) -> (Vec<Entry>, Vec<PathBuf>) {
-        (self.entries, self.places)
+        (self.entries, self.paths)
     }
 }
 
 /// Length and hash of a file.
-pub(super) async fn hash(place: PathBuf) -> Result<(u64, String), Problem> {
+pub(super) async fn hash(path: PathBuf) -> Result<(u64, String), Problem> {
     let read = move || {
         let mut hasher = blake3::Hasher::new();
-        hasher.update_reader(File::open(place)?)?;
+        hasher.update_reader(File::open(path)?)?;
         Ok::<_, std::io::Error>((hasher.count(), hasher.finalize().to_string()))
     };
     tokio::task::spawn_blocking(read)

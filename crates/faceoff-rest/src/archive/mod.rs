@@ -1,5 +1,5 @@
-//! The archive of a season, made while the server goes on: a snapshot of the database without what the edition does not
-//! hold, what API and pages show of it as files, and the artifacts, which are read when their turn comes.
+//! The season archive, made while the server is running: a snapshot of the database, reduced to what the edition
+//! contains; the responses of the API as files; and the artifacts, which are read while the archive is sent.
 
 use faceoff_archive::{Edition, FORMAT, Manifest};
 use faceoff_scoring::EpisodeSummary;
@@ -7,14 +7,14 @@ use faceoff_service::{
     app::{App, AppState},
     config::HttpConfig,
     problem::{Problem, ProblemKind},
-    room,
+    free_space,
     viewer::Viewer,
 };
-use faceoff_store::{KeptOf, Snapshot};
+use faceoff_store::{ArtifactOwner, Snapshot};
 use faceoff_types::Clock;
 use files::Files;
 use jiff::Timestamp;
-use results::Recorded;
+use results::ArtifactRow;
 pub(crate) use send::send;
 use std::{path::PathBuf, sync::Arc};
 use tempfile::TempDir;
@@ -25,61 +25,61 @@ mod files;
 mod results;
 mod send;
 
-/// Who made it, as manifests tell.
+/// Program and version in the manifest.
 const PROGRAM: &str = concat!("faceoff ", env!("CARGO_PKG_VERSION"));
 
-/// The database's file in an archive.
+/// File name of the database in an archive.
 const DATABASE: &str = "database.sqlite3";
 
-/// An archive that only has to be written.
+/// A prepared archive that only has to be written.
 pub(crate) struct Prepared {
     pub(crate) manifest: Manifest,
-    /// Of each file of the manifest, in its order, where it lies now.
-    places: Vec<PathBuf>,
-    /// Of those that are not artifacts; removed with it, and after a kill with all uploads at the next start.
+    /// Current path of each file in the manifest, in its order.
+    paths: Vec<PathBuf>,
+    /// Folder of the files that are not artifacts. Removed on drop; after a crash, at the next start with all uploads.
     _folder: TempDir,
 }
 
 impl Prepared {
-    /// What a download is called.
+    /// File name of the download.
     pub(crate) fn file_name(&self) -> String {
         format!(
             "{}-{}-{}.tar.zst",
-            results::plain(&self.manifest.season),
+            results::slug(&self.manifest.season),
             self.manifest.edition,
             self.manifest.made_at.strftime("%Y-%m-%d")
         )
     }
 }
 
-/// As the store calls it.
-pub(crate) const fn of_store(edition: Edition) -> faceoff_store::Edition {
+/// The edition in the store's type.
+pub(crate) const fn store_edition(edition: Edition) -> faceoff_store::Edition {
     match edition {
         Edition::Public => faceoff_store::Edition::Public,
         Edition::Organiser => faceoff_store::Edition::Organiser,
     }
 }
 
-/// Gathers what an archive holds, and the hashes of all of it.
+/// Collects the contents of an archive and their hashes.
 ///
 /// # Errors
-/// `StorageFull`; `Conflict` where a public archive is to become an organiser's.
+/// `StorageFull`; `Conflict` if an organiser's archive is requested from a public one.
 pub(crate) async fn prepare(app: &App, edition: Edition) -> Result<Prepared, Problem> {
-    room::check(app)?;
+    free_space::check(app)?;
     let folder = tempfile::Builder::new()
         .prefix("archive-")
         .tempdir_in(&app.config.upload_dir)
-        .map_err(room::unwritten)?;
+        .map_err(free_space::write_problem)?;
     let now = app.config.clock.now();
     if edition == Edition::Public {
-        sum_up(app).await?;
+        store_summaries(app).await?;
     }
     let snapshot = app
         .store
-        .snapshot(folder.path(), of_store(edition), PROGRAM, now)
+        .snapshot(folder.path(), store_edition(edition), PROGRAM, now)
         .await?;
-    let Some(archived) = snapshot.store().archived().cloned() else {
-        return Err(Problem::internal("a snapshot does not say what it is"));
+    let Some(archived) = snapshot.store().archived_season().cloned() else {
+        return Err(Problem::internal("a snapshot has no archive metadata"));
     };
     let mut files = Files::new(folder.path());
     let season = snapshot.store().season().await?.name;
@@ -90,39 +90,39 @@ pub(crate) async fn prepare(app: &App, edition: Edition) -> Result<Prepared, Pro
         )
         .await?;
 
-    let of = still(app, &snapshot, archived.made_at);
+    let frozen = snapshot_app(app, &snapshot, archived.made_at);
     let viewer = match edition {
-        Edition::Public => Viewer::Anybody,
+        Edition::Public => Viewer::Visitor,
         Edition::Organiser => Viewer::Organiser,
     };
-    let mut recorded = results::gather(&of, viewer, &mut files).await?;
-    results::put_questions(&of, edition, &mut files).await?;
-    events::put(&of, &mut files).await?;
-    drop(of);
+    let mut artifacts = results::collect(&frozen, viewer, &mut files).await?;
+    results::put_questions(&frozen, edition, &mut files).await?;
+    events::put(&frozen, &mut files).await?;
+    drop(frozen);
 
     let mut left_out = Vec::new();
     if snapshot.under_way > 0 {
         left_out.push(format!(
-            "{} evaluations that were queued or running, and all else of what they belong to: of a day that was not \
-             released, or of a proposal",
+            "{} evaluations that were queued or running, with everything else of their unreleased days and of their \
+             proposals",
             snapshot.under_way
         ));
     }
     if edition == Edition::Organiser {
-        for kept in snapshot.kept_artifacts().await? {
-            recorded.push(match kept.of {
-                KeptOf::Bundle(id) => Recorded::beside("submission", id, kept.key, kept.blake3),
-                KeptOf::Draft(id) => Recorded::beside("proposal", id, kept.key, kept.blake3),
-                KeptOf::Game(id) => Recorded::beside("game", id, kept.key, kept.blake3),
+        for artifact in snapshot.artifacts_to_archive().await? {
+            artifacts.push(match artifact.owner {
+                ArtifactOwner::Bundle(id) => ArtifactRow::without_team("submission", id, artifact.key, artifact.blake3),
+                ArtifactOwner::ProposedEvaluation(id) => ArtifactRow::without_team("proposal", id, artifact.key, artifact.blake3),
+                ArtifactOwner::Game(id) => ArtifactRow::without_team("game", id, artifact.key, artifact.blake3),
             });
         }
     }
     let database = folder.path().join(DATABASE);
     snapshot.finish(&database).await?;
     files.add(DATABASE, database).await?;
-    results::add_artifacts(app, recorded, &mut files, &mut left_out).await?;
+    results::add_artifacts(app, artifacts, &mut files, &mut left_out).await?;
 
-    let (entries, places) = files.into_parts();
+    let (entries, paths) = files.into_parts();
     let manifest = Manifest {
         format: FORMAT,
         program: PROGRAM.to_owned(),
@@ -132,25 +132,25 @@ pub(crate) async fn prepare(app: &App, edition: Edition) -> Result<Prepared, Pro
         left_out,
         files: entries,
     };
-    // Before the answer has begun: afterwards it could only break off.
+    // Checked before the response begins, which could only break off afterwards.
     manifest.check().map_err(Problem::internal)?;
     Ok(Prepared {
         manifest,
-        places,
+        paths,
         _folder: folder,
     })
 }
 
-/// Keeps what the episodes of all results come to: the public edition has nothing else of them.
-async fn sum_up(app: &App) -> Result<(), Problem> {
-    for run in app.store.unsummed_runs(EpisodeSummary::VERSION).await? {
-        app.summaries.of_run(run).await?;
+/// Stores the episode summaries of all results: the public edition contains no other data about episodes.
+async fn store_summaries(app: &App) -> Result<(), Problem> {
+    for run in app.store.unsummarised_runs(EpisodeSummary::VERSION).await? {
+        app.summaries.load_run(run).await?;
     }
     Ok(())
 }
 
-/// A site that shows the snapshot at its moment, as a server that takes the archive in will.
-fn still(app: &App, snapshot: &Snapshot, made_at: Timestamp) -> App {
+/// An application state that shows the snapshot at its time, as a server with the imported archive does.
+fn snapshot_app(app: &App, snapshot: &Snapshot, made_at: Timestamp) -> App {
     let config = HttpConfig {
         clock: Clock::new(move || made_at),
         ..app.config.clone()
@@ -159,20 +159,21 @@ fn still(app: &App, snapshot: &Snapshot, made_at: Timestamp) -> App {
 }
 
 fn readme(season: &str, edition: Edition, made_at: Timestamp) -> String {
-    let whose = match edition {
-        Edition::Public => "what everybody may know and have of it",
+    let contents = match edition {
+        Edition::Public => "the public edition, with everything that visitors can see and download",
         Edition::Organiser => {
-            "the organiser's: all of it but keys, passwords and what was under way. Keep it as secret as the server"
+            "the organiser's edition: everything except tokens, passwords and unfinished evaluations. Keep it as secret as \
+             the server"
         }
     };
     format!(
-        "The archive of the season {season:?} as it was at {}; {whose}.\n\
+        "Archive of the season {season:?} as of {}; {contents}.\n\
          \n\
          manifest.json          every file with its length and its BLAKE3 hash\n\
          results/               stages, boards and days as JSON and CSV, tournaments, teams, announcements, questions\n\
-         events.jsonl           what happened, in its order\n\
-         datasets.csv           whose the recordings are, and which of them are public\n\
-         artifacts/datasets/    the recordings; `faceoff verify FILE` plays them again\n\
+         events.jsonl           the event log, oldest first\n\
+         datasets.csv           team and visibility of each recording\n\
+         artifacts/datasets/    the recordings; `faceoff verify FILE` replays them\n\
          database.sqlite3       for `faceoff import`, which shows the season on another server\n\
          \n\
          docs/archive.md of Faceoff describes the format.\n",
@@ -180,11 +181,11 @@ fn readme(season: &str, edition: Edition, made_at: Timestamp) -> String {
     )
 }
 
-/// Refuses a second archive while one is made or sent.
-pub(crate) fn one_at_a_time() -> Problem {
+/// The problem of a second archive while one is made or sent.
+pub(crate) fn archive_busy() -> Problem {
     Problem::new(
         ProblemKind::Busy,
-        "an archive is being made or downloaded, and there is one at a time: try again when that is over",
+        "an archive is being made or downloaded, and only one can be at a time; try again in a minute",
     )
     .retry_after(60)
 }

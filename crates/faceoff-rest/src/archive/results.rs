@@ -1,4 +1,4 @@
-//! What an archive tells in files that need no program: stages, boards, days, tournaments, teams, words to everybody.
+//! The results of a season as JSON and CSV: stages, boards, days, tournaments, teams and announcements.
 
 use super::{
     day_csv,
@@ -16,18 +16,18 @@ use faceoff_service::{
     problem::Problem,
     viewer::Viewer,
     views::{
-        announcement, board, evaluation, game, season, sight::Sight, stage, team, tournament,
-        tournament_sheet::TournamentSheet,
+        announcement, board, evaluation, game, season, visibility::Visibility, stage, team, tournament,
+        tournament_state::TournamentState,
     },
 };
 use faceoff_store::{Artifacts, EvaluationState, Stage};
 use faceoff_types::StageDay;
 use std::collections::BTreeMap;
 
-/// An artifact that goes into an archive.
-pub(super) struct Recorded {
+/// An artifact of the archive, and its line in `datasets.csv`.
+pub(super) struct ArtifactRow {
     key: String,
-    /// Unknown of datasets of older versions.
+    /// `None` for datasets of older versions.
     blake3: Option<String>,
     kind: &'static str,
     id: String,
@@ -37,9 +37,9 @@ pub(super) struct Recorded {
     public: bool,
 }
 
-impl Recorded {
-    /// What is no dataset of an evaluation.
-    pub(super) fn beside(
+impl ArtifactRow {
+    /// An artifact other than the dataset of an evaluation.
+    pub(super) fn without_team(
         kind: &'static str,
         id: impl ToString,
         key: String,
@@ -58,8 +58,8 @@ impl Recorded {
     }
 }
 
-/// A name as a part of a path.
-pub(super) fn plain(name: &str) -> String {
+/// A name as part of a path.
+pub(super) fn slug(name: &str) -> String {
     let chars = name.chars().map(|c| match c {
         c if c.is_ascii_alphanumeric() => c.to_ascii_lowercase(),
         _ => '-',
@@ -71,54 +71,54 @@ pub(super) fn plain(name: &str) -> String {
     }
 }
 
-/// Makes the files of `results/`; the datasets that the viewer gets.
-pub(super) async fn gather(
+/// Creates the files of `results/`; returns the datasets that the viewer may download.
+pub(super) async fn collect(
     app: &App,
     viewer: Viewer,
     files: &mut Files,
-) -> Result<Vec<Recorded>, Problem> {
-    let sight = Sight::of(app, viewer).await?;
+) -> Result<Vec<ArtifactRow>, Problem> {
+    let visibility = Visibility::load(app, viewer).await?;
     files
-        .put_json("results/season.json", &season::now(app, viewer).await?)
+        .put_json("results/season.json", &season::build(app, viewer).await?)
         .await?;
     files
         .put_json("results/teams.json", &team::all(app).await?)
         .await?;
-    let announced = app.store.announcements(u32::MAX).await?.into_iter();
-    let announced: Vec<AnnouncementView> = announced.map(announcement::of).collect();
+    let announcements = app.store.announcements(u32::MAX).await?.into_iter();
+    let announcements: Vec<AnnouncementView> = announcements.map(announcement::view).collect();
     files
-        .put_json("results/announcements.json", &announced)
+        .put_json("results/announcements.json", &announcements)
         .await?;
     let terms = app.store.terms().await?.into_iter();
     let terms: Vec<TermsView> = terms.map(announcement::terms).collect();
     files.put_json("results/terms.json", &terms).await?;
 
-    let mut recorded = Vec::new();
+    let mut artifacts = Vec::new();
     for (number, stage) in app.store.stages().await?.into_iter().enumerate() {
-        let folder = format!("results/{}-{}", number + 1, plain(stage.name.as_str()));
-        boards(app, &sight, &stage, &folder, files).await?;
+        let folder = format!("results/{}-{}", number + 1, slug(stage.name.as_str()));
+        boards(app, &visibility, &stage, &folder, files).await?;
         for (day, _) in app.store.days().await? {
-            if day.of.stage == stage.id && day.released_at.is_some() {
-                one_day(app, &sight, day.of, &folder, files).await?;
-                recorded.extend(datasets(app, &sight, viewer, &stage, day.of).await?);
+            if day.stage_day.stage == stage.id && day.released_at.is_some() {
+                add_day(app, &visibility, day.stage_day, &folder, files).await?;
+                artifacts.extend(datasets(app, &visibility, viewer, &stage, day.stage_day).await?);
             }
         }
     }
     tournaments(app, viewer, files).await?;
-    Ok(recorded)
+    Ok(artifacts)
 }
 
-/// Tournaments with their games, as the viewer sees them.
+/// Tournaments with their games, as the viewer may see them.
 async fn tournaments(app: &AppState, viewer: Viewer, files: &mut Files) -> Result<(), Problem> {
     for tournament in app.store.tournaments().await? {
-        let name = plain(tournament.name.as_str());
+        let name = slug(tournament.name.as_str());
         let folder = format!("results/tournament-{}-{name}", tournament.number);
-        let sheet = TournamentSheet::find(app, tournament.id).await?;
-        let view = tournament::of(&sheet)?;
+        let state = TournamentState::find(app, tournament.id).await?;
+        let view = tournament::view(&state)?;
         files
             .put_json(&format!("{folder}/tournament.json"), &view)
             .await?;
-        let games = game::of_rounds(&sheet, viewer, None)?;
+        let games = game::round_games(&state, viewer, None)?;
         files
             .put_json(&format!("{folder}/games.json"), &games)
             .await?;
@@ -126,39 +126,39 @@ async fn tournaments(app: &AppState, viewer: Viewer, files: &mut Files) -> Resul
     Ok(())
 }
 
-/// A stage, and its boards by each of its rules that has rows.
+/// A stage, and a board for each revision of its rules with rows.
 async fn boards(
     app: &AppState,
-    sight: &Sight,
+    visibility: &Visibility,
     stage: &Stage,
     folder: &str,
     files: &mut Files,
 ) -> Result<(), Problem> {
-    let view = stage::of(app, stage.clone()).await?;
+    let view = stage::build(app, stage.clone()).await?;
     files
         .put_json(&format!("{folder}/stage.json"), &view)
         .await?;
-    let by = |revision| BoardQuery {
+    let query = |revision| BoardQuery {
         stage: Some(stage.id),
         revision,
         ..BoardQuery::default()
     };
-    let newest = board::asked(app, sight, by(None), None).await?;
+    let newest = board::query(app, visibility, query(None), None).await?;
     files
         .put_json(&format!("{folder}/board.json"), &newest)
         .await?;
     files
-        .put(&format!("{folder}/board.csv"), board_csv::of_board(&newest))
+        .put(&format!("{folder}/board.csv"), board_csv::board_table(&newest))
         .await?;
     for task in &stage.rules.rules.tasks {
-        let board = board::asked(app, sight, by(None), Some(*task)).await?;
+        let board = board::query(app, visibility, query(None), Some(*task)).await?;
         files
             .put_json(&format!("{folder}/board-{task}.json"), &board)
             .await?;
     }
     for revision in view.revisions {
-        let query = by(Some(revision.revision));
-        let board = board::asked(app, sight, query, None).await?;
+        let query = query(Some(revision.revision));
+        let board = board::query(app, visibility, query, None).await?;
         if board.revision == newest.revision || board.rows.is_empty() && board.baselines.is_empty()
         {
             continue;
@@ -166,40 +166,40 @@ async fn boards(
         let name = format!("{folder}/board-revision-{}", revision.revision);
         files.put_json(&format!("{name}.json"), &board).await?;
         files
-            .put(&format!("{name}.csv"), board_csv::of_board(&board))
+            .put(&format!("{name}.csv"), board_csv::board_table(&board))
             .await?;
     }
     Ok(())
 }
 
-async fn one_day(
+async fn add_day(
     app: &AppState,
-    sight: &Sight,
-    of: StageDay,
+    visibility: &Visibility,
+    stage_day: StageDay,
     folder: &str,
     files: &mut Files,
 ) -> Result<(), Problem> {
-    let evaluations = evaluation::of_day(app, sight, of).await?;
-    let name = format!("{folder}/{}", of.date);
+    let evaluations = evaluation::day_evaluations(app, visibility, stage_day).await?;
+    let name = format!("{folder}/{}", stage_day.date);
     files
         .put_json(&format!("{name}.json"), &evaluations)
         .await?;
     files
-        .put(&format!("{name}.csv"), day_csv::day(&evaluations))
+        .put(&format!("{name}.csv"), day_csv::day_table(&evaluations))
         .await
 }
 
-/// The datasets of a day that the viewer gets.
+/// The datasets of a day that the viewer may download.
 async fn datasets(
     app: &AppState,
-    sight: &Sight,
+    visibility: &Visibility,
     viewer: Viewer,
     stage: &Stage,
-    of: StageDay,
-) -> Result<Vec<Recorded>, Problem> {
+    stage_day: StageDay,
+) -> Result<Vec<ArtifactRow>, Problem> {
     let mut found = Vec::new();
-    for evaluation in app.store.evaluations_of_day(of).await? {
-        let public = sight.is_public(&evaluation);
+    for evaluation in app.store.evaluations_of_day(stage_day).await? {
+        let public = visibility.is_public(&evaluation);
         if !public && viewer != Viewer::Organiser || evaluation.dataset_removed.is_some() {
             continue;
         }
@@ -211,22 +211,22 @@ async fn datasets(
         else {
             continue;
         };
-        found.push(Recorded {
+        found.push(ArtifactRow {
             key: dataset,
             blake3: dataset_blake3,
             kind: "evaluation",
             id: evaluation.id.to_string(),
             team: app.store.team(evaluation.team).await?.name.to_string(),
             stage: stage.name.to_string(),
-            day: of.date.to_string(),
+            day: stage_day.date.to_string(),
             public,
         });
     }
     Ok(found)
 }
 
-/// Questions with their answers: those that everybody may read, of the organiser's archive all. They are no part of the
-/// public database, since a question there has a team.
+/// Questions with their answers: public ones, and in the organiser's edition all. The public database does not contain
+/// them, because a question there has a team.
 pub(super) async fn put_questions(
     app: &AppState,
     edition: Edition,
@@ -241,57 +241,57 @@ pub(super) async fn put_questions(
     files.put_json("results/questions.json", &shown).await
 }
 
-/// The table of all artifacts, and they themselves. What is not there any more is named in `left_out`.
+/// Adds the artifacts and the table of them. Artifacts that no longer exist are listed in `left_out`.
 pub(super) async fn add_artifacts(
     app: &AppState,
-    recorded: Vec<Recorded>,
+    artifacts: Vec<ArtifactRow>,
     files: &mut Files,
     left_out: &mut Vec<String>,
 ) -> Result<(), Problem> {
     let mut table = csv::Table::new(&[
         "path", "of", "id", "team", "stage", "day", "public", "bytes", "blake3",
     ]);
-    let mut kept = BTreeMap::new();
-    for artifact in recorded {
+    let mut sources = BTreeMap::new();
+    for artifact in artifacts {
         let path = format!("artifacts/{}", artifact.key);
-        let Some(bytes) = app.store.artifacts().bytes_of(&artifact.key).await? else {
+        let Some(bytes) = app.store.artifacts().size_bytes(&artifact.key).await? else {
             left_out.push(format!(
-                "{path}, of the {} {}: it is no longer kept",
+                "{path}, of the {} {}: the file no longer exists",
                 artifact.kind, artifact.id
             ));
             continue;
         };
-        let place = app.store.artifacts().path_of(&artifact.key)?;
+        let source = app.store.artifacts().local_path(&artifact.key)?;
         let blake3 = match artifact.blake3 {
             Some(blake3) => blake3,
-            None => files::hash(place.clone()).await?.1,
+            None => files::hash(source.clone()).await?.1,
         };
         table.row([
             path.clone(),
             artifact.kind.to_owned(),
             artifact.id,
-            csv::words(&artifact.team),
-            csv::words(&artifact.stage),
+            csv::escape_formula(&artifact.team),
+            csv::escape_formula(&artifact.stage),
             artifact.day,
             artifact.public.to_string(),
             bytes.to_string(),
             blake3.clone(),
         ]);
-        // What replays are drawn from goes along, where there is any.
-        let beside = match artifact.key.strip_suffix("/game.zip") {
+        // Clips are added if they exist.
+        let clips = match artifact.key.strip_suffix("/game.zip") {
             Some(folder) => format!("{folder}/clips"),
-            None => Artifacts::clips_of(&artifact.key),
+            None => Artifacts::clips_key(&artifact.key),
         };
-        if app.store.artifacts().bytes_of(&beside).await?.is_some() {
-            let place = app.store.artifacts().path_of(&beside)?;
-            let (bytes, blake3) = files::hash(place.clone()).await?;
-            kept.insert(format!("artifacts/{beside}"), (place, bytes, blake3));
+        if app.store.artifacts().size_bytes(&clips).await?.is_some() {
+            let source = app.store.artifacts().local_path(&clips)?;
+            let (bytes, blake3) = files::hash(source.clone()).await?;
+            sources.insert(format!("artifacts/{clips}"), (source, bytes, blake3));
         }
-        kept.insert(path, (place, bytes, blake3));
+        sources.insert(path, (source, bytes, blake3));
     }
     files.put("datasets.csv", table.into_bytes()).await?;
-    for (path, (place, bytes, blake3)) in kept {
-        files.add_known(&path, place, bytes, blake3);
+    for (path, (source, bytes, blake3)) in sources {
+        files.add_hashed(&path, source, bytes, blake3);
     }
     Ok(())
 }
@@ -301,9 +301,9 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names_become_parts_of_paths() {
-        assert_eq!(plain("Qualifying"), "qualifying");
-        assert_eq!(plain("../Größe 2026 "), "gr--e-2026");
-        assert_eq!(plain("日本"), "season");
+    fn slug_is_safe_in_paths() {
+        assert_eq!(slug("Qualifying"), "qualifying");
+        assert_eq!(slug("../Größe 2026 "), "gr--e-2026");
+        assert_eq!(slug("日本"), "season");
     }
 }

@@ -1,4 +1,4 @@
-//! An archive on its way: written by a thread of its own, a few pieces ahead of the reader.
+//! Sending an archive: a separate thread writes it, a few chunks ahead of the reader.
 
 use super::Prepared;
 use axum::body::{Body, Bytes};
@@ -9,76 +9,76 @@ use std::{
 };
 use tokio::sync::{OwnedSemaphorePermit, mpsc};
 
-/// Length of a piece, in bytes …
-const PIECE_BYTES: usize = 256 << 10;
-/// … and how many of them wait for the reader.
-const AHEAD: usize = 4;
+/// Length of a chunk.
+const CHUNK_BYTES: usize = 256 << 10;
+/// Chunks that wait for the reader.
+const MAX_BUFFERED: usize = 4;
 
-/// The archive as the body of an answer. It breaks off, so that nobody takes it for whole, if a file is not what it was;
-/// it ends with the reader.
+/// The archive as the body of a response. If a file has changed, the body breaks off, so that it cannot be mistaken for
+/// a complete archive. Writing stops when the client disconnects.
 pub(crate) fn send(prepared: Prepared, permit: OwnedSemaphorePermit) -> Body {
-    let (pieces, received) = mpsc::channel(AHEAD);
+    let (chunks, received) = mpsc::channel(MAX_BUFFERED);
     tokio::task::spawn_blocking(move || {
-        // the next one may begin once the files of this one are gone
+        // The next archive may begin once the files of this one are removed.
         let (_permit, prepared) = (permit, prepared);
-        let mut sink = Pieces {
-            pieces: pieces.clone(),
-            buffer: Vec::with_capacity(PIECE_BYTES),
+        let mut sink = ChunkWriter {
+            chunks: chunks.clone(),
+            buffer: Vec::with_capacity(CHUNK_BYTES),
         };
         match write(&prepared, &mut sink) {
             Ok(()) => {
-                tracing::info!(edition = %prepared.manifest.edition, "an archive of the season was sent")
+                tracing::info!(edition = %prepared.manifest.edition, "season archive sent")
             }
             Err(ArchiveError::Io(error)) if error.kind() == io::ErrorKind::BrokenPipe => {
-                tracing::info!("who asked for an archive of the season went away");
+                tracing::info!("the client of a season archive disconnected");
             }
             Err(error) => {
-                tracing::error!(%error, "an archive of the season breaks off");
-                // Nobody waits for it any more if that fails.
-                let _ = pieces.blocking_send(Err(io::Error::other("the archive breaks off")));
+                tracing::error!(%error, "sending a season archive failed");
+                // If this fails, the client has disconnected.
+                let _ = chunks.blocking_send(Err(io::Error::other("the archive is incomplete")));
             }
         }
     });
     Body::from_stream(futures::stream::unfold(received, |mut received| async {
-        received.recv().await.map(|piece| (piece, received))
+        received.recv().await.map(|chunk| (chunk, received))
     }))
 }
 
-fn write(prepared: &Prepared, sink: &mut Pieces) -> Result<(), ArchiveError> {
+fn write(prepared: &Prepared, sink: &mut ChunkWriter) -> Result<(), ArchiveError> {
     let mut writer = Writer::begin(&mut *sink, &prepared.manifest)?;
-    for place in &prepared.places {
-        writer.next(|_| Ok(BufReader::with_capacity(PIECE_BYTES, File::open(place)?)))?;
+    for path in &prepared.paths {
+        writer.next(|_| Ok(BufReader::with_capacity(CHUNK_BYTES, File::open(path)?)))?;
     }
     writer.finish()?;
     sink.flush()?;
     Ok(())
 }
 
-/// Hands on what is written.
-struct Pieces {
-    pieces: mpsc::Sender<io::Result<Bytes>>,
+/// Collects written bytes into chunks and sends them to the reader.
+struct ChunkWriter {
+    chunks: mpsc::Sender<io::Result<Bytes>>,
     buffer: Vec<u8>,
 }
 
-impl Write for Pieces {
+impl Write for ChunkWriter {
     fn write(&mut self, written: &[u8]) -> io::Result<usize> {
-        let room = PIECE_BYTES - self.buffer.len();
-        let taken = written.len().min(room);
-        self.buffer.extend_from_slice(&written[..taken]);
-        if self.buffer.len() == PIECE_BYTES {
+        let space = CHUNK_BYTES - self.buffer.len();
+        let accepted = written.len().min(space);
+        self.buffer.extend_from_slice(&written[..accepted]);
+        if self.buffer.len() == CHUNK_BYTES {
             self.flush()?;
         }
-        Ok(taken)
+        Ok(accepted)
     }
 
     fn flush(&mut self) -> io::Result<()> {
         if self.buffer.is_empty() {
             return Ok(());
         }
-        let fresh = Vec::with_capacity(PIECE_BYTES);
-        let piece = Bytes::from(std::mem::replace(&mut self.buffer, fresh));
-        self.pieces
-            .blocking_send(Ok(piece))
+        let empty = Vec::with_capacity(CHUNK_BYTES);
+        let chunk = Bytes::from(std::mem::replace(&mut self.buffer, empty));
+        self.chunks
+            .blocking_send(Ok(chunk))
             .map_err(|_| io::ErrorKind::BrokenPipe.into())
     }
 }

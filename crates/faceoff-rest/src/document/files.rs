@@ -1,5 +1,5 @@
-//! Answers that depend on what the client has: what takes the header `If-None-Match` may answer that nothing has changed,
-//! what takes `Range` a part.
+//! Conditional and range requests in the document: routes with `If-None-Match` can return 304, routes with `Range` 206
+//! and 416.
 
 use utoipa::{
     IntoParams,
@@ -12,82 +12,82 @@ use utoipa::{
 const IF_NONE_MATCH: &str = "If-None-Match";
 const RANGE: &str = "Range";
 
-/// What a route takes whose answer has a tag.
+/// Request headers of a route whose response has a tag.
 pub(crate) struct TagHeader;
 
 impl IntoParams for TagHeader {
     fn into_params(_: impl Fn() -> Option<ParameterIn>) -> Vec<Parameter> {
-        let told = "tags (`ETag`) of what the client has: if the answer has one of them, it is 304, without a body";
-        vec![header(IF_NONE_MATCH, told)]
+        let description = "tags (`ETag`) that the client already has; if the response has one of them, it is 304 without a body";
+        vec![header(IF_NONE_MATCH, description)]
     }
 }
 
-/// What a route takes that sends a file.
+/// Request headers of a route that sends a file.
 pub(crate) struct FileHeaders;
 
 impl IntoParams for FileHeaders {
     fn into_params(place: impl Fn() -> Option<ParameterIn>) -> Vec<Parameter> {
         let mut params = TagHeader::into_params(place);
-        let told = "`bytes=FIRST-LAST`, `bytes=FIRST-` or `bytes=-LAST_SO_MANY`; the answer is 206 with these. Of several ranges, \
-                    and of what is none, it is the whole file";
-        params.push(header(RANGE, told));
-        let told = "the tag of the file that a range is to go on with; of another one the answer is the whole file";
-        params.push(header("If-Range", told));
+        let description = "`bytes=FIRST-LAST`, `bytes=FIRST-` or `bytes=-LENGTH`; the response is 206 with this range. Several \
+                           ranges and malformed ones return the whole file";
+        params.push(header(RANGE, description));
+        let description = "tag of the file that the range continues; if the file has another tag, the whole file is returned";
+        params.push(header("If-Range", description));
         params
     }
 }
 
-fn header(name: &str, told: &str) -> Parameter {
+fn header(name: &str, description: &str) -> Parameter {
     ParameterBuilder::new()
         .name(name)
         .parameter_in(ParameterIn::Header)
         .required(Required::False)
-        .description(Some(told))
+        .description(Some(description))
         .schema(Some(Object::with_type(Type::String)))
         .build()
 }
 
-/// Adds the answers that follow from such headers, and what those that are there tell in theirs.
+/// Adds the responses that follow from these headers, and their response headers.
 pub(super) fn complete(operation: &mut Operation) {
-    if !takes(operation, IF_NONE_MATCH) {
+    if !has_header_parameter(operation, IF_NONE_MATCH) {
         return;
     }
     let responses = &mut operation.responses.responses;
-    let mut not_modified = Response::new("it is as the client has it");
-    tell(&mut not_modified, "ETag", "the tag of the answer");
+    let mut not_modified = Response::new("not modified; the client already has it");
+    add_header(&mut not_modified, "ETag", "tag of the response");
     let Some(RefOr::T(whole)) = responses.get_mut("200") else {
         return;
     };
-    tell(whole, "ETag", "the tag of the answer");
+    add_header(whole, "ETag", "tag of the response");
     let whole = whole.clone();
     responses.insert("304".to_owned(), not_modified.into());
-    if !takes(operation, RANGE) {
+    if !has_header_parameter(operation, RANGE) {
         return;
     }
     let mut whole = whole;
-    tell(&mut whole, "Accept-Ranges", "`bytes`");
-    tell(&mut whole, "Content-Disposition", "a name to store it as");
-    tell(
+    add_header(&mut whole, "Accept-Ranges", "`bytes`");
+    add_header(&mut whole, "Content-Disposition", "file name for the download");
+    add_header(
         &mut whole,
         "X-Content-BLAKE3",
-        "BLAKE3 of the whole file, 64 hexadecimal digits; absent where it is not known",
+        "BLAKE3 hash of the whole file, 64 hexadecimal digits; absent if it is unknown",
     );
     let mut part = whole.clone();
-    part.description = "the bytes that were asked for".to_owned();
-    tell(
+    part.description = "the requested range".to_owned();
+    add_header(
         &mut part,
         "Content-Range",
-        "`bytes FIRST-LAST/LENGTH_OF_ALL`",
+        "`bytes FIRST-LAST/LENGTH`",
     );
-    let mut behind = Response::new("the range begins behind the end; `bytes` says where that is");
-    tell(&mut behind, "Content-Range", "`bytes */LENGTH_OF_ALL`");
+    let mut unsatisfiable = Response::new("the range begins behind the end; `bytes` states the length of the file");
+    add_header(&mut unsatisfiable, "Content-Range", "`bytes */LENGTH`");
     let responses = &mut operation.responses.responses;
     responses.insert("200".to_owned(), whole.into());
     responses.insert("206".to_owned(), part.into());
-    responses.insert("416".to_owned(), behind.into());
+    responses.insert("416".to_owned(), unsatisfiable.into());
 }
 
-fn takes(operation: &Operation, name: &str) -> bool {
+fn has_header_parameter(operation: &Operation, name: &str) -> bool {
     let parameters = operation.parameters.iter().flatten();
     let mut plain = parameters.filter_map(|parameter| match parameter {
         RefOr::T(parameter) => Some(parameter),
@@ -96,8 +96,8 @@ fn takes(operation: &Operation, name: &str) -> bool {
     plain.any(|parameter| parameter.parameter_in == ParameterIn::Header && parameter.name == name)
 }
 
-fn tell(response: &mut Response, name: &str, told: &str) {
+fn add_header(response: &mut Response, name: &str, description: &str) {
     let mut header = Header::new(Object::with_type(Type::String));
-    header.description = Some(told.to_owned());
+    header.description = Some(description.to_owned());
     response.headers.insert(name.to_owned(), RefOr::T(header));
 }

@@ -1,12 +1,12 @@
-//! Integers without a sign are told by their own names of the registry of formats: derived, they have those of signed
-//! ones, whose upper half would be said to be wrong and is taken.
+//! Unsigned integers get their own formats (`uint32`, `uint64`). The derived schemas have those of signed integers, which
+//! exclude the upper half of the valid values.
 
 use serde_json::Value;
 
-/// Renames them wherever they stand.
-pub(super) fn tell_unsigned(told: &mut Value) {
-    match told {
-        Value::Array(items) => items.iter_mut().for_each(tell_unsigned),
+/// Corrects the format of all unsigned integers in the document.
+pub(super) fn mark_unsigned(value: &mut Value) {
+    match value {
+        Value::Array(items) => items.iter_mut().for_each(mark_unsigned),
         Value::Object(fields) => {
             let is_unsigned = fields.get("minimum").and_then(Value::as_f64) >= Some(0.0);
             if let Some(Value::String(format)) = fields.get_mut("format")
@@ -15,7 +15,7 @@ pub(super) fn tell_unsigned(told: &mut Value) {
             {
                 format.insert(0, 'u');
             }
-            fields.values_mut().for_each(tell_unsigned);
+            fields.values_mut().for_each(mark_unsigned);
         }
         _ => {}
     }
@@ -27,15 +27,15 @@ mod tests {
     use serde_json::json;
 
     #[test]
-    fn only_integers_without_a_sign_are_renamed() {
-        let mut told = json!({"properties": {
+    fn only_unsigned_integers_are_marked() {
+        let mut document = json!({"properties": {
             "waiting": {"type": ["integer", "null"], "format": "int32", "minimum": 0},
             "round": {"oneOf": [{"type": "integer", "format": "int64", "minimum": 1, "maximum": 100}]},
             "before": {"type": "integer", "format": "int64"},
             "share": {"type": "number", "format": "double", "minimum": 0},
         }});
-        tell_unsigned(&mut told);
-        let format = |pointer| told.pointer(pointer).unwrap();
+        mark_unsigned(&mut document);
+        let format = |pointer| document.pointer(pointer).unwrap();
         assert_eq!(format("/properties/waiting/format"), "uint32");
         assert_eq!(format("/properties/round/oneOf/0/format"), "uint64");
         assert_eq!(format("/properties/before/format"), "int64");

@@ -1,11 +1,11 @@
-//! Answers of lists that come page by page: what takes `after` tells where the next page is.
+//! Paged lists in the document: routes with the parameter `after` return a link to the next page.
 
 use utoipa::openapi::{
     Header, Object, RefOr, Response, Type,
     path::{Operation, ParameterIn},
 };
 
-/// Adds what follows from taking such a parameter.
+/// Adds the header and the response that follow from this parameter.
 pub(super) fn complete(operation: &mut Operation) {
     let parameters = operation.parameters.iter().flatten();
     let mut plain = parameters.filter_map(|parameter| match parameter {
@@ -20,11 +20,11 @@ pub(super) fn complete(operation: &mut Operation) {
     let responses = &mut operation.responses.responses;
     if let Some(RefOr::T(page)) = responses.get_mut("200") {
         let mut next = Header::new(Object::with_type(Type::String));
-        let told = "`<PATH>; rel=\"next\"`: the next page; absent of the last one";
-        next.description = Some(told.to_owned());
+        let description = "`<PATH>; rel=\"next\"`: the next page; absent on the last one";
+        next.description = Some(description.to_owned());
         page.headers.insert("Link".to_owned(), RefOr::T(next));
     }
     responses
         .entry("422".to_owned())
-        .or_insert_with(|| Response::new("`limit` is none").into());
+        .or_insert_with(|| Response::new("`limit` is out of range").into());
 }

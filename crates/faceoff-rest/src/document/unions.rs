@@ -1,7 +1,7 @@
-//! Types with flattened parts, told as generators of clients read them.
+//! Schemas of types with flattened parts, rewritten for client generators.
 //!
-//! A struct with a flattened enum is derived as all of (one of its variants, its own fields). That is right, and no
-//! class can be made of it; one of (a variant with the fields) is the same and can.
+//! The derived schema of a struct with a flattened enum is allOf(oneOf(variants), fields). That is correct, but generators
+//! cannot make a class of it. The equivalent oneOf(variant with fields, …) works.
 
 use std::{collections::BTreeMap, mem};
 use utoipa::openapi::{
@@ -11,17 +11,17 @@ use utoipa::openapi::{
 
 type Schemas = BTreeMap<String, RefOr<Schema>>;
 
-/// Multiplies out whatever is all of several things.
-pub(super) fn multiply_out(schemas: &mut Schemas) {
+/// Rewrites all composed schemas.
+pub(super) fn flatten(schemas: &mut Schemas) {
     let composed: Vec<(String, RefOr<Schema>)> = schemas
         .iter()
         .filter(|(_, schema)| is_composed(schema))
-        .filter_map(|(name, schema)| Some((name.clone(), flat(schema, schemas)?)))
+        .filter_map(|(name, schema)| Some((name.clone(), flattened(schema, schemas)?)))
         .collect();
     schemas.extend(composed);
 }
 
-/// Is it all of several things, or one of some that are?
+/// Whether the schema is an allOf, or a oneOf that contains one.
 fn is_composed(schema: &RefOr<Schema>) -> bool {
     match schema {
         RefOr::T(Schema::AllOf(_)) => true,
@@ -30,7 +30,7 @@ fn is_composed(schema: &RefOr<Schema>) -> bool {
     }
 }
 
-fn flat(schema: &RefOr<Schema>, schemas: &Schemas) -> Option<RefOr<Schema>> {
+fn flattened(schema: &RefOr<Schema>, schemas: &Schemas) -> Option<RefOr<Schema>> {
     let mut variants = variants(schema, schemas)?;
     let own = match schema {
         RefOr::T(Schema::AllOf(all)) => all.description.clone(),
@@ -51,7 +51,7 @@ fn flat(schema: &RefOr<Schema>, schemas: &Schemas) -> Option<RefOr<Schema>> {
     Some(RefOr::T(Schema::OneOf(one)))
 }
 
-/// The objects of which it is one; none if it can also be something else.
+/// The alternative objects of a schema; `None` if it also allows other types.
 fn variants(schema: &RefOr<Schema>, schemas: &Schemas) -> Option<Vec<Object>> {
     match schema {
         RefOr::Ref(reference) => {
@@ -72,7 +72,7 @@ fn variants(schema: &RefOr<Schema>, schemas: &Schemas) -> Option<Vec<Object>> {
                 let factors = variants(item, schemas)?;
                 products = products
                     .iter()
-                    .flat_map(|left| factors.iter().map(move |right| joined(left, right)))
+                    .flat_map(|left| factors.iter().map(move |right| merge(left, right)))
                     .collect();
             }
             Some(products)
@@ -81,8 +81,8 @@ fn variants(schema: &RefOr<Schema>, schemas: &Schemas) -> Option<Vec<Object>> {
     }
 }
 
-/// An object with the fields of both.
-fn joined(left: &Object, right: &Object) -> Object {
+/// An object with the fields of both schemas.
+fn merge(left: &Object, right: &Object) -> Object {
     let mut both = left.clone();
     both.required.extend(right.required.iter().cloned());
     both.properties.extend(right.properties.clone());

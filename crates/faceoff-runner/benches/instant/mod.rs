@@ -1,4 +1,4 @@
-//! An agent that answers at once: the benchmark's own program, started with `--agent`.
+//! An agent that answers at once: the benchmark's program, started with `--agent`.
 
 use faceoff_runner::{AgentEnvironment, Supervision, TimeLimits, bundle::Bundle};
 use faceoff_sandbox::{Isolation, Limits, Runtime};
@@ -17,7 +17,7 @@ pub const ACTION: &str = "[[0.012345678901234567,-0.19612345678901234,0.00012345
 [0.12345678901234567,-0.49612345678901234,0.5001234567890123,-1.1436123456789012,\
 0.7012345678901234,0.27041234567890123,-0.4123456789012345]]";
 
-/// Answers every message at once, looking only at what it must.
+/// Answers every message at once, and parses as little as possible.
 pub fn instant_agent() {
     let mut input = BufReader::with_capacity(64 << 10, std::io::stdin());
     let mut output = std::io::stdout();
@@ -47,7 +47,7 @@ pub fn instant_agent() {
     }
 }
 
-/// A bundle that holds this program.
+/// A bundle that contains this program.
 pub struct InstantAgent {
     _dir: tempfile::TempDir,
     pub bundle: Bundle,

@@ -1,4 +1,4 @@
-//! What unpacking may cost, whatever the archive is made of.
+//! Cost limits of unpacking any archive.
 
 use super::error::BundleError;
 use faceoff_types::BundleLimits;
@@ -8,73 +8,72 @@ use std::{
     time::{Duration, Instant},
 };
 
-/// How much may be read of an archive beside its files' contents (headers, long names, extended
-/// attributes, padding, directories), in bytes, before it has brought a single entry …
-const BESIDE_BYTES: u64 = 16 << 20;
-/// … and how much more for each entry: a header with its padding, and as much to describe it.
-const BESIDE_BYTES_PER_ENTRY: u64 = 2 << 10;
-/// A file or a folder, each with a header of its own before it, is two entries; so this many for each
-/// that is allowed.
+/// Bytes that may be read of an archive beside its files' contents (headers, long names, extended
+/// attributes, padding, directories), before its first entry.
+const OVERHEAD_BYTES: u64 = 16 << 20;
+/// Additional overhead per entry: a header with its padding, and as much for its extension headers.
+const OVERHEAD_BYTES_PER_ENTRY: u64 = 2 << 10;
+/// Maximum number of entries per allowed file: the limit allows as many folders as files, and each of them can have an
+/// extension header.
 const ENTRIES_PER_FILE: u64 = 4;
-/// A seek costs a call of the system and a buffer filled anew, so it counts as bytes, too.
+/// A seek costs a system call and refills a buffer, so it counts as this many bytes.
 const SEEK_BYTES: u64 = 64;
-/// How often one stream may be followed by another one in the same file. `bgzip` begins anew every
-/// 64 KiB; layers that can be fetched piece by piece have a stream for each file, or some, so that there are
-/// as many of these as there may be entries, if that is more.
-const MEMBERS: u64 = 1 << 16;
-/// What compressors add to a stream, in bytes: its header, and what some note there. Beyond this and
-/// [`BESIDE_BYTES`] nothing that is compressed is larger than what it holds.
-const PACKED_BYTES_PER_MEMBER: u64 = 1 << 10;
-/// How much of names may be compared to follow all links, in bytes.
+/// Maximum number of successive compressed streams in one file. `bgzip` starts a new stream every 64 KiB. Layers for
+/// partial downloads have a stream per file, or several, so the maximum is the number of entries if that is larger.
+const STREAMS: u64 = 1 << 16;
+/// Bytes that compressors add to a stream: its header, and notes in it. Apart from this and [`OVERHEAD_BYTES`],
+/// compressed data is never larger than its content.
+const PACKED_BYTES_PER_STREAM: u64 = 1 << 10;
+/// Maximum bytes of names that may be compared while following all links.
 const LINK_BYTES: u64 = 128 << 20;
-/// How much of names may be looked up to place the entries of an image's layers, in bytes. A hundred thousand
-/// entries of ordinary paths come to a tenth of it.
-const LOOKED_UP_BYTES: u64 = 256 << 20;
-/// A name costs as much as so many bytes, however short it is.
-const LOOKED_UP_AT_LEAST: u64 = 16;
+/// Maximum bytes of names that may be looked up for the entries of an image's layers. A hundred thousand entries with
+/// ordinary paths use a tenth of it.
+const LOOKUP_BYTES: u64 = 256 << 20;
+/// A name counts as this many additional bytes, because a short name also costs time.
+const LOOKUP_BYTES_PER_NAME: u64 = 16;
 
-/// Tells the time; given from outside so that a test turns it.
+/// Clock; a parameter, so that tests can set the time.
 pub(super) type Now<'a> = &'a dyn Fn() -> Instant;
 
-/// Counts everything that reading an archive makes us do, and ends it where a limit is met: bytes that
-/// come out of the decompressor, entries of any kind, streams one after another, seeks. All of that
-/// depends on the archive alone, so that the verdict on it does not depend on how fast the host is.
-/// Time is the last line: it ends what our own count has missed, or a host that stands still, and is
-/// therefore our fault and not the archive's.
+/// Counts all work that reading an archive causes, and stops at a limit: bytes from the decompressor, entries of any
+/// kind, successive streams, seeks.
 ///
-/// The reasons are kept here, since a library between us and the reader may put an error of its own in
-/// the place of ours.
+/// All these counts depend only on the archive, so the verdict on it does not depend on the speed of the host. Time is
+/// the last limit: it stops work that the counts miss, or a host that hangs. Therefore a timeout is a platform fault
+/// and not the archive's.
+///
+/// The budget keeps the failure itself, because a library between the budget and the reader may replace the error by
+/// its own.
 pub(super) struct Budget<'a> {
     limits: BundleLimits,
     until: Instant,
     now: Now<'a>,
     cancelled: &'a dyn Fn() -> bool,
-    /// Read through [`Metered`], in bytes: everything that the archive is made of.
+    /// Bytes read through [`MeteredReader`]: everything that the archive consists of.
     read: Cell<u64>,
-    /// How much that may be by now.
+    /// Current limit of `read`.
     allowed: Cell<u64>,
-    /// What became files, in bytes.
+    /// Bytes of file contents.
     content: Cell<u64>,
-    /// What an archive's directory says that files have, in bytes.
+    /// Sum of the file sizes in the archive's directory, in bytes.
     stated: Cell<u64>,
     entries: Cell<u64>,
-    members: Cell<u64>,
-    /// Taken in by decompressors, in bytes …
+    streams: Cell<u64>,
+    /// Input of the decompressors, in bytes.
     packed: Cell<u64>,
-    /// … and what they made of it.
+    /// Output of the decompressors, in bytes.
     decompressed: Cell<u64>,
     link_bytes: Cell<u64>,
-    looked_up: Cell<u64>,
-    /// Of an image's files, in bytes.
-    of_image: Cell<u64>,
-    /// What comes now is of an image's layers.
-    is_root: Cell<bool>,
-    ended: RefCell<Option<BundleError>>,
+    lookup_bytes: Cell<u64>,
+    /// Bytes read of an image's packed files.
+    image_bytes: Cell<u64>,
+    /// The counted content is that of an image's layers.
+    in_layers: Cell<bool>,
+    failure: RefCell<Option<BundleError>>,
 }
 
 impl<'a> Budget<'a> {
-    /// A budget that is all to be spent. `cancelled` is asked for every piece that is read, so it must be
-    /// cheap.
+    /// An unused budget. `cancelled` is called for every piece that is read, so it must be cheap.
     pub(super) fn new(
         limits: &BundleLimits,
         now: Now<'a>,
@@ -86,18 +85,18 @@ impl<'a> Budget<'a> {
             now,
             cancelled,
             read: Cell::new(0),
-            allowed: Cell::new(BESIDE_BYTES),
+            allowed: Cell::new(OVERHEAD_BYTES),
             content: Cell::new(0),
             stated: Cell::new(0),
             entries: Cell::new(0),
-            members: Cell::new(0),
+            streams: Cell::new(0),
             packed: Cell::new(0),
             decompressed: Cell::new(0),
             link_bytes: Cell::new(0),
-            looked_up: Cell::new(0),
-            of_image: Cell::new(0),
-            is_root: Cell::new(false),
-            ended: RefCell::new(None),
+            lookup_bytes: Cell::new(0),
+            image_bytes: Cell::new(0),
+            in_layers: Cell::new(false),
+            failure: RefCell::new(None),
         }
     }
 
@@ -105,38 +104,39 @@ impl<'a> Budget<'a> {
         &self.limits
     }
 
-    /// The reason why nothing more may be done, in place of what `done` says of it.
-    pub(super) fn verdict<T>(&self, done: Result<T, BundleError>) -> Result<T, BundleError> {
-        match (done, self.ended.take()) {
+    /// Replaces the error of `done` by the failure of this budget, if there is one.
+    pub(super) fn own_failure_or<T>(&self, done: Result<T, BundleError>) -> Result<T, BundleError> {
+        match (done, self.failure.take()) {
             (Err(_), Some(reason)) => Err(reason),
             (done, _) => done,
         }
     }
 
-    fn end(&self, reason: BundleError) -> BundleError {
-        let told = reason.to_string();
-        self.ended.borrow_mut().get_or_insert(reason);
-        BundleError::Invalid(told)
+    /// Stores the failure, if it is the first, and returns an error with its text.
+    fn fail(&self, failure: BundleError) -> BundleError {
+        let message = failure.to_string();
+        self.failure.borrow_mut().get_or_insert(failure);
+        BundleError::Invalid(message)
     }
 
     fn refuse(&self, reason: String) -> Result<(), BundleError> {
-        Err(self.end(BundleError::Invalid(reason)))
+        Err(self.fail(BundleError::Invalid(reason)))
     }
 
-    /// Asked before each piece of work.
+    /// Checks all limits; called before each piece of work.
     pub(super) fn check(&self) -> Result<(), BundleError> {
-        if self.ended.borrow().is_some() {
+        if self.failure.borrow().is_some() {
             return Err(BundleError::Cancelled);
         }
         if (self.cancelled)() {
-            return Err(self.end(BundleError::Cancelled));
+            return Err(self.fail(BundleError::Cancelled));
         }
         if (self.now)() > self.until {
-            return Err(self.end(BundleError::Io(io::Error::new(
+            return Err(self.fail(BundleError::Io(io::Error::new(
                 io::ErrorKind::TimedOut,
                 format!(
                     "unpacking took longer than {} s, which nothing in the archive explains: the host is \
-                     too slow, or stands still",
+                     too slow, or hangs",
                     self.limits.unpack_s
                 ),
             ))));
@@ -144,125 +144,125 @@ impl<'a> Budget<'a> {
         let (read, allowed) = (self.read.get(), self.allowed.get());
         if read > allowed {
             return self.refuse(format!(
-                "the archive is more than its files explain: after {read} bytes of it there were {} entries, \
-                 with which at most {allowed} bytes of contents, headers, names and padding are allowed",
+                "the archive has more bytes than its files explain: {read} bytes contained {} entries, \
+                 for which at most {allowed} bytes of contents, headers, names and padding are allowed",
                 self.entries.get(),
             ));
         }
         Ok(())
     }
 
-    /// Another entry of the archive, whatever its kind: also one that only describes the next.
-    pub(super) fn entry(&self) -> Result<(), BundleError> {
-        let most = self.most_entries();
+    /// Counts an entry of any kind, including one that only describes the next entry.
+    pub(super) fn count_entry(&self) -> Result<(), BundleError> {
+        let max = self.max_entries();
         self.entries.set(self.entries.get() + 1);
-        self.allow(BESIDE_BYTES_PER_ENTRY);
-        if self.entries.get() > most {
+        self.allow(OVERHEAD_BYTES_PER_ENTRY);
+        if self.entries.get() > max {
             return self.refuse(format!(
-                "the archive has more than {most} entries of all kinds"
+                "the archive has more than {max} entries of all kinds"
             ));
         }
         self.check()
     }
 
-    fn most_entries(&self) -> u64 {
+    fn max_entries(&self) -> u64 {
         self.limits.files.saturating_mul(ENTRIES_PER_FILE)
     }
 
-    /// What became part of a file, or was read as the content of one that is left out.
-    pub(super) fn content(&self, entry: &str, bytes: usize) -> Result<(), BundleError> {
+    /// Counts content of a file, including files that are left out.
+    pub(super) fn count_content(&self, entry: &str, bytes: usize) -> Result<(), BundleError> {
         self.content.set(self.content.get() + bytes as u64);
         self.check_content(entry, self.content.get())
     }
 
-    /// What an archive's directory says of a file, none of which has been read.
-    pub(super) fn stated(&self, entry: &str, bytes: u64) -> Result<(), BundleError> {
+    /// Counts the size of a file according to the archive's directory, before its content is read.
+    pub(super) fn count_stated(&self, entry: &str, bytes: u64) -> Result<(), BundleError> {
         self.stated.set(self.stated.get().saturating_add(bytes));
         self.check_content(entry, self.stated.get())
     }
 
     fn check_content(&self, entry: &str, bytes: u64) -> Result<(), BundleError> {
-        let most = self.limits.unpacked_bytes;
-        if bytes > most {
-            return self.refuse(if self.is_root.get() {
+        let max = self.limits.unpacked_bytes;
+        if bytes > max {
+            return self.refuse(if self.in_layers.get() {
                 format!(
-                    "what the image's layers hold comes to more than {most} bytes (stopped at entry {entry:?}): \
-                     begin with a smaller image, and install and clean up in one step"
+                    "the image's layers contain more than {max} bytes (stopped at entry {entry:?}): \
+                     start from a smaller image, and install and clean up in one step"
                 )
             } else {
                 format!(
-                    "the archive unpacks to more than {most} bytes (stopped at entry {entry:?})"
+                    "the archive unpacks to more than {max} bytes (stopped at entry {entry:?})"
                 )
             });
         }
         Ok(())
     }
 
-    /// The layers of an image have been unpacked as files, and are now unpacked themselves: their content has the
-    /// limit for itself. All else is counted on.
-    pub(super) fn begin_root(&self) {
+    /// Starts counting the content of an image's layers, which have been unpacked as files before: the content has its
+    /// own limit. All other counts continue.
+    pub(super) fn begin_layers(&self) {
         self.content.set(0);
-        self.is_root.set(true);
+        self.in_layers.set(true);
     }
 
-    /// What is read of an image's files, as they came. Each is needed once, and all of them have the limit of the
-    /// unpacked bytes; one that is named again and again is read as often.
-    pub(super) fn of_image(&self, bytes: usize) -> io::Result<()> {
-        self.of_image.set(self.of_image.get() + bytes as u64);
-        let most = self.limits.unpacked_bytes;
-        if self.of_image.get() > most {
+    /// Counts bytes read of an image's packed files. Each file is needed once, and together they have the limit of the
+    /// unpacked bytes; a layer that is named several times is read several times.
+    pub(super) fn count_image_bytes(&self, bytes: usize) -> io::Result<()> {
+        self.image_bytes.set(self.image_bytes.get() + bytes as u64);
+        let max = self.limits.unpacked_bytes;
+        if self.image_bytes.get() > max {
             self.refuse(format!(
-                "the image's layers have more than {most} bytes, those that it names twice counted twice"
+                "the image's layers have more than {max} bytes, counting a layer each time that it is named"
             ))
             .map_err(as_io)?;
         }
         Ok(())
     }
 
-    /// A name that is looked up in an image's root, or a path that is looked at there.
-    pub(super) fn looked_up(&self, bytes: usize) -> Result<(), BundleError> {
-        let looked_up = self.looked_up.get() + bytes as u64 + LOOKED_UP_AT_LEAST;
-        self.looked_up.set(looked_up);
-        if looked_up > LOOKED_UP_BYTES {
+    /// Counts a lookup of a name, or of a path, in an image's root.
+    pub(super) fn count_lookup(&self, bytes: usize) -> Result<(), BundleError> {
+        let lookup_bytes = self.lookup_bytes.get() + bytes as u64 + LOOKUP_BYTES_PER_NAME;
+        self.lookup_bytes.set(lookup_bytes);
+        if lookup_bytes > LOOKUP_BYTES {
             return self
                 .refuse("the image's paths lead through too many folders and links".to_owned());
         }
         self.check()
     }
 
-    /// A name that is compared to follow a link, or the target of one.
-    pub(super) fn followed(&self, bytes: usize) -> Result<(), BundleError> {
-        let followed = self.link_bytes.get() + bytes as u64 + LOOKED_UP_AT_LEAST;
-        self.link_bytes.set(followed);
-        if followed > LINK_BYTES {
+    /// Counts a name that is compared while following a link, or the target of a link.
+    pub(super) fn count_link_bytes(&self, bytes: usize) -> Result<(), BundleError> {
+        let link_bytes = self.link_bytes.get() + bytes as u64 + LOOKUP_BYTES_PER_NAME;
+        self.link_bytes.set(link_bytes);
+        if link_bytes > LINK_BYTES {
             return self.refuse("the archive's links lead through too many others".to_owned());
         }
         self.check()
     }
 
-    /// So many bytes more may be read: the contents of a file that comes now, or all of a packed archive
-    /// that is read where it lies.
+    /// Raises the limit of read bytes: by the size of the next file, or by the size of an archive that is read in
+    /// place.
     pub(super) fn allow(&self, bytes: u64) {
         self.allowed.set(self.allowed.get().saturating_add(bytes));
     }
 
-    fn member(&self) -> Result<(), BundleError> {
-        self.members.set(self.members.get() + 1);
-        let most = MEMBERS.max(self.most_entries());
-        if self.members.get() > most {
+    fn count_stream(&self) -> Result<(), BundleError> {
+        self.streams.set(self.streams.get() + 1);
+        let max = STREAMS.max(self.max_entries());
+        if self.streams.get() > max {
             return self.refuse(format!(
-                "the archive is made of more than {most} compressed streams"
+                "the archive is made of more than {max} compressed streams"
             ));
         }
         self.check()
     }
 
-    /// Blocks that decompress to nothing cost as much as any.
-    fn decompresses(&self) -> Result<(), BundleError> {
-        let explained = BESIDE_BYTES + (self.members.get() + 1) * PACKED_BYTES_PER_MEMBER;
+    /// Refuses compressed data that is larger than its content: empty blocks cost as much time as others.
+    fn check_compression(&self) -> Result<(), BundleError> {
+        let explained = OVERHEAD_BYTES + (self.streams.get() + 1) * PACKED_BYTES_PER_STREAM;
         if self.packed.get() > self.decompressed.get().saturating_add(explained) {
             return self.refuse(format!(
-                "the archive is larger than what it holds: {} compressed bytes have brought {}",
+                "the archive is larger than its content: {} compressed bytes contain {} bytes",
                 self.packed.get(),
                 self.decompressed.get()
             ));
@@ -271,24 +271,24 @@ impl<'a> Budget<'a> {
     }
 }
 
-/// As an error of a reader; what it says is kept by the budget.
+/// Converts to an error of a reader; the budget keeps the original.
 fn as_io(error: BundleError) -> io::Error {
     io::Error::other(error.to_string())
 }
 
-/// A reader whose bytes are counted.
-pub(super) struct Metered<'a, R> {
+/// A reader that counts its bytes.
+pub(super) struct MeteredReader<'a, R> {
     inner: R,
     budget: &'a Budget<'a>,
 }
 
-impl<'a, R> Metered<'a, R> {
+impl<'a, R> MeteredReader<'a, R> {
     pub(super) const fn new(inner: R, budget: &'a Budget<'a>) -> Self {
         Self { inner, budget }
     }
 }
 
-impl<R: Read> Read for Metered<'_, R> {
+impl<R: Read> Read for MeteredReader<'_, R> {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         self.budget.check().map_err(as_io)?;
         let read = self.inner.read(buffer)?;
@@ -297,7 +297,7 @@ impl<R: Read> Read for Metered<'_, R> {
     }
 }
 
-impl<R: Seek> Seek for Metered<'_, R> {
+impl<R: Seek> Seek for MeteredReader<'_, R> {
     fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
         self.budget.read.set(self.budget.read.get() + SEEK_BYTES);
         self.budget.check().map_err(as_io)?;
@@ -305,33 +305,33 @@ impl<R: Seek> Seek for Metered<'_, R> {
     }
 }
 
-/// A reader that only asks whether to go on: for the packed side, of which every byte is read once, and
-/// which may be long before a byte comes out at the other.
-pub(super) struct Watched<'a, R> {
+/// A reader that only checks for cancellation and timeout. For the compressed side: every byte is read once, and many
+/// bytes may be read before the decompressor returns one.
+pub(super) struct CancellableReader<'a, R> {
     inner: R,
     budget: &'a Budget<'a>,
 }
 
-impl<'a, R> Watched<'a, R> {
+impl<'a, R> CancellableReader<'a, R> {
     pub(super) const fn new(inner: R, budget: &'a Budget<'a>) -> Self {
         Self { inner, budget }
     }
 }
 
-impl<R: Read> Read for Watched<'_, R> {
+impl<R: Read> Read for CancellableReader<'_, R> {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         self.budget.check().map_err(as_io)?;
         self.inner.read(buffer)
     }
 }
 
-/// What decompresses one stream of a file that may hold several, one after another.
-pub(super) trait Member<R>: Read + Sized {
+/// A decompressor of one stream, in a file that may contain several successive streams.
+pub(super) trait StreamDecoder<R>: Read + Sized {
     fn begin(packed: R) -> io::Result<Self>;
     fn packed(self) -> R;
 }
 
-impl<R: BufRead> Member<R> for flate2::bufread::GzDecoder<R> {
+impl<R: BufRead> StreamDecoder<R> for flate2::bufread::GzDecoder<R> {
     fn begin(packed: R) -> io::Result<Self> {
         Ok(Self::new(packed))
     }
@@ -341,7 +341,7 @@ impl<R: BufRead> Member<R> for flate2::bufread::GzDecoder<R> {
     }
 }
 
-impl<R: BufRead> Member<R> for zstd::Decoder<'static, R> {
+impl<R: BufRead> StreamDecoder<R> for zstd::Decoder<'static, R> {
     fn begin(packed: R) -> io::Result<Self> {
         Ok(Self::with_buffer(packed)?.single_frame())
     }
@@ -351,13 +351,13 @@ impl<R: BufRead> Member<R> for zstd::Decoder<'static, R> {
     }
 }
 
-/// What a decompressor takes in, counted.
-pub(super) struct Packed<'a, R> {
+/// Input of a decompressor, with its bytes counted.
+pub(super) struct PackedInput<'a, R> {
     inner: R,
     budget: &'a Budget<'a>,
 }
 
-impl<R: BufRead> Read for Packed<'_, R> {
+impl<R: BufRead> Read for PackedInput<'_, R> {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         let read = self.fill_buf()?.read(buffer)?;
         self.consume(read);
@@ -365,9 +365,9 @@ impl<R: BufRead> Read for Packed<'_, R> {
     }
 }
 
-impl<R: BufRead> BufRead for Packed<'_, R> {
+impl<R: BufRead> BufRead for PackedInput<'_, R> {
     fn fill_buf(&mut self) -> io::Result<&[u8]> {
-        self.budget.decompresses().map_err(as_io)?;
+        self.budget.check_compression().map_err(as_io)?;
         self.inner.fill_buf()
     }
 
@@ -379,17 +379,17 @@ impl<R: BufRead> BufRead for Packed<'_, R> {
     }
 }
 
-/// All streams of a file as one, each counted: one that holds nothing costs as much to begin as any.
-pub(super) struct Members<'a, R, M> {
+/// All successive streams of a file as one. Each stream is counted, because starting an empty one also costs time.
+pub(super) struct MultiStreamReader<'a, R, M> {
     budget: &'a Budget<'a>,
     /// `None` after the end, or an error.
     current: Option<M>,
     packed: std::marker::PhantomData<R>,
 }
 
-impl<'a, R: BufRead, M: Member<Packed<'a, R>>> Members<'a, R, M> {
+impl<'a, R: BufRead, M: StreamDecoder<PackedInput<'a, R>>> MultiStreamReader<'a, R, M> {
     pub(super) fn new(packed: R, budget: &'a Budget<'a>) -> io::Result<Self> {
-        let packed = Packed {
+        let packed = PackedInput {
             inner: packed,
             budget,
         };
@@ -401,23 +401,23 @@ impl<'a, R: BufRead, M: Member<Packed<'a, R>>> Members<'a, R, M> {
     }
 }
 
-impl<'a, R: BufRead, M: Member<Packed<'a, R>>> Read for Members<'a, R, M> {
+impl<'a, R: BufRead, M: StreamDecoder<PackedInput<'a, R>>> Read for MultiStreamReader<'a, R, M> {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         if buffer.is_empty() {
             return Ok(0);
         }
-        while let Some(member) = &mut self.current {
-            let read = member.read(buffer)?;
+        while let Some(decoder) = &mut self.current {
+            let read = decoder.read(buffer)?;
             if read > 0 {
                 let decompressed = &self.budget.decompressed;
                 decompressed.set(decompressed.get() + read as u64);
                 return Ok(read);
             }
-            self.budget.member().map_err(as_io)?;
-            let Some(mut packed) = self.current.take().map(Member::packed) else {
+            self.budget.count_stream().map_err(as_io)?;
+            let Some(mut packed) = self.current.take().map(StreamDecoder::packed) else {
                 break;
             };
-            if follows(&mut packed)? {
+            if has_next_stream(&mut packed)? {
                 self.current = Some(M::begin(packed)?);
             }
         }
@@ -425,8 +425,8 @@ impl<'a, R: BufRead, M: Member<Packed<'a, R>>> Read for Members<'a, R, M> {
     }
 }
 
-/// Is there another stream? Zeros fill up blocks of tapes, and begin none.
-fn follows(packed: &mut impl BufRead) -> io::Result<bool> {
+/// Does another stream follow? Zeros pad the blocks of tapes, and are skipped.
+fn has_next_stream(packed: &mut impl BufRead) -> io::Result<bool> {
     loop {
         let ahead = packed.fill_buf()?;
         let zeros = ahead.iter().take_while(|&&byte| byte == 0).count();
@@ -451,54 +451,54 @@ mod tests {
     };
 
     #[test]
-    fn time_is_the_hosts_fault_and_a_cancellation_nobodys() {
+    fn timeout_is_a_platform_fault_and_cancellation_is_none() {
         let start = Instant::now();
         let passed = Cell::new(Duration::ZERO);
         let cancelled = Cell::new(false);
         let (now, asked) = (|| start + passed.get(), || cancelled.get());
         let budget = Budget::new(&LIMITS, &now, &asked);
-        let mut reader = Metered::new(io::repeat(0).take(100), &budget);
+        let mut reader = MeteredReader::new(io::repeat(0).take(100), &budget);
         passed.set(Duration::from_secs(60));
         assert_eq!(reader.read(&mut [0; 10]).unwrap(), 10);
         passed.set(Duration::from_secs(61));
         let broken = reader.read(&mut [0; 10]).unwrap_err();
-        // However a library words it.
-        let told: Result<(), _> = budget.verdict(Err(BundleError::reading("x")(broken)));
+        // Even if a library replaces the error.
+        let message: Result<(), _> = budget.own_failure_or(Err(BundleError::on_read("x")(broken)));
         assert!(
-            matches!(&told, Err(BundleError::Io(error)) if error.kind() == io::ErrorKind::TimedOut),
-            "{told:?}"
+            matches!(&message, Err(BundleError::Io(error)) if error.kind() == io::ErrorKind::TimedOut),
+            "{message:?}"
         );
 
         passed.set(Duration::ZERO);
         let budget = Budget::new(&LIMITS, &now, &asked);
-        budget.entry().unwrap();
+        budget.count_entry().unwrap();
         cancelled.set(true);
-        let told = budget.verdict(budget.entry());
-        assert!(matches!(told, Err(BundleError::Cancelled)), "{told:?}");
+        let message = budget.own_failure_or(budget.count_entry());
+        assert!(matches!(message, Err(BundleError::Cancelled)), "{message:?}");
     }
 
     #[test]
-    fn links_of_the_shortest_names_are_counted() {
+    fn links_with_short_names_are_counted() {
         let (now, never) = (Instant::now, || false);
         let budget = Budget::new(&LIMITS, &now, &never);
-        let almost = usize::try_from(LINK_BYTES - 2 * LOOKED_UP_AT_LEAST).unwrap();
-        budget.followed(almost).unwrap();
-        budget.followed(0).unwrap();
-        let told = budget.verdict(budget.followed(0)).unwrap_err().to_string();
-        assert!(told.contains("lead through too many others"), "{told}");
+        let almost = usize::try_from(LINK_BYTES - 2 * LOOKUP_BYTES_PER_NAME).unwrap();
+        budget.count_link_bytes(almost).unwrap();
+        budget.count_link_bytes(0).unwrap();
+        let message = budget.own_failure_or(budget.count_link_bytes(0)).unwrap_err().to_string();
+        assert!(message.contains("lead through too many others"), "{message}");
     }
 
     #[test]
-    fn what_is_beside_the_files_is_counted_whoever_reads_it() {
+    fn overhead_is_counted_for_any_reader() {
         let (now, never) = (Instant::now, || false);
         let budget = Budget::new(&LIMITS, &now, &never);
-        let mut reader = Metered::new(io::repeat(0), &budget);
+        let mut reader = MeteredReader::new(io::repeat(0), &budget);
         let read = io::copy(&mut reader, &mut io::sink()).unwrap_err();
-        let told = budget.verdict(Err::<(), _>(BundleError::reading("")(read)));
-        let BundleError::Invalid(told) = told.unwrap_err() else {
-            panic!("it is the archive's doing");
+        let message = budget.own_failure_or(Err::<(), _>(BundleError::on_read("")(read)));
+        let BundleError::Invalid(message) = message.unwrap_err() else {
+            panic!("expected a refusal of the archive");
         };
-        assert!(told.contains("more than its files explain"), "{told}");
-        assert!(budget.read.get() < BESIDE_BYTES + (1 << 20));
+        assert!(message.contains("than its files explain"), "{message}");
+        assert!(budget.read.get() < OVERHEAD_BYTES + (1 << 20));
     }
 }

@@ -1,4 +1,4 @@
-//! What holds for an entry of any archive, wherever it is placed.
+//! Rules for entries of any archive.
 
 use super::{budget::Budget, error::BundleError};
 use fs_err::OpenOptions;
@@ -9,20 +9,19 @@ use std::{
     path::Path,
 };
 
-/// Set whatever the service's umask: agents run as another user when the service is root.
+/// Set explicitly, whatever the service's umask: if the service is root, agents run as other users.
 pub(super) const FOLDER_MODE: u32 = 0o755;
-/// Longest path in an archive, in bytes; with the folder it is unpacked to it must stay below the
-/// system's 4096.
+/// Longest path in an archive, in bytes; together with the target folder it must stay below the system's 4096.
 pub(super) const PATH_MAX_BYTES: usize = 1024;
 const NAME_MAX_BYTES: usize = 255;
 
-/// What is wrong with an entry.
+/// An error for an invalid entry.
 pub(super) fn invalid(entry: &str, problem: impl std::fmt::Display) -> BundleError {
     let shown: String = entry.chars().take(200).collect();
     BundleError::Invalid(format!("entry {shown:?} {problem}"))
 }
 
-/// The entry's path without `.` parts; empty for the archive's own root.
+/// The entry's path without `.` parts; empty for the archive's root.
 pub(super) fn normalise(entry: &str) -> Result<String, BundleError> {
     if entry.is_empty() {
         return Err(invalid(entry, "has no name"));
@@ -51,7 +50,7 @@ pub(super) fn normalise(entry: &str) -> Result<String, BundleError> {
     Ok(parts.join("/"))
 }
 
-/// Anything that neither a bundle nor a layer can hold.
+/// An error for an entry of a kind that neither a bundle nor a layer may contain.
 pub(super) fn unusable(entry: &str, what: &str) -> BundleError {
     invalid(
         entry,
@@ -59,7 +58,7 @@ pub(super) fn unusable(entry: &str, what: &str) -> BundleError {
     )
 }
 
-/// Could a symbolic link lead there?
+/// Checks that a symbolic link could have this target.
 pub(super) fn check_target(entry: &str, target: &str) -> Result<(), BundleError> {
     if target.is_empty() || target.contains('\0') || target.len() > PATH_MAX_BYTES {
         return Err(invalid(entry, "is a link to no possible path"));
@@ -67,28 +66,28 @@ pub(super) fn check_target(entry: &str, target: &str) -> Result<(), BundleError>
     Ok(())
 }
 
-/// Makes a folder that is not there yet.
-pub(super) fn make_folder(place: &Path) -> Result<(), BundleError> {
-    fs_err::create_dir(place)?;
-    fs_err::set_permissions(place, Permissions::from_mode(FOLDER_MODE))?;
+/// Creates a folder that must not exist.
+pub(super) fn make_folder(path: &Path) -> Result<(), BundleError> {
+    fs_err::create_dir(path)?;
+    fs_err::set_permissions(path, Permissions::from_mode(FOLDER_MODE))?;
     Ok(())
 }
 
 /// Gives a file another name.
-pub(super) fn write_name(entry: &str, file: &Path, place: &Path) -> Result<(), BundleError> {
-    fs_err::hard_link(file, place).map_err(|error| match error.kind() {
+pub(super) fn add_hard_link(entry: &str, file: &Path, path: &Path) -> Result<(), BundleError> {
+    fs_err::hard_link(file, path).map_err(|error| match error.kind() {
         io::ErrorKind::TooManyLinks => invalid(
             entry,
-            "is one name more than a file can have on this server",
+            "is one more name than a file can have on this server",
         ),
         _ => error.into(),
     })
 }
 
-/// Writes a file that is not there yet, its content streamed and counted.
+/// Writes a file that must not exist; streams and counts its content.
 pub(super) fn write_new(
     entry: &str,
-    place: &Path,
+    path: &Path,
     mode: u32,
     content: &mut dyn Read,
     budget: &Budget<'_>,
@@ -97,7 +96,7 @@ pub(super) fn write_new(
     let mut file = OpenOptions::new()
         .write(true)
         .create_new(true)
-        .open(place)?;
+        .open(path)?;
     file.set_permissions(Permissions::from_mode(file_mode))?;
     let mut buffer = vec![0; 64 << 10];
     loop {
@@ -105,9 +104,9 @@ pub(super) fn write_new(
             Ok(0) => return Ok(()),
             Ok(read) => read,
             Err(error) if error.kind() == io::ErrorKind::Interrupted => continue,
-            Err(error) => return Err(BundleError::reading(entry)(error)),
+            Err(error) => return Err(BundleError::on_read(entry)(error)),
         };
-        budget.content(entry, read)?;
+        budget.count_content(entry, read)?;
         file.write_all(&buffer[..read])?;
     }
 }

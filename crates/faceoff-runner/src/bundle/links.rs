@@ -2,18 +2,18 @@ use super::{error::BundleError, node::Node};
 use std::collections::BTreeMap;
 
 /// As many links as Linux follows on one path.
-const MOST_LINKS: usize = 40;
+const MAX_LINKS: usize = 40;
 
 /// Follows the link at `path` through the tree as the system would. A step above the bundle's
 /// folder `root` (a path in the tree, empty for its top) is an escape, even if the path returns.
-/// A target that does not exist is harmless as long as it would be inside. `followed` is told how long each
-/// target is that is taken apart, and each name that is looked up, and ends a walk that is too long.
+/// A target that does not exist is harmless as long as it would be inside. `count_bytes` gets the length of each
+/// target and of each name that is looked up, and ends a walk that is too long.
 pub(super) fn check(
     nodes: &BTreeMap<String, Node>,
     root: &str,
     path: &str,
     target: &str,
-    followed: &mut dyn FnMut(usize) -> Result<(), BundleError>,
+    count_bytes: &mut dyn FnMut(usize) -> Result<(), BundleError>,
 ) -> Result<(), String> {
     let leaves = || format!("is a link that leaves the bundle: {target:?}");
     let inside =
@@ -21,9 +21,9 @@ pub(super) fn check(
     let mut at: Vec<String> = path.split('/').map(str::to_owned).collect();
     at.pop();
     let mut links = 1;
-    let mut count = |name: &str| followed(name.len()).map_err(|error| error.to_string());
+    let mut count = |name: &str| count_bytes(name.len()).map_err(|error| error.to_string());
     count(target)?;
-    // What is still to be walked, the next part last.
+    // The remaining parts of the walk, the next one last.
     let mut todo: Vec<String> = parts(target).ok_or_else(leaves)?;
     while let Some(part) = todo.pop() {
         if part == ".." {
@@ -37,7 +37,7 @@ pub(super) fn check(
         count(&name)?;
         if let Some(Node::Link { target: next }) = nodes.get(&name) {
             links += 1;
-            if links > MOST_LINKS {
+            if links > MAX_LINKS {
                 return Err(format!("is a link that leads in a circle: {target:?}"));
             }
             at.pop();
@@ -83,7 +83,7 @@ mod tests {
     }
 
     #[test]
-    fn links_inside_stay() {
+    fn links_inside_are_accepted() {
         assert!(check_all(
             "",
             &[
@@ -97,7 +97,7 @@ mod tests {
     }
 
     #[test]
-    fn links_outside_are_found() {
+    fn links_outside_are_refused() {
         assert!(!check_all("", &[("a", "/etc/passwd")]));
         assert!(!check_all("", &[("a", "..")]));
         assert!(!check_all("", &[("a/b", "../../c")]));
@@ -113,7 +113,7 @@ mod tests {
     }
 
     #[test]
-    fn a_link_through_a_link_is_followed_not_read_as_text() {
+    fn link_through_a_link_is_followed() {
         // As text, deep/up/.. is deep; followed, deep/up is the root and its parent is outside.
         assert!(!check_all(
             "",
@@ -123,7 +123,7 @@ mod tests {
     }
 
     #[test]
-    fn circles_end() {
+    fn link_cycles_are_refused() {
         assert!(!check_all("", &[("a", "b"), ("b", "a")]));
         assert!(!check_all("", &[("a", "a/x")]));
     }

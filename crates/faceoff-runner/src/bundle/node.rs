@@ -1,11 +1,11 @@
-/// What an entry of the archive became.
+/// The node in the tree that an entry of the archive becomes.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) enum Node {
     Folder {
-        /// The archive has an entry for it, not only for something inside.
+        /// The archive has an entry for the folder itself, not only for something inside.
         named: bool,
-        /// It is on the disk: a folder is made when something is put into it, or at the end.
-        is_made: bool,
+        /// It exists on the disk: a folder is created when something is put into it, or at the end.
+        is_created: bool,
     },
     File,
     Link {

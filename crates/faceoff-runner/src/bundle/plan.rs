@@ -5,21 +5,21 @@ use super::{
 };
 use std::collections::BTreeMap;
 
-/// The names of an archive and what they are, in memory. What an entry is refused for before its content is
-/// looked at (name, mode, place, number) is refused here.
+/// The names and kinds of an archive's entries, in memory. Checks everything that does not depend on the content:
+/// names, modes, paths and numbers.
 pub(super) struct Plan {
     nodes: BTreeMap<String, Node>,
-    /// Most files and links, and most folders.
-    most: u64,
+    /// Maximum number of files and links, and maximum number of folders.
+    max: u64,
     files: u64,
     folders: u64,
 }
 
 impl Plan {
-    pub fn new(most: u64) -> Self {
+    pub fn new(max: u64) -> Self {
         Self {
             nodes: BTreeMap::new(),
-            most,
+            max,
             files: 0,
             folders: 0,
         }
@@ -33,30 +33,30 @@ impl Plan {
         self.nodes
     }
 
-    /// Adds a folder that the archive names.
+    /// Adds a folder that has its own entry.
     pub fn add_folder(&mut self, entry: &str, mode: u32) -> Result<(), BundleError> {
         check_mode(entry, mode)?;
         let path = normalise(entry)?;
         if path.is_empty() {
             return Ok(());
         }
-        self.place_folder(entry, &path, true)
+        self.insert_folder(entry, &path, true)
     }
 
     /// Adds a file. Returns its path.
     pub fn add_file(&mut self, entry: &str, mode: u32) -> Result<String, BundleError> {
         check_mode(entry, mode)?;
-        self.place(entry, Node::File)
+        self.insert_node(entry, Node::File)
     }
 
-    /// Adds a symbolic link. Where it leads can be checked when all names are known.
+    /// Adds a symbolic link. Its target is checked later, when all names are known.
     pub fn add_link(&mut self, entry: &str, target: &str) -> Result<(), BundleError> {
         let target = target.to_owned();
-        self.place(entry, Node::Link { target })?;
+        self.insert_node(entry, Node::Link { target })?;
         Ok(())
     }
 
-    /// Adds another name of a file that the archive has brought already. Returns the path of that file and the new one.
+    /// Adds another name of an earlier file of the archive. Returns the path of that file and the new path.
     pub fn add_hard_link(
         &mut self,
         entry: &str,
@@ -71,21 +71,21 @@ impl Plan {
                 ),
             ));
         }
-        let path = self.place(entry, Node::File)?;
+        let path = self.insert_node(entry, Node::File)?;
         Ok((existing, path))
     }
 
-    /// The folders on the way to `path` that are not on the disk, the topmost first.
+    /// The parent folders of `path` that do not exist on the disk yet, the topmost first.
     pub fn missing_folders(&self, path: &str) -> Vec<String> {
         let is_missing = |folder: &str| {
             matches!(
                 self.nodes.get(folder),
-                Some(Node::Folder { is_made: false, .. })
+                Some(Node::Folder { is_created: false, .. })
             )
         };
         let mut missing = Vec::new();
         let mut rest = path;
-        // What leads to a folder on the disk is there, too.
+        // The parents of an existing folder exist, too.
         while let Some((folder, _)) = rest.rsplit_once('/') {
             if !is_missing(folder) {
                 break;
@@ -97,38 +97,38 @@ impl Plan {
         missing
     }
 
-    /// A folder is on the disk from now on.
-    pub fn set_made(&mut self, folder: &str) {
-        if let Some(Node::Folder { is_made, .. }) = self.nodes.get_mut(folder) {
-            *is_made = true;
+    /// Marks a folder as existing on the disk.
+    pub fn set_created(&mut self, folder: &str) {
+        if let Some(Node::Folder { is_created, .. }) = self.nodes.get_mut(folder) {
+            *is_created = true;
         }
     }
 
-    /// Takes a place for something that is no folder.
-    fn place(&mut self, entry: &str, node: Node) -> Result<String, BundleError> {
+    /// Adds a node that is not a folder.
+    fn insert_node(&mut self, entry: &str, node: Node) -> Result<String, BundleError> {
         let path = normalise(entry)?;
         if path.is_empty() {
             return Err(invalid(entry, "is the root, but not a folder"));
         }
         if let Some((parent, _)) = path.rsplit_once('/') {
-            self.place_folder(entry, parent, false)?;
+            self.insert_folder(entry, parent, false)?;
         }
         if self.nodes.contains_key(&path) {
             return Err(invalid(entry, "is in the archive twice"));
         }
         self.files += 1;
-        if self.files > self.most {
+        if self.files > self.max {
             return Err(BundleError::Invalid(format!(
                 "the archive has more than {} files",
-                self.most
+                self.max
             )));
         }
         self.nodes.insert(path.clone(), node);
         Ok(path)
     }
 
-    /// Takes places for a folder and those on the way to it: some hundred at most, since a path is short.
-    fn place_folder(&mut self, entry: &str, path: &str, named: bool) -> Result<(), BundleError> {
+    /// Adds a folder and its parents; these are a few hundred at most, because the length of a path is limited.
+    fn insert_folder(&mut self, entry: &str, path: &str, named: bool) -> Result<(), BundleError> {
         match self.nodes.get_mut(path) {
             Some(Node::Folder { named: before, .. }) => {
                 if named && *before {
@@ -152,18 +152,18 @@ impl Plan {
             None => {}
         }
         if let Some((parent, _)) = path.rsplit_once('/') {
-            self.place_folder(entry, parent, false)?;
+            self.insert_folder(entry, parent, false)?;
         }
         self.folders += 1;
-        if self.folders > self.most {
+        if self.folders > self.max {
             return Err(BundleError::Invalid(format!(
                 "the archive has more than {} folders",
-                self.most
+                self.max
             )));
         }
-        let is_made = false;
+        let is_created = false;
         self.nodes
-            .insert(path.to_owned(), Node::Folder { named, is_made });
+            .insert(path.to_owned(), Node::Folder { named, is_created });
         Ok(())
     }
 }

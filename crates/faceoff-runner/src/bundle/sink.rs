@@ -1,7 +1,7 @@
 use super::error::BundleError;
 use std::io::Read;
 
-/// What an archive's entries become.
+/// Receives the entries of an archive.
 pub(super) trait Sink {
     fn folder(&mut self, entry: &str, mode: u32) -> Result<(), BundleError>;
     /// A file, its content streamed.
@@ -9,14 +9,14 @@ pub(super) trait Sink {
     fn link(&mut self, entry: &str, target: &str) -> Result<(), BundleError>;
     /// Another name of a file.
     fn hard_link(&mut self, entry: &str, target: &str) -> Result<(), BundleError>;
-    /// What is none of these.
+    /// An entry of any other kind.
     fn special(&mut self, entry: &str, special: Special) -> Result<(), BundleError>;
 }
 
-/// What has no content.
+/// An entry without content.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Special {
-    /// The device 0/0, which overlayfs has for what it hides.
+    /// The device 0/0, with which overlayfs marks hidden files.
     NullDevice,
     Device,
     Pipe,

@@ -1,5 +1,5 @@
 use super::{
-    budget::{Budget, Metered},
+    budget::{Budget, MeteredReader},
     entry::unusable,
     error::BundleError,
     sink::{Sink, Special},
@@ -7,11 +7,11 @@ use super::{
 use std::io::{self, Read};
 use tar::{Archive, EntryType, Header};
 
-/// Longest header that only describes the next entry (long names, extended attributes). Larger
-/// ones would have to be held in memory, and no honest bundle has one.
+/// Longest header that only describes the next entry (long names, extended attributes). Headers are held in memory,
+/// and no honest bundle has a longer one.
 const EXTENSION_MAX_BYTES: u64 = 1 << 20;
 
-/// What extension headers say about the entry that follows.
+/// Values of extension headers for the following entry.
 #[derive(Default)]
 struct Extensions {
     path: Option<Vec<u8>>,
@@ -22,22 +22,22 @@ struct Extensions {
 
 /// Unpacks a decompressed tar stream.
 ///
-/// The headers are read raw, since the library would hold an extension header of any size in
-/// memory. What follows the archive's end is not read.
+/// The headers are read raw, because the library would hold an extension header of any size in memory. Bytes after the
+/// archive's end are not read.
 pub(super) fn unpack<'a>(
     reader: impl Read,
     sink: &mut impl Sink,
     budget: &'a Budget<'a>,
 ) -> Result<(), BundleError> {
-    let mut archive = Archive::new(Metered::new(reader, budget));
+    let mut archive = Archive::new(MeteredReader::new(reader, budget));
     let mut extensions = Extensions::default();
     for entry in archive
         .entries()
-        .map_err(BundleError::reading(""))?
+        .map_err(BundleError::on_read(""))?
         .raw(true)
     {
-        let mut entry = entry.map_err(BundleError::reading(""))?;
-        budget.entry()?;
+        let mut entry = entry.map_err(BundleError::on_read(""))?;
+        budget.count_entry()?;
         let kind = entry.header().entry_type();
         match kind {
             EntryType::GNULongName => extensions.path = Some(read_name(&mut entry)?),
@@ -46,29 +46,29 @@ pub(super) fn unpack<'a>(
                 let bytes = read_extension(&mut entry)?;
                 read_pax(&bytes, &mut extensions)?;
             }
-            // Comments about the whole archive, as `git archive` writes them.
+            // Comments on the whole archive, as `git archive` writes them.
             EntryType::XGlobalHeader => {
                 read_extension(&mut entry)?;
             }
             _ => {
-                let told = std::mem::take(&mut extensions);
+                let extended = std::mem::take(&mut extensions);
                 let header = entry.header();
-                let path = told
+                let path = extended
                     .path
                     .unwrap_or_else(|| header.path_bytes().into_owned());
                 let name = text(path)?;
-                if told.is_sparse {
+                if extended.is_sparse {
                     return Err(sparse(&name));
                 }
-                // A size beyond the header's field is beyond every limit; another one would make readers
-                // disagree about where the next entry starts.
-                if told.size.is_some_and(|size| size != entry.size()) {
+                // A size that does not fit into the header's field exceeds every limit. A different size would make
+                // readers disagree about the start of the next entry.
+                if extended.size.is_some_and(|size| size != entry.size()) {
                     return Err(BundleError::Invalid(format!(
                         "the archive states a size outside of its header, near entry {name:?}"
                     )));
                 }
-                let mode = mode(header).map_err(BundleError::reading(&name))?;
-                let link = told.link;
+                let mode = mode(header).map_err(BundleError::on_read(&name))?;
+                let link = extended.link;
                 let link = link.or_else(|| header.link_name_bytes().map(|link| link.into_owned()));
                 match kind {
                     EntryType::Regular | EntryType::Continuous if name.ends_with('/') => {
@@ -85,11 +85,11 @@ pub(super) fn unpack<'a>(
                     EntryType::Link => sink.hard_link(&name, &text(link.unwrap_or_default())?)?,
                     EntryType::Char | EntryType::Block => {
                         // An empty field is 0.
-                        let is =
+                        let is_zero =
                             |part: io::Result<Option<u32>>| part.ok().flatten().unwrap_or(0) == 0;
                         let is_null = kind == EntryType::Char
-                            && is(header.device_major())
-                            && is(header.device_minor());
+                            && is_zero(header.device_major())
+                            && is_zero(header.device_minor());
                         let special = if is_null {
                             Special::NullDevice
                         } else {
@@ -117,11 +117,11 @@ fn read_extension(entry: &mut tar::Entry<'_, impl Read>) -> Result<Vec<u8>, Bund
     let mut bytes = Vec::new();
     entry
         .read_to_end(&mut bytes)
-        .map_err(BundleError::reading(""))?;
+        .map_err(BundleError::on_read(""))?;
     Ok(bytes)
 }
 
-/// A name that is too long for a header, which ends with a zero.
+/// Reads a name that is too long for a header; it ends with a zero byte.
 fn read_name(entry: &mut tar::Entry<'_, impl Read>) -> Result<Vec<u8>, BundleError> {
     let mut bytes = read_extension(entry)?;
     if bytes.last() == Some(&0) {
@@ -130,20 +130,20 @@ fn read_name(entry: &mut tar::Entry<'_, impl Read>) -> Result<Vec<u8>, BundleErr
     Ok(bytes)
 }
 
-/// What a sink leaves of a file's content is skipped by reading it, which costs as much as writing it.
+/// Reads and counts the rest of a file's content that the sink has not read: skipping costs as much as writing.
 fn count_rest(name: &str, content: &mut impl Read, budget: &Budget<'_>) -> Result<(), BundleError> {
     let mut buffer = [0; 8 << 10];
     loop {
         match content.read(&mut buffer) {
             Ok(0) => return Ok(()),
-            Ok(read) => budget.content(name, read)?,
+            Ok(read) => budget.count_content(name, read)?,
             Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
-            Err(error) => return Err(BundleError::reading(name)(error)),
+            Err(error) => return Err(BundleError::on_read(name)(error)),
         }
     }
 }
 
-/// Who leaves the field empty says nothing of it.
+/// The mode of an entry; the default if the field is empty.
 fn mode(header: &Header) -> io::Result<u32> {
     let is_empty = |field: &[u8]| field.iter().all(|byte| matches!(byte, 0 | b' '));
     if is_empty(&header.as_old().mode) {
@@ -155,11 +155,12 @@ fn mode(header: &Header) -> io::Result<u32> {
 fn sparse(name: &str) -> BundleError {
     unusable(
         name,
-        "a sparse file, whose holes are left out: write it whole (tar without --sparse)",
+        "a sparse file, whose holes are left out: write it in full (tar without --sparse)",
     )
 }
 
-/// Each record is `LENGTH KEY=VALUE` and a line's end, the length being of all of it: values may hold lines, too.
+/// Reads pax records. Each is `LENGTH KEY=VALUE` and a newline; the length is that of the whole record, because values
+/// may contain newlines.
 fn read_pax(mut bytes: &[u8], found: &mut Extensions) -> Result<(), BundleError> {
     while !bytes.is_empty() {
         let (key, value, rest) = pax_record(bytes).ok_or_else(|| {
@@ -169,7 +170,7 @@ fn read_pax(mut bytes: &[u8], found: &mut Extensions) -> Result<(), BundleError>
         match key {
             b"path" => found.path = Some(value.to_vec()),
             b"linkpath" => found.link = Some(value.to_vec()),
-            // No number is a size that no header has.
+            // An invalid number becomes a size that no header has.
             b"size" => found.size = Some(number(value).unwrap_or(u64::MAX)),
             key if key.starts_with(b"GNU.sparse") => found.is_sparse = true,
             _ => {}
@@ -178,7 +179,7 @@ fn read_pax(mut bytes: &[u8], found: &mut Extensions) -> Result<(), BundleError>
     Ok(())
 }
 
-/// Key, value, and what follows.
+/// Key, value, and the remaining bytes.
 fn pax_record(bytes: &[u8]) -> Option<(&[u8], &[u8], &[u8])> {
     let space = bytes.iter().position(|&byte| byte == b' ')?;
     let length = usize::try_from(number(&bytes[..space])?).ok()?;

@@ -1,6 +1,6 @@
 use super::{
     budget::Budget,
-    entry::{FOLDER_MODE, check_target, invalid, make_folder, unusable, write_name, write_new},
+    entry::{FOLDER_MODE, check_target, invalid, make_folder, unusable, add_hard_link, write_new},
     error::BundleError,
     links,
     node::Node,
@@ -16,11 +16,11 @@ use std::{
     path::{Path, PathBuf},
 };
 
-/// The folder that grows while an archive is read. What is in it is known from memory, never asked
-/// back from the disk, and symbolic links are made last: nothing can be written through one.
+/// The folder that is filled while an archive is read. Its content is known from memory and never read back from the
+/// disk, and symbolic links are created last, so nothing can be written through a link.
 ///
-/// A folder is made when a file is put into it, or at the end: an archive of too many folders is refused before
-/// there is one of them to be made, and to be removed again, which is slower still.
+/// A folder is created when a file is put into it, or at the end. So an archive with too many folders is refused before
+/// any is created; removing them would be slower still.
 pub(super) struct Tree<'a> {
     into: PathBuf,
     budget: &'a Budget<'a>,
@@ -43,32 +43,31 @@ impl<'a> Tree<'a> {
         })
     }
 
-    /// Where an archive that lists what it holds is checked before any of it is written.
+    /// The plan, for checking an archive with a directory before anything is written.
     pub fn plan_mut(&mut self) -> &mut Plan {
         &mut self.plan
     }
 
-    /// Forgets what has been checked, of which nothing is written: it comes again with its content.
-    pub fn forget_plan(&mut self) {
+    /// Resets the plan after that check: the entries come again with their contents.
+    pub fn reset_plan(&mut self) {
         self.plan = Plan::new(self.budget.limits().files);
     }
 
-    /// The place on the disk of something that is no folder, and those that lead there.
-    fn make_way(&mut self, path: &str) -> Result<PathBuf, BundleError> {
+    /// Creates the parent folders of `path`; returns its path on the disk.
+    fn make_parents(&mut self, path: &str) -> Result<PathBuf, BundleError> {
         for folder in self.plan.missing_folders(path) {
             make_folder(&self.into.join(&folder))?;
-            self.plan.set_made(&folder);
+            self.plan.set_created(&folder);
         }
         Ok(self.into.join(path))
     }
 
-    /// The folder and what is in it, if it is not to be finished as a bundle: no links are made, and no folders
-    /// that hold no file.
+    /// The folder and its content, without finishing it as a bundle: symbolic links and empty folders are not created.
     pub fn into_parts(self) -> (PathBuf, BTreeMap<String, Node>) {
         (self.into, self.plan.into_nodes())
     }
 
-    /// The folder that holds `manifest`: the root (an empty path) or the single top folder.
+    /// The folder that contains `manifest`: the root (an empty path) or the single top-level folder.
     pub fn bundle_root(&self, manifest: &str) -> Option<String> {
         let nodes = self.plan.nodes();
         if nodes.contains_key(manifest) {
@@ -85,9 +84,9 @@ impl<'a> Tree<'a> {
         }
     }
 
-    /// What is refused may be something else than a bundle, and then it helps to hear of it.
+    /// Adds a hint to an error if the archive looks like a container's file system or a nested archive.
     pub fn explain_refusal(&self, error: BundleError) -> BundleError {
-        let BundleError::Invalid(told) = error else {
+        let BundleError::Invalid(message) = error else {
             return error;
         };
         let nodes = self.plan.nodes();
@@ -96,31 +95,31 @@ impl<'a> Tree<'a> {
         let only_top = tops.next().filter(|_| tops.next().is_none());
         BundleError::Invalid(match only_top {
             _ if has(".dockerenv") || (has("etc") && has("usr") && !has("agent.toml")) => format!(
-                "{told}. This looks like the file system of a container (`docker export`): send its image, as \
+                "{message}. This looks like the file system of a container (`docker export`): send its image, as \
                  `docker save` writes it"
             ),
             Some((name, Node::File)) if name.ends_with(".tar") => format!(
-                "{told}. There is only {name:?}, itself an archive: if it is a container image, send that"
+                "{message}. There is only {name:?}, itself an archive: if it is a container image, send that"
             ),
-            _ => told,
+            _ => message,
         })
     }
 
-    /// Checks that every link stays inside of the bundle's folder `root`, then makes the folders that are not there
-    /// yet and, last, the links.
+    /// Checks that every link stays inside of the bundle's folder `root`, then creates the missing folders and, last,
+    /// the links.
     pub fn finish(self, root: &str) -> Result<(), BundleError> {
         let nodes = self.plan.nodes();
         for (path, node) in nodes {
             if let Node::Link { target } = node {
                 links::check(nodes, root, path, target, &mut |bytes| {
-                    self.budget.followed(bytes)
+                    self.budget.count_link_bytes(bytes)
                 })
                 .map_err(|problem| invalid(path, problem))?;
             }
         }
-        // A folder comes before what is in it.
+        // The sort order puts a folder before its content.
         for (path, node) in nodes {
-            if let Node::Folder { is_made: false, .. } = node {
+            if let Node::Folder { is_created: false, .. } = node {
                 self.budget.check()?;
                 make_folder(&self.into.join(path))?;
             }
@@ -135,28 +134,28 @@ impl<'a> Tree<'a> {
 }
 
 impl Sink for Tree<'_> {
-    /// Made by [`Tree::finish`], or with the first file in it.
+    /// Created by [`Tree::finish`], or with the first file in it.
     fn folder(&mut self, entry: &str, mode: u32) -> Result<(), BundleError> {
         self.plan.add_folder(entry, mode)
     }
 
     fn file(&mut self, entry: &str, mode: u32, content: &mut dyn Read) -> Result<(), BundleError> {
         let path = self.plan.add_file(entry, mode)?;
-        let place = self.make_way(&path)?;
-        write_new(entry, &place, mode, content, self.budget)
+        let path_on_disk = self.make_parents(&path)?;
+        write_new(entry, &path_on_disk, mode, content, self.budget)
     }
 
-    /// Checked and made by [`Tree::finish`].
+    /// Checked and created by [`Tree::finish`].
     fn link(&mut self, entry: &str, target: &str) -> Result<(), BundleError> {
         check_target(entry, target)?;
         self.plan.add_link(entry, target)
     }
 
-    /// Of a file that the archive has brought already.
+    /// The target must be an earlier file of the archive.
     fn hard_link(&mut self, entry: &str, target: &str) -> Result<(), BundleError> {
         let (existing, path) = self.plan.add_hard_link(entry, target)?;
-        let place = self.make_way(&path)?;
-        write_name(entry, &self.into.join(existing), &place)
+        let path_on_disk = self.make_parents(&path)?;
+        add_hard_link(entry, &self.into.join(existing), &path_on_disk)
     }
 
     fn special(&mut self, entry: &str, special: Special) -> Result<(), BundleError> {

@@ -1,5 +1,5 @@
 use super::{
-    budget::{Budget, Metered},
+    budget::{Budget, MeteredReader},
     entry::unusable,
     error::BundleError,
     plan::Plan,
@@ -25,7 +25,7 @@ const KIND_LINK: u32 = 0o120_000;
 /// Longest target of a symbolic link, in bytes.
 const LINK_MAX_BYTES: u64 = 4096;
 
-/// What the central directory says of an entry.
+/// An entry in the central directory.
 struct Header {
     name: String,
     mode: u32,
@@ -60,7 +60,7 @@ impl Header {
         ) {
             return Err(unusable(&name, "compressed by another method than deflate"));
         }
-        // The library's own translation hides set-id bits, which are to be refused.
+        // The library's own conversion hides set-id bits, which must be refused.
         let mode = match (entry.system(), entry.external_attributes() >> 16) {
             (System::Dos, _) | (_, 0) => entry.unix_mode().unwrap_or(0o644),
             (_, mode) => mode,
@@ -76,28 +76,28 @@ impl Header {
     }
 }
 
-/// Unpacks a zip archive, entry by entry as its central directory lists them: the directory is
-/// never held in memory, and two entries of one name are both seen. (The library's indexed reader
-/// does neither; its iterating one may change between versions, which the lock file pins.)
+/// Unpacks a zip archive, entry by entry in the order of its central directory. The directory is never held in memory
+/// as a whole, and two entries with the same name are both seen. (The library's indexed reader does neither; its
+/// iterating reader may change between versions, which the lock file pins.)
 ///
-/// The directory is read twice: what can be refused for what it says is refused before anything is written.
+/// The directory is read twice, so that everything wrong in it is refused before anything is written.
 ///
-/// What is read of the file is counted, since its entries may overlap: each of them could have the same
-/// bytes decompressed again, which need not come to anything.
+/// The read bytes are counted, because entries may overlap: each entry could make the same bytes be decompressed again,
+/// without any output.
 pub(super) fn unpack<'a>(
     file: BufReader<File>,
     packed: u64,
     tree: &mut Tree<'a>,
     budget: &'a Budget<'a>,
 ) -> Result<(), BundleError> {
-    // Each byte is needed about once, those of the directory once more to check it, and to find the directory behind
-    // what an archive may begin with is a search. An entry's own share covers its seeks in both passes.
+    // Each byte is needed about once, and those of the directory once more for its check. Finding the directory behind
+    // a prefix of the archive is a search. The allowance per entry covers the seeks of both passes.
     budget.allow(3 * packed);
-    let file = Metered::new(file, budget);
+    let file = MeteredReader::new(file, budget);
     let mut archive =
         ZipIterable::try_new(file, Config::default()).map_err(|error| damaged("", error))?;
     check_directory(&mut archive, tree.plan_mut(), budget)?;
-    tree.forget_plan();
+    tree.reset_plan();
     let mut archive = archive.enforce_header_consistency(true);
     let files = archive.files().map_err(|error| damaged("", error))?;
     while let Some(entry) = files.next() {
@@ -114,7 +114,7 @@ pub(super) fn unpack<'a>(
                 (&mut content)
                     .take(LINK_MAX_BYTES)
                     .read_to_end(&mut target)
-                    .map_err(BundleError::reading(&name))?;
+                    .map_err(BundleError::on_read(&name))?;
                 let target = String::from_utf8(target)
                     .map_err(|_| unusable(&name, "a link to a name that is not UTF-8"))?;
                 tree.link(&name, &target)?;
@@ -124,8 +124,8 @@ pub(super) fn unpack<'a>(
     Ok(())
 }
 
-/// Checks all that needs no content. Local headers are not looked at: those lie all over the archive, where the
-/// directory is in one piece.
+/// Checks everything that needs no content. Local headers are not read, because they are spread over the archive; the
+/// directory is contiguous.
 fn check_directory<R: Read + Seek>(
     archive: &mut ZipIterable<R>,
     plan: &mut Plan,
@@ -133,15 +133,15 @@ fn check_directory<R: Read + Seek>(
 ) -> Result<(), BundleError> {
     for entry in archive.files().map_err(|error| damaged("", error))? {
         let entry = entry.map_err(|error| damaged("", error))?;
-        budget.entry()?;
+        budget.count_entry()?;
         let Header { name, mode, kind } = Header::of(&entry)?;
         match kind {
             Kind::Folder => plan.add_folder(&name, mode)?,
             Kind::File => {
                 plan.add_file(&name, mode)?;
-                budget.stated(&name, entry.size())?;
+                budget.count_stated(&name, entry.size())?;
             }
-            // Where it leads is its content.
+            // The target is the content of the entry, which is not read yet.
             Kind::Link => plan.add_link(&name, "")?,
         }
     }
@@ -150,7 +150,7 @@ fn check_directory<R: Read + Seek>(
 
 fn damaged(entry: &str, error: ZipError) -> BundleError {
     match error {
-        ZipError::Io(error) => BundleError::reading(entry)(error),
+        ZipError::Io(error) => BundleError::on_read(entry)(error),
         other if entry.is_empty() => {
             BundleError::Invalid(format!("the archive is damaged: {other}"))
         }

@@ -1,46 +1,47 @@
-//! Both sides are asked before either is waited for, and whatever one does, the other's clock is its own. Where both
-//! share CPUs, who has answered is frozen until it is asked again: it would compute in the other's time.
+//! Runs both sides of a game in lock-step. Both sides get their question before the evaluator waits for either, and
+//! neither can affect the other's clock. If both share CPUs, a side that has answered is frozen until its next
+//! question, because it would otherwise compute in the other's time.
 
 use super::side_player::SidePlayer;
 use crate::{calibration::Calibration, fault::PlatformFault, session::Session};
-use faceoff_episode::{GameCourse, GameSink, Question};
+use faceoff_episode::{RunningGame, GameSink, Question};
 use faceoff_sandbox::{Layer, SandboxError};
 use faceoff_types::{Side, TimeLimits};
 use std::time::{Duration, Instant};
 
-/// What takes longer than this while one side is seen to has kept us from looking at the other.
-const AWAY: Duration = Duration::from_millis(1);
+/// If handling one side takes longer than this, it counts as absence of the evaluator for the other side.
+const MIN_ABSENCE: Duration = Duration::from_millis(1);
 
-/// What becomes of a side that has answered before the other one.
+/// Handling of a side that has answered before the other one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum OnceAnswered {
-    /// It has CPUs of its own.
-    GoesOn,
-    /// It is frozen until it is asked again.
-    IsFrozen,
+pub(super) enum AfterAnswer {
+    /// It has its own CPUs and continues.
+    Continue,
+    /// It is frozen until its next question.
+    Freeze,
 }
 
-/// Plays a game to its end; `cancelled` is asked before each step.
+/// Runs a game to its end; `cancelled` is called before each step.
 pub(super) fn play<S: GameSink>(
-    course: &mut GameCourse<S>,
+    game: &mut RunningGame<S>,
     sides: &mut [SidePlayer<'_>; 2],
     calibrations: &mut [Calibration; 2],
-    answered: OnceAnswered,
+    after_answer: AfterAnswer,
     cancelled: impl Fn(&mut S) -> bool,
 ) -> Result<(), PlatformFault> {
-    while course.end().is_none() {
-        get_ready(course, sides, answered)?;
-        let (rally, mut steps) = (course.rally(), 0);
-        while course.is_in_rally() {
-            if cancelled(course.sink()) {
+    while game.end().is_none() {
+        start_rally(game, sides, after_answer)?;
+        let (rally, mut steps) = (game.rally(), 0);
+        while game.is_in_rally() {
+            if cancelled(game.sink()) {
                 return Err(PlatformFault::Cancelled);
             }
-            step(course, sides, answered)?;
+            step(game, sides, after_answer)?;
             steps += 1;
         }
         for side in &mut *sides {
-            side.tell_end(rally, steps)?;
-            rest(side, answered);
+            side.send_end(rally, steps)?;
+            freeze_idle(side, after_answer);
         }
         for calibration in &mut *calibrations {
             calibration.between_episodes()?;
@@ -52,48 +53,48 @@ pub(super) fn play<S: GameSink>(
     Ok(())
 }
 
-/// Starts who must be started, announces the rally to both, and begins it.
-fn get_ready<S: GameSink>(
-    course: &mut GameCourse<S>,
+/// Starts the agents that are not running, announces the rally to both sides, and begins it.
+fn start_rally<S: GameSink>(
+    game: &mut RunningGame<S>,
     sides: &mut [SidePlayer<'_>; 2],
-    answered: OnceAnswered,
+    after_answer: AfterAnswer,
 ) -> Result<(), PlatformFault> {
-    let rally = course.rally();
+    let rally = game.rally();
     let [first, second] = sides;
-    rest(second, answered);
+    freeze_idle(second, after_answer);
     let first_started = first.start()?;
-    rest(first, answered);
+    freeze_idle(first, after_answer);
     let second_started = second.start()?;
-    if answered == OnceAnswered::IsFrozen && !(first.can_freeze() && second.can_freeze()) {
+    if after_answer == AfterAnswer::Freeze && !(first.can_freeze() && second.can_freeze()) {
         return Err(no_freezer().into());
     }
     ask_both(sides, |_, player| {
         player.ask(|session| session.send_reset(rally))
     })?;
-    wait_for_both(sides, answered)?;
+    wait_for_both(sides, after_answer)?;
     let [first, second] = sides;
     let entries = [first.entry(first_started), second.entry(second_started)];
-    course.start_rally(entries)?;
-    end_faulty(course, sides);
+    game.start_rally(entries)?;
+    end_faulty(game, sides);
     Ok(())
 }
 
-/// Stops a side that is asked nothing, until it is asked again.
-fn rest(side: &mut SidePlayer<'_>, answered: OnceAnswered) {
-    if answered == OnceAnswered::IsFrozen {
+/// Freezes a side without a pending question until its next question.
+fn freeze_idle(side: &mut SidePlayer<'_>, after_answer: AfterAnswer) {
+    if after_answer == AfterAnswer::Freeze {
         side.freeze();
     }
 }
 
-/// Asks both for one step and plays it.
+/// Requests one step from both sides and simulates it.
 fn step<S: GameSink>(
-    course: &mut GameCourse<S>,
+    game: &mut RunningGame<S>,
     sides: &mut [SidePlayer<'_>; 2],
-    answered: OnceAnswered,
+    after_answer: AfterAnswer,
 ) -> Result<(), PlatformFault> {
     let questions = [
-        course.question(Side::First)?,
-        course.question(Side::Second)?,
+        game.question(Side::First)?,
+        game.question(Side::Second)?,
     ];
     ask_both(sides, |side, player| match questions[side.index()] {
         Some(Question { step, observation }) => {
@@ -101,25 +102,25 @@ fn step<S: GameSink>(
         }
         None => Ok(()),
     })?;
-    wait_for_both(sides, answered)?;
+    wait_for_both(sides, after_answer)?;
     let [first, second] = &*sides;
-    course.answer([first.response(), second.response()])?;
-    end_faulty(course, sides);
+    game.answer([first.response(), second.response()])?;
+    end_faulty(game, sides);
     Ok(())
 }
 
-/// Ends the processes of who has a fault in this rally, if they run.
-fn end_faulty<S: GameSink>(course: &GameCourse<S>, sides: &mut [SidePlayer<'_>; 2]) {
+/// Kills the running processes of sides with a fault in this rally.
+fn end_faulty<S: GameSink>(game: &RunningGame<S>, sides: &mut [SidePlayer<'_>; 2]) {
     for (side, player) in Side::BOTH.into_iter().zip(sides) {
-        if let Some(fault) = course.fault(side)
-            && !player.is_noted()
+        if let Some(fault) = game.fault(side)
+            && !player.is_fault_logged()
         {
-            player.end_by(fault);
+            player.end_with_fault(fault);
         }
     }
 }
 
-/// Asks one after the other.
+/// Asks the first side, then the second.
 fn ask_both(
     sides: &mut [SidePlayer<'_>; 2],
     mut ask: impl FnMut(Side, &mut SidePlayer<'_>) -> Result<(), PlatformFault>,
@@ -128,71 +129,75 @@ fn ask_both(
     ask(Side::First, first)?;
     let before = Instant::now();
     ask(Side::Second, second)?;
-    tell_if_away(first, before);
+    record_absence(first, before);
     Ok(())
 }
 
-/// Waits until neither side's answer is due; the first that comes is taken first.
+/// Waits until neither side's answer is pending; takes the answers in the order of their arrival.
 fn wait_for_both(
     sides: &mut [SidePlayer<'_>; 2],
-    answered: OnceAnswered,
+    after_answer: AfterAnswer,
 ) -> Result<(), PlatformFault> {
     let [first, second] = sides;
     loop {
-        match (first.due(), second.due()) {
+        match (first.pending_session(), second.pending_session()) {
             (None, None) => return Ok(()),
-            (Some(_), None) => wait_for_last(first, second, answered)?,
-            (None, Some(_)) => wait_for_last(second, first, answered)?,
+            (Some(_), None) => wait_for_last(first, second, after_answer)?,
+            (None, Some(_)) => wait_for_last(second, first, after_answer)?,
             (Some(a), Some(b)) => {
-                Session::wait_for_any(&[a, b], Instant::now() + TimeLimits::LONGEST)?;
-                look(first, second)?;
-                look(second, first)?;
+                Session::wait_for_any(&[a, b], Instant::now() + TimeLimits::MAX_WAIT)?;
+                poll_side(first, second)?;
+                poll_side(second, first)?;
             }
         }
     }
 }
 
-/// For so long nobody is frozen for the other's sake: to freeze and thaw takes longer than most answers, and
-/// the little that can be computed meanwhile counts as the next step's, as in any game.
-const FREEZES_AFTER: Duration = Duration::from_micros(200);
+/// Delay before a side that has answered is frozen. Freezing and thawing takes longer than most answers, and CPU
+/// time used in this delay counts towards the next step, as in any game.
+const FREEZE_DELAY: Duration = Duration::from_micros(200);
 
-/// Waits for the side that is late, whose other has answered.
+/// Waits for the late side after the other has answered.
 fn wait_for_last(
     late: &mut SidePlayer<'_>,
     other: &mut SidePlayer<'_>,
-    answered: OnceAnswered,
+    after_answer: AfterAnswer,
 ) -> Result<(), PlatformFault> {
-    if answered == OnceAnswered::IsFrozen {
-        late.look(Instant::now() + FREEZES_AFTER)?;
-        if late.due().is_none() {
+    if after_answer == AfterAnswer::Freeze {
+        late.poll(Instant::now() + FREEZE_DELAY)?;
+        if late.pending_session().is_none() {
             return Ok(());
         }
         other.freeze();
     }
-    late.look(Instant::now() + TimeLimits::LONGEST)
+    late.poll(Instant::now() + TimeLimits::MAX_WAIT)
 }
 
 fn no_freezer() -> SandboxError {
     SandboxError::Unavailable {
         layer: Layer::CgroupCpu,
-        why: "the agents of a game share CPUs here, so that who has answered must be stopped until it is asked again, \
-              and this service may use no freezer of cgroups: give each side CPUs of its own (three for a slot), run the \
-              service as root, or hand it a cgroup of the freezer as of the other controllers"
+        reason: "the agents of a game share CPUs here, so that an agent that has answered must be frozen until its \
+                 next question, and this service may use no freezer of cgroups: give each side CPUs of its own (three \
+                 for a slot), run the service as root, or give it a cgroup of the freezer as of the other controllers"
             .to_owned(),
     }
 }
 
-/// Looks at one side. To learn how an agent ended may take seconds, which are not the other's.
-fn look(looked_at: &mut SidePlayer<'_>, other: &mut SidePlayer<'_>) -> Result<(), PlatformFault> {
+/// Checks one side for its answer. Diagnosing the exit of an agent may take seconds, which must not count for the
+/// other side.
+fn poll_side(
+    polled: &mut SidePlayer<'_>,
+    other: &mut SidePlayer<'_>,
+) -> Result<(), PlatformFault> {
     let before = Instant::now();
-    looked_at.look(before)?;
-    tell_if_away(other, before);
+    polled.poll(before)?;
+    record_absence(other, before);
     Ok(())
 }
 
-fn tell_if_away(other: &mut SidePlayer<'_>, since: Instant) {
-    let away = since.elapsed();
-    if away > AWAY {
-        other.was_not_looked_at(away);
+fn record_absence(other: &mut SidePlayer<'_>, since: Instant) {
+    let absence = since.elapsed();
+    if absence > MIN_ABSENCE {
+        other.add_absence(absence);
     }
 }

@@ -1,5 +1,5 @@
 use super::{
-    lock_step::{self, OnceAnswered},
+    lock_step::{self, AfterAnswer},
     side_player::SidePlayer,
 };
 use crate::{
@@ -7,50 +7,50 @@ use crate::{
     calibration::Calibration,
     config::AgentEnvironment,
     fault::PlatformFault,
-    host_watch::{Counters, HostWatch},
+    host_interference::{KernelCounters, InterferenceMonitor},
 };
 use faceoff_dataset::game::{GameArchives, GameRecorder, RecordedGame, clear_game};
 use faceoff_episode::{
-    Arena, FinishedGame, GameCourse, GameSink, GameStepRow, RallyRow, RallyStart, RecordError,
+    Arena, FinishedGame, RunningGame, GameSink, GameStepRow, RallyRow, RallyStart, RecordError,
 };
-use faceoff_sandbox::affinity::PinnedElsewhere;
+use faceoff_sandbox::affinity::AffinityGuard;
 use faceoff_types::Side;
 use faceoff_wire::game::{GameCalibration, GameSpec};
 use std::{fs, path::Path};
 
-/// Follows a game as it runs, and can stop it.
+/// Observes a running game, and can stop it.
 pub trait GameObserver {
-    fn rally_begun(&mut self, _start: &RallyStart<'_>) {}
-    /// A control step was played. Called as often as the game has steps, so it must be cheap.
-    fn stepped(&mut self, _row: &GameStepRow<'_>) {}
+    fn on_rally_start(&mut self, _start: &RallyStart<'_>) {}
+    /// A control step was simulated. Called for every step, so it must be cheap.
+    fn on_step(&mut self, _row: &GameStepRow<'_>) {}
     /// A rally is over.
-    fn rally_over(&mut self, _row: &RallyRow<'_>) {}
-    /// The end of an agent's standard error with its faults, once for each side, however the game ends: also
-    /// when it was cancelled or the platform failed, and there is no report.
+    fn on_rally_end(&mut self, _row: &RallyRow<'_>) {}
+    /// The end of an agent's standard error with its faults. Called exactly once for each side, even if there is no
+    /// report because the game was cancelled or the platform failed.
     fn log(&mut self, _side: Side, _log: &str) {}
-    /// Is the game to stop? Asked before each step, so it must be cheap.
+    /// Should the game stop? Called before each step, so it must be cheap.
     fn cancelled(&self) -> bool;
 }
 
-/// What a game yields, beside its recording.
+/// Results of a game, beside its recording.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GameReport {
     /// Score, outcome and the archives' hashes.
     pub archives: GameArchives,
-    /// How evenly the slot kept time for each side.
+    /// Timing noise of the slot for each side.
     pub calibration: GameCalibration,
-    /// The ends of both agents' standard errors, with their faults.
+    /// The ends of both agents' standard error, with their faults.
     pub logs: [String; 2],
 }
 
 const TABLES: &str = "tables.partial";
 
-/// Plays a game and records it in the folder `out`, which is created: `game.zip`, and `side-1.zip` and
-/// `side-2.zip`, which can be given to the teams. Arrays are the first side's first.
+/// Runs a game and records it in the folder `out`, which is created: `game.zip`, and `side-1.zip` and
+/// `side-2.zip` for the teams. In all arrays the first side comes first.
 ///
 /// # Errors
-/// The platform's alone, also if the host kept an agent from answering: then the game is to be played again.
-/// Faults of agents are in the report. [`PlatformFault::Cancelled`] when the observer said so.
+/// Platform faults only, including host interference that prevented an agent's answer: the game must be run again.
+/// Agent faults are in the report. [`PlatformFault::Cancelled`] if the observer cancelled the game.
 pub fn run_game(
     spec: &GameSpec,
     bundles: [&Bundle; 2],
@@ -58,32 +58,32 @@ pub fn run_game(
     out: &Path,
     observer: &mut dyn GameObserver,
 ) -> Result<GameReport, PlatformFault> {
-    run_game_watched(spec, bundles, envs, out, observer, [&Counters; 2])
+    run_game_monitored(spec, bundles, envs, out, observer, [&KernelCounters; 2])
 }
 
-/// [`run_game`] with other judges of what the host takes.
+/// [`run_game`] with other monitors of host interference.
 ///
 /// # Errors
 /// As [`run_game`].
-pub fn run_game_watched(
+pub fn run_game_monitored(
     spec: &GameSpec,
     bundles: [&Bundle; 2],
     envs: [&AgentEnvironment; 2],
     out: &Path,
     observer: &mut dyn GameObserver,
-    watches: [&dyn HostWatch; 2],
+    monitors: [&dyn InterferenceMonitor; 2],
 ) -> Result<GameReport, PlatformFault> {
     let clear =
         || clear_game(out).map_err(PlatformFault::io(format!("clearing {}", out.display())));
     clear()?;
     let tables = out.join(TABLES);
-    let report = record(spec, bundles, envs, out, &tables, observer, watches);
+    let report = record(spec, bundles, envs, out, &tables, observer, monitors);
     if report.is_err() {
         if let Err(error) = fs::remove_dir_all(&tables) {
-            tracing::debug!(%error, "no tables of a broken game to remove");
+            tracing::debug!(%error, "a failed game has left no tables to remove");
         }
         if let Err(error) = clear() {
-            tracing::warn!(%error, "what a broken game has left could not be removed");
+            tracing::warn!(%error, "the files of a failed game could not be removed");
         }
     }
     report
@@ -96,10 +96,10 @@ fn record(
     out: &Path,
     tables: &Path,
     observer: &mut dyn GameObserver,
-    watches: [&dyn HostWatch; 2],
+    monitors: [&dyn InterferenceMonitor; 2],
 ) -> Result<GameReport, PlatformFault> {
     let recorder = GameRecorder::create(tables)?;
-    let (played, calibration, logs) = play_game(spec, bundles, envs, recorder, observer, watches)?;
+    let (played, calibration, logs) = play_game(spec, bundles, envs, recorder, observer, monitors)?;
     let agents = bundles.map(|bundle| bundle.manifest.name.clone());
     let recorded = RecordedGame {
         spec,
@@ -115,8 +115,7 @@ fn record(
     })
 }
 
-/// Plays a game and tells `sink` of its steps. Returns what it came to, how evenly the slot kept time, and both
-/// agents' logs.
+/// Runs a game and sends its steps to `sink`. Returns the outcome, the slot's timing noise, and both agents' logs.
 ///
 /// # Errors
 /// As [`run_game`].
@@ -126,16 +125,16 @@ pub fn play_game<S: GameSink>(
     envs: [&AgentEnvironment; 2],
     sink: S,
     observer: &mut dyn GameObserver,
-    watches: [&dyn HostWatch; 2],
+    monitors: [&dyn InterferenceMonitor; 2],
 ) -> Result<(FinishedGame<S>, GameCalibration, [String; 2]), PlatformFault> {
     let [first, second] = envs;
     let agent_cpus = [&first.agent_cpus[..], &second.agent_cpus].concat();
-    let _pinned = PinnedElsewhere::than(&agent_cpus);
+    let _pinned = AffinityGuard::avoid(&agent_cpus);
     let mut calibrations = [
         Calibration::start(&first.agent_cpus)?,
         Calibration::start(&second.agent_cpus)?,
     ];
-    let arena = Arena::by(
+    let arena = Arena::with_ruleset(
         spec.ruleset,
         spec.profile,
         &spec.perturbations,
@@ -145,33 +144,33 @@ pub fn play_game<S: GameSink>(
     let mut sides = Side::BOTH.map(|side| {
         let at = side.index();
         let restart_s = spec.limits.restart_s;
-        SidePlayer::new(side, bundles[at], envs[at], restart_s, watches[at])
+        SidePlayer::new(side, bundles[at], envs[at], restart_s, monitors[at])
     });
-    let told = Told {
+    let observed = ObservedSink {
         sink,
         observer: &mut *observer,
     };
-    let mut course = GameCourse::begin(&arena, spec.steps, spec.limits.clone(), told);
-    // Outside of a sandbox nothing is counted.
-    let answered = if AgentEnvironment::share_cpus(envs) && envs.iter().all(|env| env.counts_cpus())
+    let mut game = RunningGame::begin(&arena, spec.steps, spec.limits.clone(), observed);
+    // Without a sandbox no CPU time is counted, so freezing is not needed.
+    let after_answer = if AgentEnvironment::share_cpus(envs) && envs.iter().all(|env| env.has_cpu_accounting())
     {
-        OnceAnswered::IsFrozen
+        AfterAnswer::Freeze
     } else {
-        OnceAnswered::GoesOn
+        AfterAnswer::Continue
     };
     let played = lock_step::play(
-        &mut course,
+        &mut game,
         &mut sides,
         &mut calibrations,
-        answered,
-        |told| told.observer.cancelled(),
+        after_answer,
+        |observed| observed.observer.cancelled(),
     );
     let ended = played.map(|()| {
         let FinishedGame {
             outcome,
             answer_times_s,
-            sink: Told { sink, .. },
-        } = course.finish();
+            sink: ObservedSink { sink, .. },
+        } = game.finish();
         FinishedGame {
             outcome,
             answer_times_s,
@@ -191,16 +190,16 @@ pub fn play_game<S: GameSink>(
     Ok((ended?, calibration, [first_log, second_log]))
 }
 
-/// A sink beside which somebody watches.
-struct Told<'o, S> {
+/// A sink that also notifies an observer.
+struct ObservedSink<'o, S> {
     sink: S,
     observer: &'o mut dyn GameObserver,
 }
 
-impl<S: GameSink> GameSink for Told<'_, S> {
+impl<S: GameSink> GameSink for ObservedSink<'_, S> {
     fn begin_rally(&mut self, start: &RallyStart<'_>) -> Result<(), RecordError> {
         self.sink.begin_rally(start)?;
-        self.observer.rally_begun(start);
+        self.observer.on_rally_start(start);
         Ok(())
     }
 
@@ -210,13 +209,13 @@ impl<S: GameSink> GameSink for Told<'_, S> {
 
     fn step(&mut self, row: &GameStepRow<'_>) -> Result<(), RecordError> {
         self.sink.step(row)?;
-        self.observer.stepped(row);
+        self.observer.on_step(row);
         Ok(())
     }
 
     fn end_rally(&mut self, row: &RallyRow<'_>) -> Result<(), RecordError> {
         self.sink.end_rally(row)?;
-        self.observer.rally_over(row);
+        self.observer.on_rally_end(row);
         Ok(())
     }
 }

@@ -1,76 +1,77 @@
 use crate::{
     bundle::Bundle,
     config::AgentEnvironment,
-    fault::{PlatformFault, Trouble},
-    host_watch::HostWatch,
+    fault::{PlatformFault, SessionError},
+    host_interference::InterferenceMonitor,
     log::Log,
     session::Session,
-    waited::Waited,
+    wait_breakdown::WaitBreakdown,
 };
-use faceoff_episode::{Answered, Entry, Response, SideFault};
-use faceoff_types::{AgentFault, Contest, Side, TimeLimits};
+use faceoff_episode::{AnswerTiming, RallyEntry, Response, SideFault};
+use faceoff_types::{AgentFault, AgentTask, Side, TimeLimits};
 use std::time::{Duration, Instant};
 
-/// One side of a game: its agent's process, which is started anew after a fault, and what is asked of it.
+/// One side of a game: its agent's process, which is restarted after a fault, and its current question.
 pub(super) struct SidePlayer<'a> {
     side: Side,
     bundle: &'a Bundle,
     env: &'a AgentEnvironment,
-    /// With the time that a restart may take.
+    /// Environment with the start-up limit of a restart.
     restart_env: AgentEnvironment,
-    watch: &'a dyn HostWatch,
-    /// None before its first rally and after a fault.
+    monitor: &'a dyn InterferenceMonitor,
+    /// `None` before its first rally and after a fault.
     session: Option<Session<'a>>,
     was_started: bool,
     /// Its fault in this rally is in the log.
-    is_noted: bool,
+    is_fault_logged: bool,
     asked: Instant,
-    /// What came of the last question; `None` while its answer is due, or if there was none.
-    came: Option<Result<Answered, Broken>>,
-    /// Whose time it was that ended it last, if it ended by an answer that did not come.
-    waited: Option<Waited>,
+    /// Result of the last question; `None` while its answer is pending, or if there is no question.
+    result: Option<Result<AnswerTiming, SideFailure>>,
+    /// The wait for the missing answer, if a timeout ended the agent.
+    wait: Option<WaitBreakdown>,
     log: Log,
     longest_stall_s: f64,
 }
 
-/// A side broke the protocol or a limit.
-pub(super) struct Broken {
+/// A violation of the protocol or of a limit by one side.
+pub(super) struct SideFailure {
     fault: SideFault,
-    /// For how long it was waited for.
-    answered: Answered,
-    waited: Option<Waited>,
+    /// Time until the violation.
+    timing: AnswerTiming,
+    wait: Option<WaitBreakdown>,
 }
 
-/// What came of a start, if one was needed.
-pub(super) enum Started {
+/// Result of a start; `startup_s` is `None` if the agent was running already.
+pub(super) enum StartResult {
     Ready { startup_s: Option<f64> },
     Failed { startup_s: f64, fault: SideFault },
 }
 
-impl Broken {
-    /// What is not the platform's; an answer that the host kept from coming is: the game is played again.
-    fn by(trouble: Trouble, asked: Instant) -> Result<Self, PlatformFault> {
-        let broken = |kind, line, waited: Option<Waited>| Self {
+impl SideFailure {
+    /// Separates agent faults from platform faults. A missing answer due to host interference is a platform fault: the
+    /// game is run again.
+    fn new(error: SessionError, asked: Instant) -> Result<Self, PlatformFault> {
+        let failure = |kind, line, wait: Option<WaitBreakdown>| Self {
             fault: SideFault { kind, line },
-            answered: match &waited {
-                Some(waited) => Answered {
-                    computation_time_s: waited.of_the_agent().as_secs_f64(),
-                    host_time_s: waited.host.as_secs_f64(),
-                    cpu_time_s: waited.cpu_time_s,
+            timing: match &wait {
+                Some(wait) => AnswerTiming {
+                    computation_time_s: wait.charged().as_secs_f64(),
+                    host_time_s: wait.host_interference.as_secs_f64(),
+                    cpu_time_s: wait.cpu_time_s,
                 },
-                None => Answered {
+                None => AnswerTiming {
                     computation_time_s: asked.elapsed().as_secs_f64(),
                     host_time_s: 0.0,
                     cpu_time_s: None,
                 },
             },
-            waited,
+            wait,
         };
-        match trouble {
-            Trouble::Agent { fault, line } => Ok(broken(fault, line, None)),
-            Trouble::Late { fault, waited } => Ok(broken(fault, None, Some(*waited))),
-            Trouble::Host { waited, .. } => Err(PlatformFault::HostBusy(*waited)),
-            Trouble::Platform(fault) => Err(fault),
+        match error {
+            SessionError::Agent { fault, line } => Ok(failure(fault, line, None)),
+            SessionError::TimedOut { fault, wait } => Ok(failure(fault, None, Some(*wait))),
+            SessionError::HostInterference { wait, .. } => Err(PlatformFault::HostBusy(*wait)),
+            SessionError::Platform(fault) => Err(fault),
         }
     }
 }
@@ -81,7 +82,7 @@ impl<'a> SidePlayer<'a> {
         bundle: &'a Bundle,
         env: &'a AgentEnvironment,
         restart_s: f64,
-        watch: &'a dyn HostWatch,
+        monitor: &'a dyn InterferenceMonitor,
     ) -> Self {
         let time = TimeLimits {
             startup_s: env.time.startup_s.min(restart_s),
@@ -95,23 +96,23 @@ impl<'a> SidePlayer<'a> {
                 time,
                 ..env.clone()
             },
-            watch,
+            monitor,
             session: None,
             was_started: false,
-            is_noted: false,
+            is_fault_logged: false,
             asked: Instant::now(),
-            came: None,
-            waited: None,
+            result: None,
+            wait: None,
             log: Log::new(env.limits.stderr_tail_bytes),
             longest_stall_s: 0.0,
         }
     }
 
     /// Starts the agent, if it is not running.
-    pub fn start(&mut self) -> Result<Started, PlatformFault> {
-        self.is_noted = false;
+    pub fn start(&mut self) -> Result<StartResult, PlatformFault> {
+        self.is_fault_logged = false;
         if self.session.is_some() {
-            return Ok(Started::Ready { startup_s: None });
+            return Ok(StartResult::Ready { startup_s: None });
         }
         let env = if self.was_started {
             &self.restart_env
@@ -119,93 +120,93 @@ impl<'a> SidePlayer<'a> {
             self.env
         };
         self.was_started = true;
-        self.came = None;
+        self.result = None;
         let begun = Instant::now();
-        let contest = Contest::Game { side: self.side };
-        match Session::start_watched(self.bundle, env, contest, self.watch) {
+        let agent_task = AgentTask::Game { side: self.side };
+        match Session::start_monitored(self.bundle, env, agent_task, self.monitor) {
             Ok(session) => {
                 let startup_s = Some(session.startup_s());
                 self.session = Some(session);
-                Ok(Started::Ready { startup_s })
+                Ok(StartResult::Ready { startup_s })
             }
-            Err((trouble, stderr)) => {
-                let broken = Broken::by(trouble, begun)?;
+            Err((error, stderr)) => {
+                let failure = SideFailure::new(error, begun)?;
                 self.log.add(&stderr, None);
-                self.waited = broken.waited;
-                Ok(Started::Failed {
-                    startup_s: broken.answered.computation_time_s,
-                    fault: broken.fault,
+                self.wait = failure.wait;
+                Ok(StartResult::Failed {
+                    startup_s: failure.timing.computation_time_s,
+                    fault: failure.fault,
                 })
             }
         }
     }
 
-    /// Asks something; what is known of it at once is kept.
+    /// Sends a question; an immediate failure becomes the result.
     pub fn ask(
         &mut self,
-        question: impl FnOnce(&mut Session<'_>) -> Result<(), Trouble>,
+        question: impl FnOnce(&mut Session<'_>) -> Result<(), SessionError>,
     ) -> Result<(), PlatformFault> {
         self.asked = Instant::now();
-        self.came = None;
+        self.result = None;
         let Some(session) = &mut self.session else {
             return Ok(());
         };
-        if let Err(trouble) = question(session) {
-            self.came = Some(Err(Broken::by(trouble, self.asked)?));
+        if let Err(error) = question(session) {
+            self.result = Some(Err(SideFailure::new(error, self.asked)?));
         }
         Ok(())
     }
 
-    /// The conversation, while an answer is due.
-    pub fn due(&self) -> Option<&Session<'a>> {
+    /// The session, while an answer is pending.
+    pub fn pending_session(&self) -> Option<&Session<'a>> {
         self.session
             .as_ref()
-            .filter(|session| self.came.is_none() && session.is_asked())
+            .filter(|session| self.result.is_none() && session.is_pending())
     }
 
-    /// Looks for the answer that is due, at most until `until`.
-    pub fn look(&mut self, until: Instant) -> Result<(), PlatformFault> {
+    /// Waits for the pending answer until `until`.
+    pub fn poll(&mut self, until: Instant) -> Result<(), PlatformFault> {
         let Some(session) = &mut self.session else {
             return Ok(());
         };
         match session.poll(until) {
             Ok(None) => {}
-            Ok(Some(answered)) => {
-                self.longest_stall_s = self.longest_stall_s.max(answered.host_time_s);
-                self.came = Some(Ok(answered));
+            Ok(Some(timing)) => {
+                self.longest_stall_s = self.longest_stall_s.max(timing.host_time_s);
+                self.result = Some(Ok(timing));
             }
-            Err(trouble) => self.came = Some(Err(Broken::by(trouble, self.asked)?)),
+            Err(error) => self.result = Some(Err(SideFailure::new(error, self.asked)?)),
         }
         Ok(())
     }
 
-    /// Stops the agent, if it runs and no answer of it is due, until it is asked again.
+    /// Freezes the agent until its next question, if it runs and no answer is pending.
     pub fn freeze(&mut self) {
-        if self.due().is_none()
+        if self.pending_session().is_none()
             && let Some(session) = &mut self.session
         {
             session.freeze();
         }
     }
 
-    /// Can the agent be stopped, if it runs?
+    /// Can the host freeze the agent, if it runs?
     pub fn can_freeze(&self) -> bool {
         self.session.as_ref().is_none_or(Session::can_freeze)
     }
 
-    /// Something of ours was seen to meanwhile.
-    pub fn was_not_looked_at(&mut self, away: Duration) {
+    /// Adds time in which the evaluator was busy elsewhere.
+    pub fn add_absence(&mut self, absence: Duration) {
         if let Some(session) = &mut self.session {
-            session.was_not_looked_at(away);
+            session.add_absence(absence);
         }
     }
 
-    /// What came of getting ready, of which the reset was the last question.
-    pub fn entry(&mut self, started: Started) -> Entry {
+    /// Entry of this side into the rally, after the answer to its reset.
+    pub fn entry(&mut self, started: StartResult) -> RallyEntry {
         let startup_s = match started {
-            Started::Ready { startup_s } => startup_s,
-            Started::Failed { startup_s, fault } => {
-                return Entry::FailedToStart { startup_s, fault };
+            StartResult::Ready { startup_s } => startup_s,
+            StartResult::Failed { startup_s, fault } => {
+                return RallyEntry::StartFailed { startup_s, fault };
             }
         };
         let interpolation = self
@@ -213,60 +214,60 @@ impl<'a> SidePlayer<'a> {
             .as_ref()
             .map(Session::interpolation)
             .expect("an agent that is ready runs");
-        match self.came.take().expect("its reset was waited for") {
-            Ok(answered) => Entry::Plays {
+        match self.result.take().expect("the reset has a result") {
+            Ok(timing) => RallyEntry::Ready {
                 startup_s,
                 interpolation,
-                reset_s: answered.computation_time_s,
+                reset_s: timing.computation_time_s,
             },
-            Err(broken) => {
-                self.waited = broken.waited;
-                Entry::FailedToReset {
+            Err(failure) => {
+                self.wait = failure.wait;
+                RallyEntry::ResetFailed {
                     startup_s,
                     interpolation,
-                    reset_s: broken.answered.computation_time_s,
-                    fault: broken.fault,
+                    reset_s: failure.timing.computation_time_s,
+                    fault: failure.fault,
                 }
             }
         }
     }
 
-    /// What came of a step.
+    /// Response of this side to a step.
     pub fn response(&self) -> Response<'_> {
-        match (&self.came, &self.session) {
-            (Some(Ok(answered)), Some(session)) => Response::Answer {
+        match (&self.result, &self.session) {
+            (Some(Ok(timing)), Some(session)) => Response::Answer {
                 action: session.action(),
-                answered: *answered,
+                timing: *timing,
             },
-            (Some(Err(broken)), _) => Response::Fault {
-                fault: broken.fault.clone(),
-                answered: broken.answered,
+            (Some(Err(failure)), _) => Response::Fault {
+                fault: failure.fault.clone(),
+                timing: failure.timing,
             },
             _ => Response::Held,
         }
     }
 
-    /// Was its fault in this rally noted?
-    pub const fn is_noted(&self) -> bool {
-        self.is_noted
+    /// Is its fault in this rally logged?
+    pub const fn is_fault_logged(&self) -> bool {
+        self.is_fault_logged
     }
 
-    /// Ends the agent's process after a fault, and notes it.
-    pub fn end_by(&mut self, fault: &AgentFault) {
-        self.is_noted = true;
-        if let Some(Err(broken)) = self.came.take() {
-            self.waited = broken.waited;
+    /// Kills the agent's process after a fault, and logs the fault.
+    pub fn end_with_fault(&mut self, fault: &AgentFault) {
+        self.is_fault_logged = true;
+        if let Some(Err(failure)) = self.result.take() {
+            self.wait = failure.wait;
         }
         let stderr = self.session.take().map(Session::abort);
-        let told = match self.waited.take() {
-            Some(waited) => format!("{fault} ({waited})"),
+        let message = match self.wait.take() {
+            Some(wait) => format!("{fault} ({wait})"),
             None => fault.to_string(),
         };
-        self.log.add(&stderr.unwrap_or_default(), Some(&told));
+        self.log.add(&stderr.unwrap_or_default(), Some(&message));
     }
 
-    /// Tells that a rally is over.
-    pub fn tell_end(&mut self, rally: u32, steps: u32) -> Result<(), PlatformFault> {
+    /// Sends the end of a rally.
+    pub fn send_end(&mut self, rally: u32, steps: u32) -> Result<(), PlatformFault> {
         match &mut self.session {
             Some(session) => session.end(rally, steps),
             None => Ok(()),
@@ -281,8 +282,8 @@ impl<'a> SidePlayer<'a> {
         Ok(())
     }
 
-    /// Ends the agent, if it runs, and tells the log of all its processes and the most that the host took of
-    /// one answer, in seconds.
+    /// Kills the agent if it runs. Returns the log of all its processes, and the longest host interference in one
+    /// answer in seconds.
     pub fn close(mut self) -> (String, f64) {
         if let Some(session) = self.session.take() {
             self.log.add(&session.abort(), None);

@@ -1,4 +1,4 @@
-//! Agents in Python, behaving and not, each a real process.
+//! Test agents in Python, each a real process.
 
 use faceoff_runner::{AgentEnvironment, Supervision, TimeLimits, bundle::Bundle};
 use faceoff_sandbox::{Isolation, Limits, Runtime, RuntimeFiles};
@@ -6,8 +6,9 @@ use faceoff_wire::Manifest;
 use std::{collections::BTreeMap, fs, os::unix::fs::PermissionsExt};
 use tempfile::TempDir;
 
-/// A whole agent that holds the pose it finds, with hooks to misbehave: `on_reset(episode)` and
-/// `on_step(step, answer)`, which returns the line to send or `None` for none.
+/// A complete agent that holds its initial pose, with hooks for misbehaviour: `on_hello(hello)`, `on_reset(episode)`
+/// and
+/// `on_step(step, answer)`, which returns the line to send, or `None` for no answer.
 const FRAME: &str = r#"
 import json, os, sys, time
 INTERPOLATION = 3
@@ -85,7 +86,7 @@ impl Agent {
     }
 }
 
-/// The full sandbox with deadlines that only a dead machine meets.
+/// The full sandbox with deadlines that only a dead machine reaches.
 pub fn sandboxed() -> AgentEnvironment {
     AgentEnvironment {
         limits: Limits {
@@ -101,7 +102,7 @@ pub fn sandboxed() -> AgentEnvironment {
             mean_s: 600.0,
             episode_extra_s: 600.0,
             resets_extra_s: 600.0,
-            // Tests of other things must not depend on what else the machine does.
+            // Tests of other features must not depend on other load of the host.
             host_noise_reruns: 0,
             ..TimeLimits::default()
         },
@@ -121,7 +122,7 @@ pub fn sandboxed() -> AgentEnvironment {
     }
 }
 
-/// The sandbox with a short step limit, for agents that meet it because they never answer.
+/// The sandbox with a short step limit, for agents that never answer.
 pub fn impatient() -> AgentEnvironment {
     let mut env = sandboxed();
     env.time.step_s = 0.5;

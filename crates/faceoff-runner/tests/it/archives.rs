@@ -12,7 +12,7 @@ use zip::{ZipWriter, write::SimpleFileOptions};
 pub const MANIFEST: &str =
     "name = \"test\"\ncommand = [\"python3\", \"agent.py\"]\nruntime = \"python3\"\n";
 
-/// A tar archive under construction; names and modes are taken as they are.
+/// Builder of a tar archive; writes names and modes unchanged.
 #[derive(Clone)]
 pub struct Tar(Vec<u8>);
 

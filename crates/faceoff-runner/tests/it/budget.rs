@@ -1,4 +1,4 @@
-//! Archives that are small, hold little and take long to read, unless what reading them costs is counted.
+//! Malicious archives that are small and take long to read, unless the cost of reading is counted.
 
 use crate::archives::{MANIFEST, Tar, write};
 use faceoff_runner::bundle::{BundleError, BundleLimits, unpack};
@@ -11,10 +11,10 @@ use tar::EntryType;
 use zip::{ZipWriter, write::FullFileOptions};
 
 const MIB: usize = 1 << 20;
-/// The reason of all that is more reading than files.
-const TOO_MUCH: &str = "more than its files explain";
+/// The reason for archives with too much overhead.
+const TOO_MUCH: &str = "more bytes than its files explain";
 
-/// What is said of an archive.
+/// The result of unpacking an archive.
 fn verdict(bytes: &[u8]) -> Result<(), BundleError> {
     verdict_unless(bytes, &|| false)
 }
@@ -29,12 +29,12 @@ fn verdict_unless(bytes: &[u8], cancelled: &dyn Fn() -> bool) -> Result<(), Bund
 #[track_caller]
 fn refused(bytes: &[u8], needle: &str) {
     match verdict(bytes) {
-        Err(BundleError::Invalid(told)) => assert!(told.contains(needle), "{told:?}"),
+        Err(BundleError::Invalid(message)) => assert!(message.contains(needle), "{message:?}"),
         other => panic!("expected a refusal with {needle:?}, got {other:?}"),
     }
 }
 
-/// A comment of about a MiB, as an extension header has it.
+/// A comment of about a MiB in the format of an extension header.
 fn pax_comment() -> Vec<u8> {
     let length = MIB - 8;
     let mut record = format!("{length} comment=").into_bytes();
@@ -43,7 +43,7 @@ fn pax_comment() -> Vec<u8> {
     record
 }
 
-/// An archive of this entry, over and over.
+/// An archive that repeats this entry.
 fn repeated(kind: EntryType, content: &[u8], times: usize) -> Tar {
     (0..times).fold(Tar::with_manifest(), |tar, _| {
         tar.entry(kind, "repeated", 0o644, "agent.toml", content)
@@ -51,7 +51,7 @@ fn repeated(kind: EntryType, content: &[u8], times: usize) -> Tar {
 }
 
 #[test]
-fn headers_that_describe_nothing_are_counted() {
+fn headers_without_entries_are_counted() {
     let comment = pax_comment();
     for kind in [EntryType::XHeader, EntryType::XGlobalHeader] {
         let bomb = repeated(kind, &comment, 20).gz();
@@ -65,12 +65,12 @@ fn headers_that_describe_nothing_are_counted() {
 }
 
 #[test]
-fn what_an_entry_carries_and_nobody_reads_is_counted() {
+fn skipped_content_is_counted() {
     // The library skips it, by reading it.
     for kind in [EntryType::Directory, EntryType::Symlink] {
         refused(&repeated(kind, &vec![0; 30 * MIB], 1).gz(), TOO_MUCH);
     }
-    // Sparse files are refused by what they claim, before their content.
+    // Sparse files are refused by their header, before their content is read.
     let sparse = repeated(EntryType::GNUSparse, &[0; 512], 1).gz();
     refused(&sparse, "sparse");
     let sparse = Tar::with_manifest()
@@ -86,14 +86,14 @@ fn what_an_entry_carries_and_nobody_reads_is_counted() {
 }
 
 #[test]
-fn entries_that_become_nothing_are_counted() {
-    // The archive's own root is no folder that could be there twice.
+fn entries_without_effect_are_counted() {
+    // Entries for the archive's root are not refused as duplicates.
     let roots = (0..200_001).fold(Tar::with_manifest(), |tar, _| tar.folder("./"));
     refused(&roots.gz(), "more than 200000 entries");
 }
 
 #[test]
-fn streams_that_hold_nothing_are_counted() {
+fn empty_streams_are_counted() {
     let empty_gzip = GzEncoder::new(Vec::new(), Compression::fast())
         .finish()
         .unwrap();
@@ -110,8 +110,8 @@ fn streams_that_hold_nothing_are_counted() {
 }
 
 #[test]
-fn blocks_that_hold_nothing_are_counted() {
-    // A stream of gzip: its header, empty blocks that are stored as they are, the last one, sum and length.
+fn empty_blocks_are_counted() {
+    // A gzip stream: its header, empty stored blocks, the last block, checksum and length.
     let stream = |blocks: usize| {
         let mut stream = b"\x1f\x8b\x08\0\0\0\0\0\0\xff".to_vec();
         stream.extend(b"\0\0\0\xff\xff".repeat(blocks));
@@ -125,18 +125,18 @@ fn blocks_that_hold_nothing_are_counted() {
     };
     let with = |blocks: usize| [stream(blocks), whole()].concat();
     verdict(&with(1 << 20)).unwrap();
-    refused(&with(4 << 20), "larger than what it holds");
-    // What cannot be compressed is as large as it is, and what fills up a block of a tape is nothing.
+    refused(&with(4 << 20), "larger than its content");
+    // Incompressible content is accepted, and so is the padding of a tape block.
     let mut state = 1_u32;
-    let noise: Vec<u8> = (0..20 * MIB)
+    let random_bytes: Vec<u8> = (0..20 * MIB)
         .map(|_| {
             state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
             (state >> 24) as u8
         })
         .collect();
-    let noisy = || Tar::with_manifest().file("noise", 0o644, &noise);
-    verdict(&noisy().gz()).unwrap();
-    verdict(&noisy().zst()).unwrap();
+    let random_tar = || Tar::with_manifest().file("noise", 0o644, &random_bytes);
+    verdict(&random_tar().gz()).unwrap();
+    verdict(&random_tar().zst()).unwrap();
     verdict(&[whole(), vec![0; 10_240]].concat()).unwrap();
     let skipped = b"\x50\x2a\x4d\x18\x04\0\0\0size".to_vec();
     let tar = Tar::with_manifest().file("agent.py", 0o644, b"print()");
@@ -144,7 +144,7 @@ fn blocks_that_hold_nothing_are_counted() {
 }
 
 #[test]
-fn an_archive_in_several_streams_and_with_padding_behind_it_is_as_good_as_any() {
+fn multi_stream_archive_with_padding_is_accepted() {
     let whole = Tar::with_manifest()
         .file("weights", 0o644, &vec![7; MIB])
         .bytes();
@@ -166,7 +166,7 @@ fn an_archive_in_several_streams_and_with_padding_behind_it_is_as_good_as_any() 
 }
 
 #[test]
-fn many_honest_files_with_all_that_can_describe_them_pass() {
+fn many_files_with_extension_headers_are_accepted() {
     let described = (0..3000).fold(Tar::with_manifest(), |tar, i| {
         let name = format!("{}/{i}", "long".repeat(40));
         let record = format!(" path={name}\n");
@@ -180,28 +180,27 @@ fn many_honest_files_with_all_that_can_describe_them_pass() {
 }
 
 #[test]
-fn a_cancelled_archive_ends_whatever_it_is_in_the_middle_of() {
+fn cancellation_stops_unpacking_at_any_point() {
     let large = || Tar::with_manifest().file("large", 0o644, &vec![7; 3 * MIB]);
     let headers = repeated(EntryType::XHeader, &pax_comment(), 10).gz();
-    let quoted = quoting_zip(50, MIB);
-    for bytes in [large().gz(), large().zst(), headers, quoted] {
+    let shared = shared_zip(50, MIB);
+    for bytes in [large().gz(), large().zst(), headers, shared] {
         for at in [0, 3, 20] {
             let asked = Cell::new(0);
             let cancelled = || {
                 asked.set(asked.get() + 1);
                 asked.get() > at
             };
-            let told = verdict_unless(&bytes, &cancelled);
-            assert!(matches!(told, Err(BundleError::Cancelled)), "{told:?}");
-            assert_eq!(asked.get(), at + 1, "it goes on after it was cancelled");
+            let result = verdict_unless(&bytes, &cancelled);
+            assert!(matches!(result, Err(BundleError::Cancelled)), "{result:?}");
+            assert_eq!(asked.get(), at + 1, "it continues after the cancellation");
         }
     }
 }
 
-/// An archive of files that share their bytes: each is compressed as “the head of the next one, literally, and
-/// then what that one is”, and the last holds `tail` bytes that decompress to nothing. Reading every file reads
-/// the tail again.
-fn quoting_zip(files: usize, tail: usize) -> Vec<u8> {
+/// A zip whose files share their bytes. Each file's data is a literal copy of the next file's header, followed by that
+/// file's data. The last file has `tail` bytes that decompress to nothing. Reading any file reads the tail again.
+fn shared_zip(files: usize, tail: usize) -> Vec<u8> {
     let stored = |last: bool, bytes: &[u8]| {
         let length = u16::try_from(bytes.len()).unwrap();
         let mut block = vec![u8::from(last)];
@@ -217,7 +216,7 @@ fn quoting_zip(files: usize, tail: usize) -> Vec<u8> {
             format!("f{file:08}")
         }
     };
-    // version, flags, method, time, date, CRC, sizes, lengths: as both kinds of header have them
+    // Version, flags, method, time, date, CRC, sizes, lengths: as in both kinds of header.
     let fields = |file: usize, crc: u32, packed: usize, unpacked: usize| {
         let mut fields = vec![20, 0, 0, 0, 8, 0, 0, 0, 0x21, 0];
         fields.extend_from_slice(&crc.to_le_bytes());
@@ -227,43 +226,43 @@ fn quoting_zip(files: usize, tail: usize) -> Vec<u8> {
         fields.extend_from_slice(&[0, 0]);
         fields
     };
-    // From the last file to the first; `data` is what a file is compressed to.
+    // From the last file to the first; `data` is the compressed data of a file.
     let mut data = stored(false, b"").repeat(tail / 5);
     data.extend_from_slice(&stored(true, b""));
     let mut contents: Vec<u8> = Vec::new();
     let mut directory = Vec::new();
-    let mut heads = Vec::new();
+    let mut headers = Vec::new();
     for file in (0..files).rev() {
         let mut crc = Crc::new();
         crc.update(&contents);
         let fields = fields(file, crc.sum(), data.len(), contents.len());
-        let mut head = b"PK\x03\x04".to_vec();
-        head.extend_from_slice(&fields);
-        head.extend_from_slice(name(file).as_bytes());
-        heads.push((file, fields, head.len() + data.len()));
+        let mut header = b"PK\x03\x04".to_vec();
+        header.extend_from_slice(&fields);
+        header.extend_from_slice(name(file).as_bytes());
+        headers.push((file, fields, header.len() + data.len()));
         if file == 0 {
-            head.extend_from_slice(&data);
-            data = head;
+            header.extend_from_slice(&data);
+            data = header;
         } else {
-            let mut quoting = stored(false, &head);
-            quoting.extend_from_slice(&data);
-            data = quoting;
-            head.extend_from_slice(&contents);
-            contents = head;
+            let mut literal = stored(false, &header);
+            literal.extend_from_slice(&data);
+            data = literal;
+            header.extend_from_slice(&contents);
+            contents = header;
         }
     }
-    for (file, fields, from_end) in heads.iter().rev() {
+    for (file, fields, from_end) in headers.iter().rev() {
         directory.extend_from_slice(b"PK\x01\x02\x14\x03");
         directory.extend_from_slice(fields);
-        // comment, disk, attributes, place
+        // Comment, disk, attributes, offset.
         directory.extend_from_slice(&[0; 6]);
         directory.extend_from_slice(&(0o100_644_u32 << 16).to_le_bytes());
-        let place = u32::try_from(data.len() - from_end).unwrap();
-        directory.extend_from_slice(&place.to_le_bytes());
+        let offset = u32::try_from(data.len() - from_end).unwrap();
+        directory.extend_from_slice(&offset.to_le_bytes());
         directory.extend_from_slice(name(*file).as_bytes());
     }
     let mut zip = data;
-    let place = u32::try_from(zip.len()).unwrap();
+    let offset = u32::try_from(zip.len()).unwrap();
     let (files, length) = (
         u16::try_from(files).unwrap(),
         u32::try_from(directory.len()).unwrap(),
@@ -273,22 +272,22 @@ fn quoting_zip(files: usize, tail: usize) -> Vec<u8> {
     zip.extend_from_slice(&files.to_le_bytes());
     zip.extend_from_slice(&files.to_le_bytes());
     zip.extend_from_slice(&length.to_le_bytes());
-    zip.extend_from_slice(&place.to_le_bytes());
+    zip.extend_from_slice(&offset.to_le_bytes());
     zip.extend_from_slice(&[0, 0]);
     zip
 }
 
 #[test]
-fn a_zip_whose_files_share_their_bytes_is_read_about_once() {
-    // Three files of it are a proper archive, but for its manifest.
-    refused(&quoting_zip(3, 1000), "agent.toml: ");
-    let bomb = quoting_zip(200, MIB);
+fn zip_with_shared_bytes_is_refused() {
+    // With three files it is a valid archive, except for its manifest.
+    refused(&shared_zip(3, 1000), "agent.toml: ");
+    let bomb = shared_zip(200, MIB);
     assert!(bomb.len() < MIB + MIB / 8, "{} bytes", bomb.len());
     refused(&bomb, TOO_MUCH);
 }
 
 #[test]
-fn zip_of_a_large_directory_may_be_read_twice() {
+fn zip_with_a_large_directory_is_accepted() {
     let comment = "c".repeat(60_000);
     let mut zip = ZipWriter::new(Cursor::new(Vec::new()));
     for index in 0..400 {
@@ -306,7 +305,7 @@ fn zip_of_a_large_directory_may_be_read_twice() {
 }
 
 #[test]
-fn links_that_take_long_to_follow_are_counted() {
+fn link_chains_are_counted() {
     let target = "a/".repeat(500);
     let links = |count: usize| {
         (0..count).fold(Tar::with_manifest(), |tar, link| {

@@ -38,7 +38,7 @@ fn refused(bytes: &[u8], needle: &str) -> TempDir {
     refused_with(bytes, BundleLimits::default(), needle)
 }
 
-/// Refused before anything was written.
+/// Asserts a refusal before anything was written.
 #[track_caller]
 fn refused_unwritten(bytes: &[u8], limits: BundleLimits, needle: &str) {
     let dir = refused_with(bytes, limits, needle);
@@ -51,7 +51,7 @@ fn mode(path: &Path) -> u32 {
 }
 
 #[test]
-fn the_three_kinds_of_archive_are_told_apart_by_their_bytes() {
+fn archive_formats_are_detected_by_their_bytes() {
     let tar = || {
         Tar::with_manifest()
             .folder("weights/")
@@ -80,7 +80,7 @@ fn the_three_kinds_of_archive_are_told_apart_by_their_bytes() {
 }
 
 #[test]
-fn a_single_top_folder_is_the_bundle() {
+fn single_top_folder_is_the_bundle() {
     let (_dir, bundle) = accepted(
         &Tar::new()
             .file("striker-1.2/agent.toml", 0o644, MANIFEST.as_bytes())
@@ -103,7 +103,7 @@ fn a_single_top_folder_is_the_bundle() {
 }
 
 #[test]
-fn a_wrong_manifest_is_told_by_its_key() {
+fn wrong_manifest_key_is_named() {
     let tar = |text: &str| Tar::new().file("agent.toml", 0o644, text.as_bytes()).gz();
     refused(&tar("name = 3"), "agent.toml:");
     refused(
@@ -118,14 +118,14 @@ fn a_wrong_manifest_is_told_by_its_key() {
 }
 
 #[test]
-fn paths_that_leave_the_bundle_are_refused_by_name() {
-    for (name, why) in [
+fn paths_outside_the_bundle_are_refused() {
+    for (name, reason) in [
         ("/etc/cron.d/x", "absolute path"),
         ("../x", "'..'"),
         ("a/../../x", "'..'"),
         ("a/..", "'..'"),
     ] {
-        let dir = refused(&Tar::with_manifest().file(name, 0o644, b"x").gz(), why);
+        let dir = refused(&Tar::with_manifest().file(name, 0o644, b"x").gz(), reason);
         assert!(!dir.path().join("x").exists());
         refused(&Tar::with_manifest().file(name, 0o644, b"x").gz(), name);
         refused(
@@ -133,7 +133,7 @@ fn paths_that_leave_the_bundle_are_refused_by_name() {
                 ("agent.toml", 0o644, MANIFEST.as_bytes()),
                 (name, 0o644, b"x"),
             ]),
-            why,
+            reason,
         );
     }
     refused(&zip(&[("a\\..\\b", 0o644, b"")]), "backslash");
@@ -147,7 +147,7 @@ fn paths_that_leave_the_bundle_are_refused_by_name() {
 }
 
 #[test]
-fn links_that_stay_inside_work_and_others_are_refused() {
+fn links_outside_the_bundle_are_refused() {
     let good = Tar::with_manifest()
         .file("lib/real.so.1", 0o644, b"library")
         .symlink("lib/real.so", "real.so.1")
@@ -167,12 +167,12 @@ fn links_that_stay_inside_work_and_others_are_refused() {
         let mut as_zip = ZipWithLink::new(target);
         refused(&as_zip.bytes(), leaves);
     }
-    // The archive's root is outside of a bundle in a top folder.
+    // If the bundle is in a top-level folder, the archive's root is outside of it.
     let top = Tar::new()
         .file("top/agent.toml", 0o644, MANIFEST.as_bytes())
         .symlink("top/l", "..");
     refused(&top.gz(), leaves);
-    // A chain that only leaves when it is followed.
+    // A chain of links that leaves the bundle only when it is followed.
     let chain = Tar::with_manifest()
         .symlink("deep/up", "..")
         .symlink("escape", "deep/up/../x");
@@ -198,7 +198,7 @@ fn links_that_stay_inside_work_and_others_are_refused() {
     );
 }
 
-/// The zip library writes links as files with a mode, which is what attackers do.
+/// A zip with a symbolic link, which the library writes as a file with the mode of a link.
 struct ZipWithLink(zip::ZipWriter<std::io::Cursor<Vec<u8>>>);
 
 impl ZipWithLink {
@@ -223,7 +223,7 @@ impl ZipWithLink {
 }
 
 #[test]
-fn nothing_is_written_through_a_link() {
+fn files_are_never_written_through_links() {
     let outside = tempfile::tempdir().unwrap();
     let target = outside.path().to_str().unwrap();
     let tar = Tar::with_manifest()
@@ -256,7 +256,7 @@ fn duplicate_names_are_refused() {
         &Tar::with_manifest().folder("d/").file("d", 0o644, b"").gz(),
         "twice",
     );
-    // The library refuses to write two entries of one name, so one is renamed in the bytes.
+    // The library refuses to write two entries with the same name, so one is renamed in the bytes.
     let mut bytes = zip(&[
         ("agent.toml", 0o644, MANIFEST.as_bytes()),
         ("a1", 0o644, b"x"),
@@ -304,7 +304,7 @@ fn devices_pipes_and_set_id_bits_are_refused() {
 }
 
 #[test]
-fn long_names_of_both_dialects_are_read() {
+fn long_names_of_gnu_and_pax_are_read() {
     let name = format!("{}/{}.py", "d".repeat(120), "n".repeat(120));
     let gnu = Tar::with_manifest()
         .entry(
@@ -361,7 +361,7 @@ fn long_names_of_both_dialects_are_read() {
     refused(&size.gz(), "states a size outside of its header");
 }
 
-/// Changes a field of the last entry in the central directory of a zip: the library writes no such values.
+/// Changes a field of the last entry in the central directory of a zip, to values that the library does not write.
 fn change_last_entry(mut zip: Vec<u8>, at: usize, value: &[u8]) -> Vec<u8> {
     let entry = zip
         .windows(4)
@@ -371,7 +371,7 @@ fn change_last_entry(mut zip: Vec<u8>, at: usize, value: &[u8]) -> Vec<u8> {
     zip
 }
 
-/// A zip of one file that both of its headers state to have ten bytes.
+/// A zip with one file whose headers both state a size of ten bytes.
 fn understated_zip(name: &str, content: &[u8]) -> Vec<u8> {
     let size = 10_u32.to_le_bytes();
     let mut bytes = change_last_entry(zip(&[(name, 0o644, content)]), 24, &size);
@@ -380,7 +380,7 @@ fn understated_zip(name: &str, content: &[u8]) -> Vec<u8> {
 }
 
 #[test]
-fn bombs_are_stopped_while_they_stream() {
+fn bombs_are_stopped_while_streaming() {
     let limits = BundleLimits {
         packed_bytes: 1 << 20,
         unpacked_bytes: 1 << 20,
@@ -409,7 +409,7 @@ fn bombs_are_stopped_while_they_stream() {
         assert!(written <= 1 << 20, "{written} bytes were written");
     }
     refused_unwritten(&zip(&[("bomb", 0o644, &bomb)]), limits, too_much);
-    // A header that describes the next entry is no way around the limit.
+    // A header that describes the next entry cannot bypass the limit.
     let header = Tar::with_manifest().entry(EntryType::GNULongName, "l", 0o644, "", &bomb);
     refused_with(&header.gz(), limits, "has a header of 41943040 bytes");
     refused_with(
@@ -445,7 +445,7 @@ fn files_and_folders_are_counted() {
 }
 
 #[test]
-fn fifty_thousand_and_one_files_are_one_too_many() {
+fn default_limit_is_fifty_thousand_files() {
     let names: Vec<String> = (0..50_000).map(|i| format!("f{i}")).collect();
     let tar = names
         .iter()
@@ -454,7 +454,7 @@ fn fifty_thousand_and_one_files_are_one_too_many() {
 }
 
 #[test]
-fn folders_beyond_the_limit_are_not_made() {
+fn folders_beyond_the_limit_are_not_created() {
     let names: Vec<String> = (0..50_001).map(|i| format!("d{i}/")).collect();
     let tar = || names.iter().fold(Tar::new(), |tar, name| tar.folder(name));
     let entries: Vec<(&str, u32, &[u8])> = names
@@ -496,7 +496,7 @@ fn zip_with_an_unusable_last_entry_writes_nothing() {
             field(40, &0o104_755_u16.to_le_bytes()),
             "\"b\" has a set-user-id or set-group-id bit",
         ),
-        // The name.
+        // The entry's name.
         (field(46, b"a"), "\"a\" is in the archive twice"),
         (field(46, b"\xff"), "has a name that is not UTF-8"),
         (field(46, b"\\"), "named with a backslash"),
@@ -520,7 +520,7 @@ fn zip_with_an_unusable_last_entry_writes_nothing() {
 }
 
 #[test]
-fn empty_folders_are_there_with_their_modes() {
+fn empty_folders_are_created_with_their_modes() {
     let tar = || {
         Tar::with_manifest()
             .folder("empty/")
@@ -553,7 +553,7 @@ fn empty_folders_are_there_with_their_modes() {
 }
 
 #[test]
-fn folder_that_holds_only_a_link_is_made() {
+fn folder_with_only_a_link_is_created() {
     let tar = Tar::with_manifest()
         .symlink("only/a/link", "../../agent.toml")
         .symlink("to", "only/a")
@@ -567,7 +567,7 @@ fn folder_that_holds_only_a_link_is_made() {
 }
 
 #[test]
-fn damaged_archives_are_the_teams_affair() {
+fn damaged_archives_are_refused_as_invalid() {
     let tar = || Tar::with_manifest().file("agent.py", 0o644, &[1; 50_000]);
     let gz = tar().gz();
     refused(&gz[..gz.len() / 2], "the archive is damaged");
@@ -586,7 +586,7 @@ fn damaged_archives_are_the_teams_affair() {
 }
 
 #[test]
-fn what_fails_on_our_side_is_not_the_teams_affair() {
+fn failed_disk_access_is_a_platform_fault() {
     let dir = tempfile::tempdir().unwrap();
     let archive = write(dir.path(), "upload", &Tar::with_manifest().gz());
     fs::create_dir(dir.path().join("full")).unwrap();
@@ -608,7 +608,7 @@ fn what_fails_on_our_side_is_not_the_teams_affair() {
 }
 
 #[test]
-fn a_folder_is_opened_in_place() {
+fn folder_is_opened_in_place() {
     let dir = tempfile::tempdir().unwrap();
     let scratch = tempfile::tempdir().unwrap();
     let limits = BundleLimits::default();
@@ -638,7 +638,7 @@ fn a_folder_is_opened_in_place() {
 }
 
 #[test]
-fn an_agent_toml_that_is_no_file_is_the_teams_doing() {
+fn manifest_that_is_no_file_is_refused() {
     let manifest = MANIFEST.as_bytes();
     let folder = Tar::new()
         .folder("agent.toml/")
@@ -665,18 +665,18 @@ fn an_agent_toml_that_is_no_file_is_the_teams_doing() {
         refused(&device.gz(), "a bundle holds files, folders and links");
     }
 
-    // A developer's own folder, opened in place.
+    // A developer's folder, opened in place.
     let own = tempfile::tempdir().unwrap();
-    let told = |make: &dyn Fn(&Path)| {
+    let refusal = |make: &dyn Fn(&Path)| {
         let dir = tempfile::tempdir_in(own.path()).unwrap();
         make(&dir.path().join("agent.toml"));
         let opened = open(dir.path(), own.path(), &BundleLimits::default());
         match opened {
-            Err(BundleError::Invalid(told)) => told,
+            Err(BundleError::Invalid(message)) => message,
             other => panic!("{other:?}"),
         }
     };
-    assert!(told(&|path| fs::create_dir(path).unwrap()).contains("is a folder"));
+    assert!(refusal(&|path| fs::create_dir(path).unwrap()).contains("is a folder"));
     let pipe = |path: &Path| {
         rustix::fs::mknodat(
             rustix::fs::CWD,
@@ -687,7 +687,7 @@ fn an_agent_toml_that_is_no_file_is_the_teams_doing() {
         )
         .unwrap();
     };
-    assert!(told(&pipe).contains("is a device, pipe or socket"));
+    assert!(refusal(&pipe).contains("is a device, pipe or socket"));
     let link = |path: &Path| std::os::unix::fs::symlink("/dev/null", path).unwrap();
-    assert!(told(&link).contains("is a link"));
+    assert!(refusal(&link).contains("is a link"));
 }

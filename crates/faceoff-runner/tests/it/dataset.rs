@@ -2,7 +2,7 @@
 
 use crate::{
     agents::{Agent, sandboxed},
-    recording::{moving, read},
+    recording::{moving_agent, read},
     shard::{run, spec},
 };
 use faceoff_dataset::{
@@ -10,7 +10,7 @@ use faceoff_dataset::{
     verify::{Verified, verify},
 };
 use faceoff_types::{AgentFaultKind, Ruleset, Task};
-use faceoff_wire::work::EvaluationMeta;
+use faceoff_wire::job::EvaluationMeta;
 use std::{
     fs::File,
     num::NonZero,
@@ -18,7 +18,7 @@ use std::{
 };
 use zip::ZipArchive;
 
-/// Everything in the tables but the two columns of measured times and what follows from them.
+/// All columns of a table except measured times and the columns derived from them.
 fn timeless_columns(dir: &Path, table: &str) -> Vec<(String, arrow_array::ArrayRef)> {
     let batch = read(&dir.join(table));
     let schema = batch.schema();
@@ -38,9 +38,9 @@ fn timeless_columns(dir: &Path, table: &str) -> Vec<(String, arrow_array::ArrayR
 }
 
 #[test]
-fn one_worker_and_three_record_the_same() {
+fn recordings_of_one_and_three_workers_are_equal() {
     let dir = tempfile::tempdir().unwrap();
-    let agent = moving();
+    let agent = moving_agent();
     let play = |name: &str, shards: &[(u32, u32)], workers: usize| {
         let dirs: Vec<PathBuf> = shards
             .iter()
@@ -71,7 +71,7 @@ fn one_worker_and_three_record_the_same() {
         let out = dir.path().join(name);
         let mut zip = ZipArchive::new(File::open(&archive).unwrap()).unwrap();
         zip.extract(&out).unwrap();
-        // What is measured may differ; nothing else may.
+        // Only measured values may differ.
         let task = result.tasks.get_mut(&Task::Defend).unwrap();
         task.computation_time_s = Default::default();
         task.violations.computation_time = 0;
@@ -104,7 +104,7 @@ fn meta() -> EvaluationMeta {
     }
 }
 
-/// Plays one shard and simulates its recording again.
+/// Runs one shard and simulates its recording again.
 fn verified(agent: &Agent, task: Task, episodes: u32) -> Verified {
     let dir = tempfile::tempdir().unwrap();
     let shard = dir.path().join("shard");
@@ -116,8 +116,8 @@ fn verified(agent: &Agent, task: Task, episodes: u32) -> Verified {
 }
 
 #[test]
-fn what_agents_play_verifies_faults_and_all() {
-    assert_eq!(verified(&moving(), Task::Hit, 2).episodes, 2);
+fn recordings_with_faults_verify() {
+    assert_eq!(verified(&moving_agent(), Task::Hit, 2).episodes, 2);
     let agent = Agent::with(
         "now = 0\n\
          def on_reset(episode):\n    global now; now = episode\n    \
@@ -126,15 +126,15 @@ fn what_agents_play_verifies_faults_and_all() {
          return 'oops' if (now, step) == (1, 4) else json.dumps(answer)",
     );
     assert_eq!(verified(&agent, Task::Prepare, 4).episodes, 4);
-    let silent = Agent::script("import sys\nsys.exit('no model')");
-    assert_eq!(verified(&silent, Task::Hit, 2).steps, 0);
+    let failing = Agent::script("import sys\nsys.exit('no model')");
+    assert_eq!(verified(&failing, Task::Hit, 2).steps, 0);
 }
 
 #[test]
-fn a_world_that_an_agent_makes_diverge_is_its_fault_and_verifies() {
+fn diverged_world_is_an_agent_fault_and_verifies() {
     let dir = tempfile::tempdir().unwrap();
     let shard = dir.path().join("shard");
-    // The way that each joint turns already, so that it turns ever faster.
+    // Accelerates each joint in the direction in which it moves already.
     let agent = Agent::with(
         "INTERPOLATION = None\n\
          def on_hello(hello): print('start', file=sys.stderr)\n\
@@ -145,7 +145,7 @@ fn a_world_that_an_agent_makes_diverge_is_its_fault_and_verifies() {
     );
     let report = run(&spec(Task::Prepare, 0..2), &agent, &sandboxed(), &shard).unwrap();
     let faults: Vec<_> = report.outcomes.iter().map(|o| o.fault.clone()).collect();
-    // The first world diverges; the second is thrown about, but stays a world.
+    // The first world diverges; the second has extreme motion but stays finite.
     let [Some(fault), None] = &faults[..] else {
         panic!("{faults:?}");
     };

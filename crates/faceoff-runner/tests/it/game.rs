@@ -1,4 +1,4 @@
-//! Games between real agents: what each side does is its own affair.
+//! Games between real agents: the sides do not affect each other.
 
 use crate::agents::{Agent, sandboxed};
 use faceoff_dataset::game::{GAME_FILE, GameRecording, side_file, verify_game};
@@ -11,7 +11,7 @@ use faceoff_types::{
 };
 use std::{cell::Cell, fs, path::Path};
 
-/// Late is what takes a minute: what a busy machine does must not decide a test.
+/// Answers are late after a minute, so that other load of the host does not affect a test.
 pub fn spec(steps: u32) -> GameSpec {
     let seed = Seed::from_number(7);
     GameSpec {
@@ -30,9 +30,9 @@ pub fn spec(steps: u32) -> GameSpec {
     }
 }
 
-struct Nobody;
+struct NullObserver;
 
-impl GameObserver for Nobody {
+impl GameObserver for NullObserver {
     fn cancelled(&self) -> bool {
         false
     }
@@ -45,19 +45,19 @@ fn play_in(
     out: &Path,
 ) -> GameReport {
     let bundles = agents.map(|agent| &agent.bundle);
-    run_game(spec, bundles, envs, out, &mut Nobody).expect("the platform works")
+    run_game(spec, bundles, envs, out, &mut NullObserver).expect("the platform works")
 }
 
-/// Plays a game, which must verify.
+/// Runs a game and verifies it.
 fn play(spec: &GameSpec, agents: [&Agent; 2]) -> GameReport {
     let out = tempfile::tempdir().unwrap();
     let env = sandboxed();
     let report = play_in(spec, agents, [&env; 2], out.path());
-    verifies(out.path(), &report);
+    assert_verifies(out.path(), &report);
     report
 }
 
-fn verifies(out: &Path, report: &GameReport) {
+fn assert_verifies(out: &Path, report: &GameReport) {
     let recording = GameRecording::open(&out.join(GAME_FILE)).unwrap();
     let steps = Cell::new(0);
     let verified = verify_game(&recording, &|played| steps.set(steps.get() + played)).unwrap();
@@ -69,7 +69,7 @@ fn verifies(out: &Path, report: &GameReport) {
     assert_eq!(found, report.archives.game);
 }
 
-/// What does not depend on how fast anything was.
+/// The outcome without measured times.
 fn timeless(outcome: &GameOutcome) -> GameOutcome {
     let mut outcome = outcome.clone();
     for side in &mut outcome.sides {
@@ -81,7 +81,7 @@ fn timeless(outcome: &GameOutcome) -> GameOutcome {
     outcome
 }
 
-/// A game's sides: the one that is tested, and the one that behaves.
+/// The sides of a game: the tested agent, and an agent that behaves.
 fn against_holding(spec: &GameSpec, hooks: &str) -> [SideOutcome; 2] {
     let (agent, hold) = (Agent::with(hooks), Agent::behaving());
     let report = play(spec, [&agent, &hold]);
@@ -89,7 +89,7 @@ fn against_holding(spec: &GameSpec, hooks: &str) -> [SideOutcome; 2] {
     assert_eq!(good.faults, []);
     assert_eq!(good.late_answers, 0);
     assert_eq!(good.answers, report.archives.outcome.steps);
-    // By its answers, too: they move nothing.
+    // Its answers hold the pose, so they violate nothing either.
     assert!(
         good.windows
             .iter()
@@ -106,7 +106,7 @@ fn kinds(side: &SideOutcome) -> Vec<(&AgentFaultKind, Option<u32>, Option<u32>)>
 }
 
 #[test]
-fn a_game_is_played_recorded_and_verified_and_the_same_seed_gives_the_same_bits() {
+fn game_verifies_and_is_reproducible() {
     let agents = [
         Agent::with(
             "def on_hello(hello): print(hello['task'], hello['agent_id'], file=sys.stderr)\n\
@@ -119,7 +119,7 @@ fn a_game_is_played_recorded_and_verified_and_the_same_seed_gives_the_same_bits(
     let env = sandboxed();
     let reports = dirs.each_ref().map(|dir| {
         let report = play_in(&spec(1700), [&agents[0], &agents[1]], [&env; 2], dir.path());
-        verifies(dir.path(), &report);
+        assert_verifies(dir.path(), &report);
         report
     });
     let outcomes = reports
@@ -128,7 +128,7 @@ fn a_game_is_played_recorded_and_verified_and_the_same_seed_gives_the_same_bits(
     assert_eq!(outcomes[0], outcomes[1]);
     let outcome = &outcomes[0];
     assert_eq!((outcome.steps, &outcome.end), (1700, &GameEnd::Played));
-    // Fouls in turns, each after 752 steps.
+    // Fouls alternate between the sides, each after 752 steps.
     assert!(outcome.rallies >= 2, "{outcome:?}");
     for side in &outcome.sides {
         let steps: Vec<u32> = side.windows.iter().map(|window| window.steps).collect();
@@ -148,7 +148,7 @@ fn a_game_is_played_recorded_and_verified_and_the_same_seed_gives_the_same_bits(
 }
 
 #[test]
-fn a_sides_own_file_holds_nothing_of_the_other_and_no_seed() {
+fn side_file_holds_nothing_of_the_other_side_and_no_seed() {
     let agent = Agent::with("def on_reset(episode): print('SECRET', file=sys.stderr)");
     let out = tempfile::tempdir().unwrap();
     let env = sandboxed();
@@ -180,8 +180,8 @@ fn a_sides_own_file_holds_nothing_of_the_other_and_no_seed() {
 }
 
 #[test]
-fn late_answers_are_dropped_and_replayed_and_cost_their_own_side_alone() {
-    // Nothing is late but what waits to be: the bound lies far above what a busy machine takes.
+fn late_answers_are_dropped_and_cost_only_their_side() {
+    // Only deliberate sleeps are late: the bound is far above the answer times on a busy host.
     let mut spec = spec(60);
     spec.limits.in_time_s = 2.0;
     let slow = Agent::with(
@@ -202,7 +202,7 @@ fn late_answers_are_dropped_and_replayed_and_cost_their_own_side_alone() {
 }
 
 #[test]
-fn an_agent_that_always_answers_late_never_moves_its_arm() {
+fn always_late_agent_never_moves_its_arm() {
     let mut spec = spec(200);
     spec.limits.in_time_s = 1e-9;
     let swings = Agent::with(
@@ -218,7 +218,7 @@ fn an_agent_that_always_answers_late_never_moves_its_arm() {
 }
 
 #[test]
-fn a_side_that_never_answers_holds_its_arm_and_is_restarted_at_the_next_rally() {
+fn silent_side_holds_its_arm_and_is_restarted_next_rally() {
     let agent = Agent::with("def on_step(step, answer): return None");
     let mut impatient = sandboxed();
     impatient.time.step_s = 0.2;
@@ -231,7 +231,7 @@ fn a_side_that_never_answers_holds_its_arm_and_is_restarted_at_the_next_rally() 
         [&env, &impatient],
         out.path(),
     );
-    verifies(out.path(), &report);
+    assert_verifies(out.path(), &report);
     let [good, bad] = &report.archives.outcome.sides;
     assert_eq!((good.answers, good.faults.len()), (800, 0));
     assert_eq!(bad.answers, 0);
@@ -247,7 +247,7 @@ fn a_side_that_never_answers_holds_its_arm_and_is_restarted_at_the_next_rally() 
         ]
     );
     assert_eq!(report.archives.outcome.rallies, 2);
-    // A fault costs each window that has one.
+    // Each window with a fault is penalised.
     let score = &report.archives.score.sides[1];
     assert_eq!(score.violations.computation_time, 2);
     assert_eq!(score.penalty_points, 4.0);
@@ -255,8 +255,8 @@ fn a_side_that_never_answers_holds_its_arm_and_is_restarted_at_the_next_rally() 
 }
 
 #[test]
-fn floods_rubbish_and_crashes_are_the_faults_of_their_side() {
-    for (hooks, told) in [
+fn invalid_output_and_crashes_are_faults_of_their_side() {
+    for (hooks, message) in [
         (
             "def on_step(step, answer):\n    \
              return (json.dumps(answer) + '\\n') * 300 if step == 3 else json.dumps(answer)",
@@ -283,13 +283,13 @@ fn floods_rubbish_and_crashes_are_the_faults_of_their_side() {
         let [bad, _] = against_holding(&spec(30), hooks);
         assert_eq!(bad.faults.len(), 1, "{hooks}");
         let fault = bad.faults[0].to_string();
-        assert!(fault.contains(told), "{fault}");
+        assert!(fault.contains(message), "{fault}");
         assert_eq!(bad.windows[0].faults, 1);
     }
 }
 
 #[test]
-fn numbers_at_the_bound_and_diverging_ones_are_answers_until_the_world_says_otherwise() {
+fn extreme_actions_are_valid_until_the_world_diverges() {
     let [at_the_bound, _] = against_holding(
         &spec(40),
         "def on_step(step, answer):\n    \
@@ -299,7 +299,7 @@ fn numbers_at_the_bound_and_diverging_ones_are_answers_until_the_world_says_othe
     for (kind, ..) in kinds(&at_the_bound) {
         assert!(matches!(kind, AgentFaultKind::Diverged { .. }), "{kind:?}");
     }
-    // The way that each joint turns already, so that it turns ever faster.
+    // Accelerates each joint in the direction in which it moves already.
     let [diverging, _] = against_holding(
         &spec(1500),
         "INTERPOLATION = None\n\
@@ -315,7 +315,7 @@ fn numbers_at_the_bound_and_diverging_ones_are_answers_until_the_world_says_othe
 }
 
 #[test]
-fn a_side_that_faults_in_every_rally_forfeits_and_both_draw() {
+fn repeated_faults_forfeit_the_game() {
     let mut spec = spec(45_000);
     spec.limits.max_faults = 1;
     let crashes = Agent::with("def on_reset(episode): os._exit(5)");
@@ -352,19 +352,19 @@ fn a_side_that_faults_in_every_rally_forfeits_and_both_draw() {
 }
 
 #[test]
-fn who_uses_up_the_time_of_the_game_forfeits_it() {
+fn used_up_game_time_forfeits_the_game() {
     let mut spec = spec(45_000);
     spec.limits.total_s = 3600.0;
     let agents = [
         Agent::behaving(),
         Agent::with("def on_step(step, answer): time.sleep(0.3); return json.dumps(answer)"),
     ];
-    // Only the slow one's time is short: a busy machine must not use up the other's.
+    // Only the slow agent can use up this time, even on a busy host.
     let out = tempfile::tempdir().unwrap();
     spec.limits.total_s = 20.0;
     let env = sandboxed();
     let report = play_in(&spec, [&agents[0], &agents[1]], [&env; 2], out.path());
-    verifies(out.path(), &report);
+    assert_verifies(out.path(), &report);
     let GameEnd::Forfeit {
         by: Side::Second,
         cause: ForfeitCause::Time { used_s, allowed_s },
@@ -380,10 +380,10 @@ fn who_uses_up_the_time_of_the_game_forfeits_it() {
     );
 }
 
-/// An agent that has closed its output and lives on is found out after a patience of ours, which is none of
-/// the other side's time.
+/// A closed output of a running agent is diagnosed only after a wait of the evaluator, which must not count as the
+/// other side's time.
 #[test]
-fn learning_how_one_side_ended_is_not_on_the_others_clock() {
+fn diagnosis_of_one_side_is_not_on_the_others_clock() {
     let closes = Agent::with(
         "def on_step(step, answer):\n    \
          if step == 2: os.close(1); time.sleep(3600)\n    \
@@ -393,12 +393,12 @@ fn learning_how_one_side_ended_is_not_on_the_others_clock() {
     let mut env = sandboxed();
     env.time.bye_s = 3.0;
     let mut spec = spec(10);
-    // Less than we wait for the other's end, and far more than a busy machine takes to answer.
+    // At most the wait for the other agent's exit, and far more than answer times on a busy host.
     spec.limits.in_time_s = 3.0;
     for agents in [[&closes, &hold], [&hold, &closes]] {
         let out = tempfile::tempdir().unwrap();
         let report = play_in(&spec, agents, [&env; 2], out.path());
-        verifies(out.path(), &report);
+        assert_verifies(out.path(), &report);
         let sides = &report.archives.outcome.sides;
         for (agent, side) in agents.into_iter().zip(sides) {
             if std::ptr::eq(agent, &closes) {
@@ -413,7 +413,7 @@ fn learning_how_one_side_ended_is_not_on_the_others_clock() {
 }
 
 #[test]
-fn a_game_stops_when_it_is_told_to_and_leaves_logs_and_no_recording() {
+fn cancelled_game_leaves_logs_and_no_recording() {
     struct Stops {
         asked: Cell<u32>,
         logs: Vec<(Side, String)>,
@@ -421,10 +421,10 @@ fn a_game_stops_when_it_is_told_to_and_leaves_logs_and_no_recording() {
         steps: u32,
     }
     impl GameObserver for Stops {
-        fn rally_begun(&mut self, _: &faceoff_episode::RallyStart<'_>) {
+        fn on_rally_start(&mut self, _: &faceoff_episode::RallyStart<'_>) {
             self.rallies += 1;
         }
-        fn stepped(&mut self, _: &faceoff_episode::GameStepRow<'_>) {
+        fn on_step(&mut self, _: &faceoff_episode::GameStepRow<'_>) {
             self.steps += 1;
         }
         fn log(&mut self, side: Side, log: &str) {

@@ -1,4 +1,4 @@
-//! Bundles that are container images: what is accepted, and what a hostile one cannot do.
+//! Bundles that are container images: accepted formats, and attacks that must fail.
 
 use crate::{
     archives::{MANIFEST, Tar, write, zip},
@@ -23,7 +23,7 @@ fn try_unpack(bytes: &[u8], limits: BundleLimits) -> (TempDir, Result<Bundle, Bu
     fs::write(dir.path().join("secret"), "secret").unwrap();
     let archive = write(dir.path(), "upload", bytes);
     let result = unpack(&archive, &dir.path().join("out"), &limits, &|| false);
-    // Whatever came of it, nothing beside the folder has changed.
+    // In any case nothing beside the folder may have changed.
     let secret = fs::read_to_string(dir.path().join("secret")).unwrap();
     assert_eq!(secret, "secret");
     assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 3);
@@ -43,25 +43,25 @@ fn accepted(bytes: &[u8]) -> (TempDir, Bundle, Image) {
 }
 
 #[track_caller]
-fn told(bytes: &[u8], limits: BundleLimits) -> String {
+fn refusal(bytes: &[u8], limits: BundleLimits) -> String {
     match try_unpack(bytes, limits).1 {
-        Err(BundleError::Invalid(told)) => told,
+        Err(BundleError::Invalid(message)) => message,
         other => panic!("expected a refusal, got {other:?}"),
     }
 }
 
 #[track_caller]
 fn refused(bytes: &[u8], expected: &str) {
-    assert_eq!(told(bytes, BundleLimits::default()), expected);
+    assert_eq!(refusal(bytes, BundleLimits::default()), expected);
 }
 
 #[track_caller]
 fn refused_near(bytes: &[u8], needle: &str) {
-    let told = told(bytes, BundleLimits::default());
-    assert!(told.contains(needle), "{told:?} lacks {needle:?}");
+    let message = refusal(bytes, BundleLimits::default());
+    assert!(message.contains(needle), "{message:?} lacks {needle:?}");
 }
 
-/// An image with these layers on an agent's: the last of them is refused.
+/// Asserts that an image with an agent's layer and these layers is refused because of the last one.
 #[track_caller]
 fn layer_refused(layers: impl IntoIterator<Item = Tar>, expected: &str) {
     let layers: Vec<Tar> = layers.into_iter().collect();
@@ -72,20 +72,20 @@ fn layer_refused(layers: impl IntoIterator<Item = Tar>, expected: &str) {
     );
 }
 
-/// The root of an image of these layers on an agent's.
+/// The root of an image with an agent's layer and these layers.
 #[track_caller]
 fn root_of(layers: impl IntoIterator<Item = Tar>) -> (TempDir, Image) {
     let (dir, _, image) = accepted(&TestImage::agent(layers).docker().bytes());
     (dir, image)
 }
 
-impl Look for Image {
+impl ImageFiles for Image {
     fn at(&self, path: &str) -> std::path::PathBuf {
         self.root.join(path)
     }
 }
 
-trait Look {
+trait ImageFiles {
     fn at(&self, path: &str) -> std::path::PathBuf;
 
     fn text(&self, path: &str) -> String {
@@ -101,7 +101,7 @@ trait Look {
         target.to_str().unwrap().to_owned()
     }
 
-    fn is_there(&self, path: &str) -> bool {
+    fn exists(&self, path: &str) -> bool {
         self.at(path).symlink_metadata().is_ok()
     }
 
@@ -125,9 +125,9 @@ fn base() -> Tar {
 }
 
 #[test]
-fn an_image_is_accepted_as_engines_save_it() {
+fn image_formats_of_engines_are_accepted() {
     for packing in [Packing::Plain, Packing::Gzip, Packing::Zstd] {
-        let image = || TestImage::of([base(), agent_layer()]).packed(packing);
+        let image = || TestImage::new([base(), agent_layer()]).packed(packing);
         for tar in [TestImage::docker, TestImage::layout] {
             for bytes in [
                 tar(&image()).bytes(),
@@ -140,7 +140,7 @@ fn an_image_is_accepted_as_engines_save_it() {
                 assert_eq!(image.path(), "/opt/bin:/bin");
                 assert_eq!(image.text("agent/agent"), "program");
                 assert_eq!(image.link("bin"), "usr/bin");
-                // Nothing is left of what it came in.
+                // The files of the archive have been removed.
                 let left: Vec<_> = fs::read_dir(dir.path().join("out")).unwrap().collect();
                 assert_eq!(left.len(), 1, "{left:?}");
             }
@@ -149,8 +149,8 @@ fn an_image_is_accepted_as_engines_save_it() {
 }
 
 #[test]
-fn both_descriptions_at_once_are_one_image() {
-    let image = TestImage::of([base(), agent_layer()]).packed(Packing::Gzip);
+fn docker_list_and_oci_layout_together_are_one_image() {
+    let image = TestImage::new([base(), agent_layer()]).packed(Packing::Gzip);
     let (tar, descriptor) = image.blobs(layout());
     let names: Vec<String> = image
         .packed_layers()
@@ -165,7 +165,7 @@ fn both_descriptions_at_once_are_one_image() {
 }
 
 #[test]
-fn modes_are_the_sandboxs_and_set_id_bits_go() {
+fn modes_are_normalised_and_set_id_bits_dropped() {
     let (_dir, image) = root_of([base()
         .entry(EntryType::Directory, "closed/", 0o2700, "", b"")
         .file("closed/secret", 0o400, b"x")]);
@@ -177,7 +177,7 @@ fn modes_are_the_sandboxs_and_set_id_bits_go() {
 }
 
 #[test]
-fn what_the_sandbox_needs_is_there_and_nothing_of_its_folders() {
+fn sandbox_files_exist_and_sandbox_folders_are_empty() {
     let (_dir, image) = root_of([Tar::new()
         .file("tmp/x", 0o644, b"x")
         .symlink("dev", "/somewhere")
@@ -211,7 +211,7 @@ fn what_the_sandbox_needs_is_there_and_nothing_of_its_folders() {
 }
 
 #[test]
-fn whiteouts_hide_what_is_below_and_nothing_else() {
+fn whiteouts_hide_only_lower_layers() {
     let (_dir, image) = root_of([
         base(),
         Tar::new()
@@ -222,20 +222,20 @@ fn whiteouts_hide_what_is_below_and_nothing_else() {
             .file(".wh.tmp", 0o644, b"")
             .file("lib/.wh..wh.plnk", 0o644, b""),
     ]);
-    assert!(!image.is_there("lib/deep/one"));
-    assert!(!image.is_there("bin"));
-    assert!(!image.is_there("gone"));
-    assert!(!image.is_there("lib/.wh..wh.plnk"));
+    assert!(!image.exists("lib/deep/one"));
+    assert!(!image.exists("bin"));
+    assert!(!image.exists("gone"));
+    assert!(!image.exists("lib/.wh..wh.plnk"));
     assert_eq!(image.text("lib/deep/two"), "two");
     assert_eq!(image.text("usr/bin/tool"), "tool");
-    assert!(image.is_there("tmp"));
+    assert!(image.exists("tmp"));
     let whole = |layer: Tar| {
         let (_dir, image) = root_of([base(), layer]);
-        assert!(!image.is_there("lib/deep/one"));
+        assert!(!image.exists("lib/deep/one"));
         assert_eq!(image.text("lib/new"), "new");
         assert_eq!(image.text("usr/bin/tool"), "tool");
     };
-    // Before and after what the same layer brings.
+    // Before and after other entries of the same layer.
     let new = || Tar::new().folder("lib/").file("lib/new", 0o644, b"new");
     whole(
         Tar::new()
@@ -258,7 +258,7 @@ fn whiteouts_hide_what_is_below_and_nothing_else() {
 }
 
 #[test]
-fn empty_folders_are_there_unless_hidden_or_replaced() {
+fn empty_folders_exist_unless_hidden_or_replaced() {
     let (_dir, image) = root_of([
         Tar::new()
             .entry(EntryType::Directory, "var/empty/", 0o700, "", b"")
@@ -289,7 +289,7 @@ fn empty_folders_are_there_unless_hidden_or_replaced() {
         assert_eq!(image.mode(folder), 0o755, "{folder}");
     }
     for gone in ["var/hidden", "opaque/deep", "tmp/deep"] {
-        assert!(!image.is_there(gone), "{gone}");
+        assert!(!image.exists(gone), "{gone}");
     }
     assert_eq!(image.text("var/file"), "now a file");
     assert_eq!(image.text("var/filled/deep/x"), "x");
@@ -297,18 +297,18 @@ fn empty_folders_are_there_unless_hidden_or_replaced() {
 }
 
 #[test]
-fn folders_of_a_layer_beyond_the_limit_are_not_made() {
+fn layer_folders_beyond_the_limit_are_not_created() {
     let limits = BundleLimits {
         files: 20,
         ..BundleLimits::default()
     };
     let folders = (0..21).fold(Tar::new(), |tar, index| tar.folder(&format!("d{index}/")));
-    let (dir, result) = try_unpack(&TestImage::of([folders]).docker().gz(), limits);
-    let Err(BundleError::Invalid(told)) = result else {
+    let (dir, result) = try_unpack(&TestImage::new([folders]).docker().gz(), limits);
+    let Err(BundleError::Invalid(message)) = result else {
         panic!("{result:?}");
     };
     assert_eq!(
-        told,
+        message,
         "layer 1 of the image's 1 (COPY . /agent): the container image has more than 20 folders in all layers"
     );
     let made: Vec<_> = fs::read_dir(dir.path().join("out/root0"))
@@ -318,18 +318,18 @@ fn folders_of_a_layer_beyond_the_limit_are_not_made() {
 }
 
 #[test]
-fn an_opaque_root_hides_all_that_is_below() {
+fn opaque_root_hides_all_lower_layers() {
     let (_dir, image) = root_of([
         base(),
         Tar::new()
             .file("agent/agent.toml", 0o644, IMAGE_MANIFEST.as_bytes())
             .file(".wh..wh..opq", 0o644, b""),
     ]);
-    assert!(!image.is_there("usr") && !image.is_there("agent/agent"));
+    assert!(!image.exists("usr") && !image.exists("agent/agent"));
 }
 
 #[test]
-fn whiteouts_of_no_name_are_refused() {
+fn whiteouts_without_a_name_are_refused() {
     for name in [".wh.", "lib/.wh..", "lib/.wh..."] {
         layer_refused(
             [base(), Tar::new().file(name, 0o644, b"")],
@@ -339,7 +339,7 @@ fn whiteouts_of_no_name_are_refused() {
 }
 
 #[test]
-fn later_layers_replace_what_is_there() {
+fn later_layers_replace_earlier_entries() {
     let (_dir, image) = root_of([
         base(),
         Tar::new()
@@ -357,10 +357,10 @@ fn later_layers_replace_what_is_there() {
     assert_eq!(
         image.text("bin/own"),
         "newer",
-        "a folder again is the same folder"
+        "a repeated folder is the same folder"
     );
     assert!(
-        !image.is_there("usr/bin/own"),
+        !image.exists("usr/bin/own"),
         "the link was replaced, not followed"
     );
 }
@@ -371,15 +371,15 @@ fn hard_links_keep_a_file_that_is_replaced() {
         |tar: Tar, name: &str, target: &str| tar.entry(EntryType::Link, name, 0o644, target, b"");
     let (_dir, image) = root_of([
         base(),
-        // Through a link of the image, to a file below and to a link, which is not followed.
+        // Through a link of the image: to a file of a lower layer, and to a link, which is not followed.
         hard(hard(Tar::new(), "kept", "bin/tool"), "alias", "bin"),
         Tar::new().file("usr/bin/tool", 0o755, b"newer"),
         Tar::new().file("usr/bin/.wh.tool", 0o644, b""),
     ]);
     assert_eq!(image.text("kept"), "tool");
     assert_eq!(image.link("alias"), "usr/bin");
-    assert!(!image.is_there("usr/bin/tool"));
-    // What an archiver is told of twice is a link to itself; some builders write paths from the root.
+    assert!(!image.exists("usr/bin/tool"));
+    // Archivers write a link to itself for a repeated file; some builders write absolute paths.
     let twice = hard(Tar::new(), "lib/deep/two", "./lib/deep/two");
     let (_dir, image) = root_of([base(), twice, hard(Tar::new(), "same", "/lib/deep/two")]);
     assert_eq!(image.text("lib/deep/two"), "two");
@@ -424,12 +424,12 @@ fn hard_links_keep_a_file_that_is_replaced() {
 }
 
 #[test]
-fn links_of_the_image_never_lead_to_the_host() {
+fn image_links_never_lead_to_the_host() {
     let host = host_folder();
     fs::write(host.path().join("mine"), "mine").unwrap();
-    let there = host.path().to_str().unwrap();
-    let up = format!("../../../../../../../../..{there}");
-    for target in [there, &up] {
+    let host_path = host.path().to_str().unwrap();
+    let up = format!("../../../../../../../../..{host_path}");
+    for target in [host_path, &up] {
         let (_dir, image) = root_of([
             Tar::new().symlink("a", target).symlink("b", "a"),
             Tar::new()
@@ -442,8 +442,8 @@ fn links_of_the_image_never_lead_to_the_host() {
                 .folder("a/folder/")
                 .file("b/.wh..wh..opq", 0o644, b""),
         ]);
-        // They led into the root, as in the sandbox.
-        let inside = |name: &str| image.root.join(&there[1..]).join(name);
+        // The links were resolved inside of the root, as in the sandbox.
+        let inside = |name: &str| image.root.join(&host_path[1..]).join(name);
         assert!(inside("folder").is_dir());
         assert!(!inside("kept").exists() && !inside("mine").exists());
         assert_eq!(image.link("a"), target);
@@ -457,7 +457,7 @@ fn links_of_the_image_never_lead_to_the_host() {
 }
 
 #[test]
-fn links_in_circles_and_endless_paths_end() {
+fn link_cycles_and_endless_paths_are_refused() {
     layer_refused(
         [Tar::new()
             .symlink("a", "b")
@@ -477,7 +477,7 @@ fn links_in_circles_and_endless_paths_end() {
         [Tar::new().file("a", 0o644, b"").file("a/b", 0o644, b"")],
         "entry \"a/b\" needs \"a\" to be a folder, but it is a file",
     );
-    // Far more names than an honest image has, in a small archive.
+    // A small archive with far more lookups than an honest image.
     let detour = "a/../".repeat(17);
     let links = (0..38).fold(Tar::new().folder("a/").symlink("l0", "a"), |tar, index| {
         tar.symlink(&format!("l{}", index + 1), &format!("{detour}l{index}"))
@@ -490,8 +490,8 @@ fn links_in_circles_and_endless_paths_end() {
 }
 
 #[test]
-fn names_that_lead_out_are_refused() {
-    // In an image a slash is the image's root, as builders write it; in the archive it is none.
+fn names_outside_the_image_are_refused() {
+    // In a layer a leading slash means the image's root, as some builders write it; in the archive it is refused.
     let slashes = Tar::new()
         .folder("/")
         .folder("//opt/")
@@ -527,7 +527,7 @@ fn names_that_lead_out_are_refused() {
 }
 
 #[test]
-fn devices_are_left_out_and_overlays_own_whiteouts_refused() {
+fn devices_are_skipped_and_overlayfs_whiteouts_refused() {
     let mut device = Tar::new();
     for (kind, name) in [
         (EntryType::Block, "disk"),
@@ -537,7 +537,7 @@ fn devices_are_left_out_and_overlays_own_whiteouts_refused() {
         device = device.entry(kind, name, 0o666, "", b"");
     }
     let (_dir, image) = root_of([device]);
-    assert!(!image.is_there("disk") && !image.is_there("pipe"));
+    assert!(!image.exists("disk") && !image.exists("pipe"));
     layer_refused(
         [Tar::new().entry(EntryType::Char, "lib/gone", 0o666, "", b"")],
         "entry \"lib/gone\" is a whiteout of overlayfs (a device 0/0), which layers do not have: expected what \
@@ -546,51 +546,51 @@ fn devices_are_left_out_and_overlays_own_whiteouts_refused() {
 }
 
 #[test]
-fn an_agent_is_a_real_folder_with_a_real_file() {
-    const HINT: &str = "an image holds the agent's folder as /agent, with its agent.toml (runtime = \"image\"): put \
-                        `COPY . /agent` into the Dockerfile that lies in that folder";
+fn agent_folder_and_manifest_must_not_be_links() {
+    const HINT: &str = "an image contains the agent's folder as /agent, with its agent.toml (runtime = \"image\"): put \
+                        `COPY . /agent` into the Dockerfile in that folder";
     let host = tempfile::tempdir().unwrap();
     fs::write(host.path().join("agent.toml"), IMAGE_MANIFEST).unwrap();
-    let there = host.path().to_str().unwrap();
-    let of = |layer: Tar| TestImage::of([layer]).docker().bytes();
+    let host_path = host.path().to_str().unwrap();
+    let archive_of = |layer: Tar| TestImage::new([layer]).docker().bytes();
     refused(
-        &of(base()),
+        &archive_of(base()),
         &format!("the container image has no /agent; {HINT}"),
     );
     refused(
-        &of(Tar::new().folder("agent/")),
+        &archive_of(Tar::new().folder("agent/")),
         &format!("the container image has no /agent/agent.toml; {HINT}"),
     );
     refused(
-        &of(Tar::new().symlink("agent", there)),
-        &format!("the container image has something else than a folder as /agent; {HINT}"),
+        &archive_of(Tar::new().symlink("agent", host_path)),
+        &format!("the container image has something other than a folder as /agent; {HINT}"),
     );
     for layer in [
-        Tar::new().symlink("agent/agent.toml", &format!("{there}/agent.toml")),
+        Tar::new().symlink("agent/agent.toml", &format!("{host_path}/agent.toml")),
         Tar::new().folder("agent/agent.toml/"),
     ] {
         refused(
-            &of(layer),
-            "the container image has something else than a file as /agent/agent.toml",
+            &archive_of(layer),
+            "the container image has something other than a file as /agent/agent.toml",
         );
     }
     for etc in [
-        Tar::new().symlink("etc", there),
+        Tar::new().symlink("etc", host_path),
         Tar::new().file("etc", 0o644, b""),
     ] {
         refused(
             &TestImage::agent([etc]).docker().bytes(),
-            "the container image has something else than a folder as /etc",
+            "the container image has something other than a folder as /etc",
         );
     }
     assert_eq!(fs::read_dir(host.path()).unwrap().count(), 1);
 }
 
 #[test]
-fn runtime_and_bundle_agree() {
+fn runtime_must_match_the_bundle() {
     let plain = Tar::new().file("agent/agent.toml", 0o644, MANIFEST.as_bytes());
     refused(
-        &TestImage::of([plain]).docker().bytes(),
+        &TestImage::new([plain]).docker().bytes(),
         "agent.toml: runtime is \"python3\", and the bundle is a container image, which brings its own: expected \
          \"image\"",
     );
@@ -601,10 +601,10 @@ fn runtime_and_bundle_agree() {
     let folder = tempfile::tempdir().unwrap();
     fs::write(folder.path().join("agent.toml"), IMAGE_MANIFEST).unwrap();
     match open(folder.path(), folder.path(), &BundleLimits::default()) {
-        Err(BundleError::Invalid(told)) => assert_eq!(told, no_image),
+        Err(BundleError::Invalid(message)) => assert_eq!(message, no_image),
         other => panic!("{other:?}"),
     }
-    // An agent.toml at the archive's root makes it a bundle, whatever else is there.
+    // With an agent.toml at its root, an archive is a bundle, even if it has other files of an image.
     let (_dir, result) = try_unpack(
         &Tar::with_manifest()
             .file("manifest.json", 0o644, b"{}")
@@ -615,7 +615,7 @@ fn runtime_and_bundle_agree() {
 }
 
 #[test]
-fn a_plain_tar_is_an_image_or_refused() {
+fn plain_tar_is_an_image_or_refused() {
     refused(
         &Tar::with_manifest().bytes(),
         "a plain .tar is accepted of a container image only: compress the bundle to .tar.gz",
@@ -629,7 +629,7 @@ fn a_plain_tar_is_an_image_or_refused() {
 }
 
 #[test]
-fn an_archive_holds_one_image() {
+fn archive_must_hold_one_image() {
     let one = TestImage::agent([]);
     let entry = json!({"Config": "config.json", "Layers": ["layer0/layer.tar"]});
     let other = json!({"Config": "other.json", "Layers": ["layer0/layer.tar"]});
@@ -645,12 +645,12 @@ fn an_archive_holds_one_image() {
     accepted(&docker(&json!([entry, entry])));
     let several = |tags: &str| {
         format!(
-            "the archive holds 2 container images{tags}: expected one; save the agent's alone, by its name and its tag: \
+            "the archive contains 2 container images{tags}: expected one; save the agent's alone, by its name and its tag: \
              `docker save -o ours.tar ours:latest`"
         )
     };
     refused(&docker(&json!([entry, other])), &several(""));
-    // Who names no tag saves all.
+    // Docker saves all tags if none is given.
     let (mut first, mut second) = (entry.clone(), other);
     first["RepoTags"] = json!(["ours:v2", "ours:latest"]);
     second["RepoTags"] = json!(["ours:v1"]);
@@ -660,7 +660,7 @@ fn an_archive_holds_one_image() {
     );
     refused_near(&docker(&json!([])), "is missing: manifest.json names none");
     let (tar, first) = TestImage::agent([]).blobs(layout());
-    let (tar, second) = TestImage::of([base()]).blobs(tar);
+    let (tar, second) = TestImage::new([base()]).blobs(tar);
     refused(&index(tar, &[first, second]).bytes(), &several(""));
     refused_near(&docker(&json!(null)), "cannot be read: manifest.json");
     let none = layout().file("index.json", 0o644, b"{\"manifests\":null}");
@@ -674,22 +674,22 @@ fn an_archive_holds_one_image() {
 }
 
 #[test]
-fn of_several_platforms_the_hosts_is_taken() {
-    let of = |architecture: &str, os: &str| json!({"architecture": architecture, "os": os});
-    let ours = TestImage::agent([base()]);
+fn image_of_the_hosts_platform_is_chosen() {
+    let platform = |architecture: &str, os: &str| json!({"architecture": architecture, "os": os});
+    let host_image = TestImage::agent([base()]);
     let host = if cfg!(target_arch = "x86_64") {
         "amd64"
     } else {
         "arm64"
     };
-    let (tar, mut here) = ours.blobs(layout());
-    here["platform"] = of(host, "linux");
-    let (tar, mut there) = TestImage::of([Tar::new()]).blobs(tar);
-    there["platform"] = of("riscv64", "linux");
-    let told_of = json!({
+    let (tar, mut for_host) = host_image.blobs(layout());
+    for_host["platform"] = platform(host, "linux");
+    let (tar, mut for_riscv) = TestImage::new([Tar::new()]).blobs(tar);
+    for_riscv["platform"] = platform("riscv64", "linux");
+    let attestation = json!({
         "mediaType": "application/vnd.oci.image.manifest.v1+json",
         "digest": digest(b"attestation"),
-        "platform": of("unknown", "unknown"),
+        "platform": platform("unknown", "unknown"),
         "annotations": {"vnd.docker.reference.type": "attestation-manifest"},
     });
     let nested = |tar: Tar, images: serde_json::Value| {
@@ -699,12 +699,12 @@ fn of_several_platforms_the_hosts_is_taken() {
         let entry = json!({"mediaType": "application/vnd.oci.image.index.v1+json", "digest": name});
         index(tar, &[entry]).bytes()
     };
-    let (_dir, _, image) = accepted(&nested(tar.clone(), json!([there, here, told_of])));
+    let (_dir, _, image) = accepted(&nested(tar.clone(), json!([for_riscv, for_host, attestation])));
     assert_eq!(image.text("usr/bin/tool"), "tool");
-    let mut elsewhere = here.clone();
-    elsewhere["platform"] = of(host, "windows");
+    let mut for_windows = for_host.clone();
+    for_windows["platform"] = platform(host, "windows");
     refused(
-        &nested(tar.clone(), json!([there, elsewhere])),
+        &nested(tar.clone(), json!([for_riscv, for_windows])),
         &format!(
             "the container image is for linux/riscv64, windows/{host}, and this server runs linux/{host}: build it \
              with --platform linux/{host}, and save that one"
@@ -718,13 +718,13 @@ fn of_several_platforms_the_hosts_is_taken() {
         );
         refused_near(&image.docker().bytes(), value);
     }
-    // Docker's list has the image of the machine that saved it, the layout beside it has all.
-    let there =
-        TestImage::of([Tar::new()]).config(|config| config["architecture"] = "riscv64".into());
-    let (tar, mut theirs) = there.blobs(layout());
-    let (tar, mut here) = ours.blobs(tar);
-    theirs["platform"] = of("riscv64", "linux");
-    here["platform"] = of(host, "linux");
+    // Docker's list has the image of the machine that saved it; the layout has all.
+    let for_riscv =
+        TestImage::new([Tar::new()]).config(|config| config["architecture"] = "riscv64".into());
+    let (tar, mut riscv) = for_riscv.blobs(layout());
+    let (tar, mut for_host) = host_image.blobs(tar);
+    riscv["platform"] = platform("riscv64", "linux");
+    for_host["platform"] = platform(host, "linux");
     let names = |image: &TestImage| {
         let blob = |bytes: &[u8]| format!("blobs/{}", digest(bytes).replace(':', "/"));
         let layers: Vec<String> = image
@@ -736,19 +736,19 @@ fn of_several_platforms_the_hosts_is_taken() {
     };
     let both = |images: &[serde_json::Value]| {
         let tar = index(tar.clone(), images);
-        tar.file("manifest.json", 0o644, &names(&there)).bytes()
+        tar.file("manifest.json", 0o644, &names(&for_riscv)).bytes()
     };
-    let (_dir, _, image) = accepted(&both(&[theirs.clone(), here.clone()]));
+    let (_dir, _, image) = accepted(&both(&[riscv.clone(), for_host.clone()]));
     assert_eq!(image.text("usr/bin/tool"), "tool");
     refused_near(
-        &both(&[theirs]),
+        &both(&[riscv]),
         &format!("is for linux/riscv64, and this server runs linux/{host}"),
     );
-    // One that needs a newer processor, and something that says nothing of where it runs.
-    let (tar, mut newer) = TestImage::of([Tar::new().folder("newer/")]).blobs(tar.clone());
+    // One image needs a newer CPU, and one entry has no platform.
+    let (tar, mut newer) = TestImage::new([Tar::new().folder("newer/")]).blobs(tar.clone());
     newer["platform"] = json!({"architecture": host, "os": "linux", "variant": "v3"});
-    let (tar, signature) = TestImage::of([Tar::new().folder("signed/")]).blobs(tar);
-    accepted(&index(tar, &[newer, here, signature]).bytes());
+    let (tar, signature) = TestImage::new([Tar::new().folder("signed/")]).blobs(tar);
+    accepted(&index(tar, &[newer, for_host, signature]).bytes());
     let none =
         TestImage::agent([]).config(|config| drop(config.as_object_mut().unwrap().remove("os")));
     refused_near(
@@ -758,7 +758,7 @@ fn of_several_platforms_the_hosts_is_taken() {
 }
 
 #[test]
-fn documents_that_make_no_sense_are_told_by_name() {
+fn invalid_documents_are_named() {
     let docker = |text: &[u8]| {
         Tar::new()
             .file("config.json", 0o644, &TestImage::agent([]).config_bytes())
@@ -789,7 +789,7 @@ fn documents_that_make_no_sense_are_told_by_name() {
     );
     for outside in ["../secret", "/etc/passwd", "missing", "", "config.json/x"] {
         let named = list(&json!([{"Config": "config.json", "Layers": [outside]}]));
-        let one = TestImage::of([Tar::new()]);
+        let one = TestImage::new([Tar::new()]);
         let tar = Tar::new().file("config.json", 0o644, &one.config_bytes());
         refused(
             &tar.file("manifest.json", 0o644, &named).bytes(),
@@ -827,7 +827,7 @@ fn documents_that_make_no_sense_are_told_by_name() {
     let wrong = TestImage::agent([]).config(|config| config["rootfs"]["diff_ids"] = json!([]));
     refused(
         &wrong.docker().bytes(),
-        "the container image has 1 layers, and its configuration knows of 0",
+        "the container image has 1 layers, and its configuration lists 0",
     );
     let wrong = TestImage::agent([]).config(|config| config["config"]["Env"] = json!(["a"]));
     refused(
@@ -840,7 +840,7 @@ fn documents_that_make_no_sense_are_told_by_name() {
 }
 
 #[test]
-fn lists_that_name_lists_end() {
+fn nested_lists_are_bounded() {
     let mut tar = layout();
     let mut entry = json!({"digest": digest(b"nothing")});
     for _ in 0..70 {
@@ -865,9 +865,9 @@ fn content_that_differs_from_its_digest_is_refused() {
     let other = image.config(|config| config["rootfs"]["diff_ids"][1] = one.clone().into());
     refused_near(
         &other.docker().bytes(),
-        "layer 2 of the image's 2: its uncompressed content is not what the image says: expected SHA-256",
+        "layer 2 of the image's 2: its uncompressed content differs from the image's digest: expected SHA-256",
     );
-    // A blob of a layout that is not what it is named after.
+    // A blob of a layout whose content differs from its name.
     let image = TestImage::agent([]).packed(Packing::Gzip);
     let real = image.packed_layers().remove(0);
     let (tar, descriptor) = image.blobs(layout());
@@ -880,14 +880,14 @@ fn content_that_differs_from_its_digest_is_refused() {
     refused_near(
         &bytes,
         &format!(
-            "blobs/{} is not what the image says",
+            "blobs/{} differs from the image's digest",
             digest(&real).replace(':', "/")
         ),
     );
 }
 
 #[test]
-fn what_follows_a_layers_end_is_part_of_its_digest() {
+fn padding_of_a_layer_is_part_of_its_digest() {
     let image = TestImage::agent([]);
     let layer = image.packed_layers().remove(0);
     let mut bytes = image.layout().bytes();
@@ -898,22 +898,22 @@ fn what_follows_a_layers_end_is_part_of_its_digest() {
     bytes[at + layer.len() - 1] = 1;
     refused_near(
         &bytes,
-        "layer 1 of the image's 1 (COPY . /agent): its uncompressed content is not what the image says: expected SHA-256",
+        "layer 1 of the image's 1 (COPY . /agent): its uncompressed content differs from the image's digest: ",
     );
 }
 
 #[test]
-fn a_layer_that_is_named_again_and_again_counts_as_often() {
-    // It holds nothing, and takes long to find that out.
+fn repeated_layer_counts_each_time() {
+    // An empty layer that takes long to read.
     let mut encoder = GzEncoder::new(Vec::new(), Compression::fast());
     encoder.write_all(&Tar::new().bytes()).unwrap();
     let mut layer = encoder.finish().unwrap();
-    // An empty stream after another, which are one to a reader.
+    // Successive empty streams, which a reader treats as one.
     let empty = GzEncoder::new(Vec::new(), Compression::fast());
     let empty = empty.finish().unwrap();
     layer.extend(empty.repeat(20_000 / empty.len()));
     let again = 50;
-    let one = TestImage::of((0..again).map(|_| Tar::new()));
+    let one = TestImage::new((0..again).map(|_| Tar::new()));
     let archive = |names: Vec<&str>| {
         let named = json!([{"Config": "config.json", "Layers": names}]);
         Tar::new()
@@ -927,19 +927,19 @@ fn a_layer_that_is_named_again_and_again_counts_as_often() {
         ..BundleLimits::default()
     };
     assert_eq!(
-        told(&archive(vec!["layer"; again]), limits),
-        "layer 10 of the image's 50: the image's layers have more than 200000 bytes, those that it names twice counted \
-         twice"
+        refusal(&archive(vec!["layer"; again]), limits),
+        "layer 10 of the image's 50: the image's layers have more than 200000 bytes, counting a layer each time that it \
+         is named"
     );
 }
 
 #[test]
-fn a_layer_may_come_twice_and_be_empty() {
+fn layer_may_be_repeated_or_empty() {
     let image = TestImage::agent([base(), Tar::new(), base(), Tar::new()]);
     let (_dir, _, image) = accepted(&image.layout().bytes());
     assert_eq!(image.text("usr/bin/tool"), "tool");
-    // Named twice in Docker's list, it is one file.
-    let one = TestImage::of([agent_layer(), agent_layer()]);
+    // Named twice in Docker's list, the layer is a single file.
+    let one = TestImage::new([agent_layer(), agent_layer()]);
     let twice = Tar::new()
         .file("config.json", 0o644, &one.config_bytes())
         .file("layer.tar", 0o644, &one.packed_layers()[0])
@@ -951,9 +951,9 @@ fn a_layer_may_come_twice_and_be_empty() {
     accepted(&twice.bytes());
 }
 
-/// As versions of Docker before 25 save layers that are the same: the first is a file, all others lead to it.
+/// Docker before version 25 saves equal layers as one file and links to it.
 #[test]
-fn layers_that_are_the_same_are_links_to_one_of_them() {
+fn equal_layers_may_be_links() {
     for order in [[0, 0, 1], [0, 1, 0], [1, 0, 0]] {
         let layers = order.map(|kind| [Tar::new, base][kind]());
         let image = TestImage::agent(layers);
@@ -973,7 +973,7 @@ fn layers_that_are_the_same_are_links_to_one_of_them() {
 }
 
 #[test]
-fn other_names_of_what_is_left_out_are_kept() {
+fn hard_links_to_removed_files_are_kept() {
     let hard =
         |tar: Tar, name: &str, target: &str| tar.entry(EntryType::Link, name, 0o644, target, b"");
     let cache = Tar::new().file("tmp/cache/a", 0o644, b"wheel").entry(
@@ -989,12 +989,12 @@ fn other_names_of_what_is_left_out_are_kept() {
         "opt/pipe",
     )]);
     assert_eq!(image.text("usr/b"), "wheel");
-    assert!(!image.is_there("tmp/cache") && !image.is_there("opt/another"));
+    assert!(!image.exists("tmp/cache") && !image.exists("opt/another"));
 }
 
 #[test]
-fn no_name_in_an_archive_keeps_the_root_from_its_place() {
-    // The longest name that a file can have, and all that lead to it.
+fn root_folder_avoids_names_of_the_archive() {
+    // Names of all lengths up to the longest that a file can have.
     let mut tar = TestImage::agent([base()]).docker();
     for length in 4..=255 {
         let name = format!("root{}", "_".repeat(length - 4));
@@ -1009,7 +1009,7 @@ fn no_name_in_an_archive_keeps_the_root_from_its_place() {
 }
 
 #[test]
-fn an_image_may_be_packed_with_its_folder() {
+fn image_may_be_packed_with_its_folder() {
     for tar in [TestImage::docker, TestImage::layout] {
         let image = tar(&TestImage::agent([base()])).bytes();
         let mut archive = tar::Archive::new(&image[..]);
@@ -1034,7 +1034,7 @@ fn an_image_may_be_packed_with_its_folder() {
 }
 
 #[test]
-fn empty_folders_of_the_archive_leave_nothing() {
+fn empty_archive_folders_are_removed() {
     let tar = TestImage::agent([base()]).docker();
     let bytes = tar.folder("empty/deep/").folder("layer0/empty/").gz();
     let (dir, _, image) = accepted(&bytes);
@@ -1044,7 +1044,7 @@ fn empty_folders_of_the_archive_leave_nothing() {
 }
 
 #[test]
-fn what_may_have_been_meant_is_told() {
+fn refusal_hints_at_the_probable_mistake() {
     let exported = "This looks like the file system of a container (`docker export`): send its image, as `docker save` \
                     writes it";
     let system = || Tar::new().folder("etc/").folder("usr/");
@@ -1078,12 +1078,12 @@ fn what_may_have_been_meant_is_told() {
         );
     }
     let (tar, descriptor) = TestImage::agent([]).blobs(layout());
-    let lacking = TestImage::of([Tar::new().folder("lacking/")]);
+    let lacking = TestImage::new([Tar::new().folder("lacking/")]);
     let (_, absent) = lacking.blobs(layout());
     drop(descriptor);
     refused_near(
         &index(tar, &[absent]).bytes(),
-        "which is no file of the archive: pull or build the image again, and save it anew",
+        "which is no file of the archive: pull or build the image again, and save it again",
     );
 }
 
@@ -1100,25 +1100,25 @@ fn limits_hold_over_all_layers() {
         files: 20,
         ..BundleLimits::default()
     };
-    let of = |layers: Vec<Tar>| TestImage::agent(layers).packed(Packing::Gzip).docker().gz();
-    // The same file again and again is written each time, and counts each time.
+    let archive = |layers: Vec<Tar>| TestImage::agent(layers).packed(Packing::Gzip).docker().gz();
+    // A file that is repeated in several layers is written each time, and counts each time.
     let big = || Tar::new().file("big", 0o644, &[0; 40_000]);
-    assert!(try_unpack(&of(vec![big(), big()]), limits).1.is_ok());
-    let too_much = |layer: usize, of: usize, entry: &str| {
+    assert!(try_unpack(&archive(vec![big(), big()]), limits).1.is_ok());
+    let too_much = |layer: usize, count: usize, entry: &str| {
         format!(
-            "layer {layer} of the image's {of}: what the image's layers hold comes to more than 100000 bytes (stopped \
-             at entry {entry:?}): begin with a smaller image, and install and clean up in one step"
+            "layer {layer} of the image's {count}: the image's layers contain more than 100000 bytes (stopped at entry \
+             {entry:?}): start from a smaller image, and install and clean up in one step"
         )
     };
     assert_eq!(
-        told(&of(vec![big(), big(), big()]), limits),
+        refusal(&archive(vec![big(), big(), big()]), limits),
         too_much(4, 4, "big")
     );
     // A bomb in a layer is stopped at the limit.
     let bomb = Tar::new().file("bomb", 0o644, &vec![0; 30 << 20]);
     let bomb = TestImage::agent([bomb]).packed(Packing::Zstd).docker();
-    assert_eq!(told(&bomb.gz(), limits), too_much(2, 2, "bomb"));
-    // Wherever it lies, and whether anything comes of it or not.
+    assert_eq!(refusal(&bomb.gz(), limits), too_much(2, 2, "bomb"));
+    // In any folder, even if the file is left out.
     for name in [
         "tmp/bomb",
         "dev/bomb",
@@ -1133,47 +1133,47 @@ fn limits_hold_over_all_layers() {
     ] {
         let bomb = Tar::new().file(name, 0o644, &vec![0; 30 << 20]);
         let bomb = TestImage::agent([base(), bomb]).packed(Packing::Zstd);
-        let told_of = told(&bomb.docker().gz(), limits);
+        let message = refusal(&bomb.docker().gz(), limits);
         let expected = match name {
-            "/" => "more than its files explain".to_owned(),
+            "/" => "more bytes than its files explain".to_owned(),
             _ => too_much(3, 3, name),
         };
-        assert!(told_of.contains(&expected), "{name}: {told_of}");
+        assert!(message.contains(&expected), "{name}: {message}");
     }
     let padded = Tar::new().entry(EntryType::Directory, "x", 0o755, "", &vec![0; 30 << 20]);
     let padded = TestImage::agent([padded]).packed(Packing::Zstd).docker();
-    let told_of = told(&padded.gz(), limits);
-    assert!(told_of.contains("more than its files explain"), "{told_of}");
+    let message = refusal(&padded.gz(), limits);
+    assert!(message.contains("more bytes than its files explain"), "{message}");
     let files = |count: usize, of_layer: usize| {
         (0..count).fold(Tar::new(), |tar, index| {
             tar.file(&format!("f{of_layer}-{index}"), 0o644, b"")
         })
     };
     assert_eq!(
-        told(&of(vec![files(10, 1), files(10, 2)]), limits),
+        refusal(&archive(vec![files(10, 1), files(10, 2)]), limits),
         "layer 3 of the image's 3: the container image has more than 20 files in all layers"
     );
     let folders = (0..21).fold(Tar::new(), |tar, index| tar.folder(&format!("d{index}/")));
     assert_eq!(
-        told(&of(vec![folders]), limits),
+        refusal(&archive(vec![folders]), limits),
         "layer 2 of the image's 2: the container image has more than 20 folders in all layers"
     );
     let again = (0..100).fold(Tar::new(), |tar, _| tar.folder("d/"));
     assert_eq!(
-        told(&of(vec![again]), limits),
+        refusal(&archive(vec![again]), limits),
         "layer 2 of the image's 2: the archive has more than 80 entries of all kinds"
     );
 }
 
 #[test]
-fn a_cancelled_image_stops() {
+fn cancelled_image_stops() {
     let dir = tempfile::tempdir().unwrap();
     let archive = write(
         dir.path(),
         "upload",
         &TestImage::agent([base()]).docker().gz(),
     );
-    // At each of the moments at which it may be asked for.
+    // At each call of the cancellation check.
     for moment in 0..400 {
         let into = dir.path().join(format!("out{moment}"));
         let asked = std::cell::Cell::new(0);
@@ -1183,7 +1183,7 @@ fn a_cancelled_image_stops() {
         };
         match unpack(&archive, &into, &BundleLimits::default(), &cancelled) {
             Err(BundleError::Cancelled) => {}
-            Ok(_) => return assert!(moment > 20, "it was asked {moment} times only"),
+            Ok(_) => return assert!(moment > 20, "only {moment} checks"),
             other => panic!("{other:?}"),
         }
     }
@@ -1191,7 +1191,7 @@ fn a_cancelled_image_stops() {
 }
 
 #[test]
-fn the_folder_may_lie_behind_a_link_of_the_hosts() {
+fn target_folder_may_be_behind_a_link() {
     let dir = tempfile::tempdir().unwrap();
     fs::create_dir(dir.path().join("real")).unwrap();
     symlink("real", dir.path().join("way")).unwrap();

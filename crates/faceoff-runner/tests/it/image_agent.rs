@@ -1,4 +1,4 @@
-//! An agent that is a container image, from the archive to its verdict.
+//! An agent that is a container image, from the archive to the verdict.
 
 use crate::{
     agents::sandboxed,
@@ -6,30 +6,30 @@ use crate::{
     image_archives::{HOLDS_A_POSE, HOLDS_A_POSE_TOML, shell_agent},
 };
 use faceoff_runner::{
-    AgentEnvironment, SmokeDefect, SmokeReport, SmokeSpec,
+    AgentEnvironment, ValidationFailure, ValidationReport, ValidationSpec,
     bundle::{BundleLimits, unpack},
-    smoke,
+    validate,
 };
 use faceoff_sandbox::{Isolation, Layer};
 use faceoff_types::{AgentFaultKind, Seed};
 
-fn report_in(env: &AgentEnvironment) -> SmokeReport {
+fn report_in(env: &AgentEnvironment) -> ValidationReport {
     let dir = tempfile::tempdir().unwrap();
     let image = shell_agent(HOLDS_A_POSE_TOML, HOLDS_A_POSE);
     let archive = write(dir.path(), "ours.tar.gz", &image.docker().gz());
     let limits = BundleLimits::default();
     let bundle = unpack(&archive, &dir.path().join("bundle"), &limits, &|| false).unwrap();
     let seed = Seed::from_number(0);
-    let spec = SmokeSpec {
+    let spec = ValidationSpec {
         seed,
         mismatch_seed: seed.model_mismatch(),
     };
-    smoke(&spec, &bundle, env, &|| false).expect("the platform works")
+    validate(&spec, &bundle, env, &|| false).expect("the platform works")
 }
 
 fn refusal(env: &AgentEnvironment) -> String {
-    match report_in(env).defect {
-        Some(SmokeDefect::Fault { fault, .. }) => match fault.fault {
+    match report_in(env).failure {
+        Some(ValidationFailure::Fault { fault, .. }) => match fault.fault {
             AgentFaultKind::CannotStart { detail } => detail,
             other => panic!("{other:?}"),
         },
@@ -38,19 +38,19 @@ fn refusal(env: &AgentEnvironment) -> String {
 }
 
 #[test]
-fn an_image_plays_with_its_variables_and_those_of_its_manifest() {
+fn image_agent_gets_image_and_manifest_variables() {
     let report = report_in(&sandboxed());
-    assert_eq!(report.defect, None, "{}", report.log);
+    assert_eq!(report.failure, None, "{}", report.log);
     assert_eq!(report.log, "toml /opt/bin own\n".repeat(3));
 }
 
 #[test]
-fn an_image_that_cannot_be_run_here_is_told_why() {
+fn unsupported_image_is_refused_with_a_reason() {
     let mut forbidden = sandboxed();
     forbidden.images = false;
-    let told = refusal(&forbidden);
+    let reason = refusal(&forbidden);
     assert_eq!(
-        told,
+        reason,
         "the runtime \"image\" of agent.toml is not offered here; offered: native, python3"
     );
     for isolation in [
@@ -59,9 +59,9 @@ fn an_image_that_cannot_be_run_here_is_told_why() {
             given_up: vec![Layer::Namespaces],
         },
     ] {
-        let mut open = sandboxed();
-        open.isolation = isolation;
-        let told = refusal(&open);
-        assert!(told.contains("runs in the sandbox only"), "{told}");
+        let mut unsupported = sandboxed();
+        unsupported.isolation = isolation;
+        let reason = refusal(&unsupported);
+        assert!(reason.contains("runs in the sandbox only"), "{reason}");
     }
 }

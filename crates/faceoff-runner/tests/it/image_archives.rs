@@ -1,4 +1,4 @@
-//! Container images as engines and attackers save them.
+//! Builder of container images, valid and malicious.
 
 use crate::archives::Tar;
 use flate2::{Compression, write::GzEncoder};
@@ -8,7 +8,7 @@ use std::io::{Cursor, Write};
 
 pub const IMAGE_MANIFEST: &str = "name = \"boxed\"\ncommand = [\"./agent\"]\nruntime = \"image\"\n";
 
-/// `sha256:` and digits.
+/// `sha256:` and the digits of the hash.
 pub fn digest(bytes: &[u8]) -> String {
     format!("sha256:{}", hex::encode(Sha256::digest(bytes)))
 }
@@ -17,13 +17,13 @@ fn blob(digest: &str) -> String {
     format!("blobs/{}", digest.replace(':', "/"))
 }
 
-/// A folder of the host whose path an image may have, too: not below `/tmp`, of which an image has nothing, nor below the
-/// target folder, which may lie there.
+/// A folder of the host whose path can also exist in an image. It is not below `/tmp`, which is empty in an image,
+/// and not below the target folder, which may be there.
 pub fn host_folder() -> tempfile::TempDir {
     tempfile::tempdir_in("/var/tmp").unwrap()
 }
 
-/// How a layer is packed in the archive.
+/// Compression of a layer in the archive.
 #[derive(Debug, Clone, Copy)]
 pub enum Packing {
     Plain,
@@ -31,7 +31,7 @@ pub enum Packing {
     Zstd,
 }
 
-/// An image under construction.
+/// Builder of an image.
 pub struct TestImage {
     layers: Vec<Vec<u8>>,
     packing: Packing,
@@ -39,8 +39,8 @@ pub struct TestImage {
 }
 
 impl TestImage {
-    /// Of these layers, the lowest one first, for this host.
-    pub fn of(layers: impl IntoIterator<Item = Tar>) -> Self {
+    /// An image of these layers, the lowest one first, for this host.
+    pub fn new(layers: impl IntoIterator<Item = Tar>) -> Self {
         let architecture = match std::env::consts::ARCH {
             "x86_64" => "amd64",
             "aarch64" => "arm64",
@@ -62,9 +62,9 @@ impl TestImage {
         }
     }
 
-    /// With a lowest layer that makes it an agent.
+    /// An image with a lowest layer that contains an agent.
     pub fn agent(layers: impl IntoIterator<Item = Tar>) -> Self {
-        Self::of([agent_layer()].into_iter().chain(layers))
+        Self::new([agent_layer()].into_iter().chain(layers))
     }
 
     pub fn packed(mut self, packing: Packing) -> Self {
@@ -95,7 +95,7 @@ impl TestImage {
         self.layers.iter().map(pack).collect()
     }
 
-    /// What older versions of Docker save: layers in folders, the list last.
+    /// The format of older versions of Docker: layers in folders, the list last.
     pub fn docker(&self) -> Tar {
         let names: Vec<String> = (0..self.layers.len())
             .map(|index| format!("layer{index}/layer.tar"))
@@ -143,14 +143,14 @@ impl TestImage {
         (tar, descriptor)
     }
 
-    /// The layout of the Open Container Initiative.
+    /// The OCI layout.
     pub fn layout(&self) -> Tar {
         let (tar, descriptor) = self.blobs(layout());
         index(tar, &[descriptor])
     }
 }
 
-/// The mark of a layout.
+/// The marker file of an OCI layout.
 pub fn layout() -> Tar {
     Tar::new().file("oci-layout", 0o644, b"{\"imageLayoutVersion\":\"1.0.0\"}")
 }
@@ -167,7 +167,7 @@ pub fn list(value: &Value) -> Vec<u8> {
     value.to_string().into_bytes()
 }
 
-/// A layer that makes an image an agent.
+/// A layer that contains an agent.
 pub fn agent_layer() -> Tar {
     Tar::new()
         .folder("agent/")
@@ -175,13 +175,12 @@ pub fn agent_layer() -> Tar {
         .file("agent/agent", 0o755, b"program")
 }
 
-/// An image with a shell, of which `script` is the agent; nothing else of a system is in it. Its `ENV` says
-/// `POSE` and `MODE=image`.
+/// An image that contains only a shell and the agent `script`. Its `ENV` sets `POSE` and `MODE=image`.
 pub fn shell_agent(agent_toml: &str, script: &str) -> TestImage {
     let shell = std::fs::canonicalize("/bin/sh").unwrap();
-    let said = std::process::Command::new("ldd").arg(&shell).output();
-    let said = String::from_utf8(said.unwrap().stdout).unwrap();
-    let system = said
+    let output = std::process::Command::new("ldd").arg(&shell).output();
+    let output = String::from_utf8(output.unwrap().stdout).unwrap();
+    let system = output
         .split_whitespace()
         .filter(|word| word.starts_with('/'))
         .fold(
@@ -193,7 +192,7 @@ pub fn shell_agent(agent_toml: &str, script: &str) -> TestImage {
     let agent = Tar::new()
         .file("agent/agent.toml", 0o644, agent_toml.as_bytes())
         .file("agent/agent.sh", 0o755, script.as_bytes());
-    TestImage::of([system, agent])
+    TestImage::new([system, agent])
         .packed(Packing::Gzip)
         .config(|config| {
             config["config"]["Env"] = json!([
@@ -204,7 +203,7 @@ pub fn shell_agent(agent_toml: &str, script: &str) -> TestImage {
         })
 }
 
-/// An agent that holds a pose, and says at its end what it was told by variables.
+/// An agent that holds a pose, and prints its environment variables at the end.
 pub const HOLDS_A_POSE: &str = r#"#!/bin/sh
 number() { n=${line#*"\"$1\":"}; n=${n%%[,\}]*}; }
 while read -r line; do
@@ -217,6 +216,6 @@ while read -r line; do
 done
 "#;
 
-/// Its `agent.toml`, which changes one of the image's variables and adds one.
+/// Its `agent.toml`, which replaces one of the image's variables and adds one.
 pub const HOLDS_A_POSE_TOML: &str = "name = \"boxed\"\ncommand = [\"./agent.sh\"]\nruntime = \"image\"\n\
                                      interpolation = 3\n[env]\nMODE = \"toml\"\nOWN = \"own\"\n";

@@ -1,19 +1,18 @@
-//! The runner as the platform uses it: real archives, real agent processes in the sandbox, real
-//! recordings.
+//! Tests of the runner with real archives, real agent processes in the sandbox, and real recordings.
 #![expect(clippy::unwrap_used, reason = "a helper's failure is its test's")]
 
 mod agents;
 mod archives;
 mod budget;
 mod bundle;
-mod commentary;
+mod live_feed;
 mod dataset;
-mod free_time;
+mod unread_questions;
 mod fuzz;
 mod game;
-mod head_start;
-mod host_noise;
-mod host_share;
+mod early_cpu_time;
+mod host_interference;
+mod interference_limits;
 mod image;
 mod image_agent;
 mod image_archives;

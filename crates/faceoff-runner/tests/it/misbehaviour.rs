@@ -1,47 +1,47 @@
-//! What agents do wrong, and the verdict on each.
+//! Agent faults and their verdicts.
 
 use crate::agents::{Agent, impatient, sandboxed};
 use faceoff_runner::{
-    AgentEnvironment, PlatformFault, SMOKE_STEPS, SmokeDefect, SmokeReport, SmokeSpec, smoke,
+    AgentEnvironment, PlatformFault, VALIDATION_STEPS, ValidationFailure, ValidationReport, ValidationSpec, validate,
 };
 use faceoff_types::{AgentFault, AgentFaultKind, Phase, Seed, Task};
 
-fn spec(number: u64) -> SmokeSpec {
+fn spec(number: u64) -> ValidationSpec {
     let seed = Seed::from_number(number);
-    SmokeSpec {
+    ValidationSpec {
         seed,
         mismatch_seed: seed.model_mismatch(),
     }
 }
 
-fn report_in(agent: &Agent, env: &AgentEnvironment) -> SmokeReport {
-    smoke(&spec(0), &agent.bundle, env, &|| false).expect("the platform works")
+fn report_in(agent: &Agent, env: &AgentEnvironment) -> ValidationReport {
+    validate(&spec(0), &agent.bundle, env, &|| false).expect("the platform works")
 }
 
-fn verdict_in(agent: &Agent, env: &AgentEnvironment) -> (AgentFaultKind, SmokeReport) {
+fn verdict_in(agent: &Agent, env: &AgentEnvironment) -> (AgentFaultKind, ValidationReport) {
     let report = report_in(agent, env);
     (fault(&report).fault, report)
 }
 
-fn fault(report: &SmokeReport) -> AgentFault {
-    match &report.defect {
-        Some(SmokeDefect::Fault { fault, .. }) => fault.clone(),
+fn fault(report: &ValidationReport) -> AgentFault {
+    match &report.failure {
+        Some(ValidationFailure::Fault { fault, .. }) => fault.clone(),
         other => panic!("expected a fault, got {other:?}"),
     }
 }
 
-fn verdict(hooks: &str) -> (AgentFaultKind, SmokeReport) {
+fn verdict(hooks: &str) -> (AgentFaultKind, ValidationReport) {
     verdict_in(&Agent::with(hooks), &sandboxed())
 }
 
 #[test]
-fn a_behaving_agent_passes_the_smoke_run() {
+fn behaving_agent_passes_the_validation() {
     let report = report_in(&Agent::behaving(), &sandboxed());
-    assert_eq!(report.defect, None);
+    assert_eq!(report.failure, None);
     assert_eq!(report.log, "goodbye\n".repeat(3));
     for (timing, task) in report.timing.iter().zip(Task::ALL) {
         assert_eq!(timing.task, task);
-        assert!(timing.steps >= SMOKE_STEPS, "{timing:?}");
+        assert!(timing.steps >= VALIDATION_STEPS, "{timing:?}");
         assert!(
             0.0 < timing.mean_s && timing.p99_s <= timing.max_s,
             "{timing:?}"
@@ -51,42 +51,42 @@ fn a_behaving_agent_passes_the_smoke_run() {
 }
 
 #[test]
-fn smoke_runs_of_two_submissions_differ_in_length_and_episodes_and_those_of_one_do_not() {
+fn validation_length_and_episodes_depend_on_the_seed() {
     let agent = Agent::with(
         "def on_reset(episode): print('reset', episode, file=sys.stderr)\n\
          def on_step(step, answer):\n    \
          if step == 0: print(answer['action'][0][0], file=sys.stderr)\n    \
          return json.dumps(answer)",
     );
-    let told = |number| {
-        let report = smoke(&spec(number), &agent.bundle, &sandboxed(), &|| false).unwrap();
-        assert_eq!(report.defect, None, "{}", report.log);
+    let run = |number| {
+        let report = validate(&spec(number), &agent.bundle, &sandboxed(), &|| false).unwrap();
+        assert_eq!(report.failure, None, "{}", report.log);
         let steps: Vec<u32> = report.timing.iter().map(|timing| timing.steps).collect();
         (steps, report.log)
     };
-    let (steps, log) = told(1);
-    assert_eq!(told(1), (steps.clone(), log.clone()));
-    let (other_steps, other_log) = told(2);
+    let (steps, log) = run(1);
+    assert_eq!(run(1), (steps.clone(), log.clone()));
+    let (other_steps, other_log) = run(2);
     assert_ne!(other_steps, steps);
     assert_ne!(other_log, log);
 }
 
 #[test]
-fn an_agent_that_is_too_slow_in_the_mean_is_told_so() {
-    // Every answer is in time by its own limit; no machine is so fast that they take no time at all.
+fn slow_mean_answer_fails_the_validation() {
+    // Every answer is within its own limit, and no machine is so fast that answers take no time.
     let mut env = sandboxed();
     env.time.mean_s = 1e-9;
     let report = report_in(&Agent::behaving(), &env);
-    let Some(defect @ SmokeDefect::TooSlow { timing, .. }) = &report.defect else {
-        panic!("{:?}", report.defect)
+    let Some(failure @ ValidationFailure::TooSlow { timing, .. }) = &report.failure else {
+        panic!("{:?}", report.failure)
     };
     assert_eq!((timing.task, report.timing.len()), (Task::Hit, 1));
-    assert!(defect.to_string().contains("too slow"), "{defect}");
+    assert!(failure.to_string().contains("too slow"), "{failure}");
 }
 
 #[test]
-fn answers_that_take_too_long_in_all_are_a_fault_although_each_is_in_time() {
-    // Whatever the machine does besides: three answers cannot be had in less.
+fn exceeded_time_budget_is_a_fault() {
+    // Independent of other load: three answers cannot take less time.
     let mut env = sandboxed();
     env.time.episode_extra_s = 0.5;
     let slow = Agent::with("def on_step(step, answer): time.sleep(0.3); return json.dumps(answer)");
@@ -96,7 +96,7 @@ fn answers_that_take_too_long_in_all_are_a_fault_although_each_is_in_time() {
             if used_s > limit_s && limit_s < 0.7),
         "{kind:?}"
     );
-    let step = fault(&report).step.expect("it is an episode's");
+    let step = fault(&report).step.expect("the fault is in an episode");
     assert!((1..=2).contains(&step), "{step}");
 
     let mut env = sandboxed();
@@ -117,13 +117,13 @@ fn answers_that_take_too_long_in_all_are_a_fault_although_each_is_in_time() {
 }
 
 #[test]
-fn a_smoke_run_stops_when_it_is_told_to() {
+fn validation_stops_when_cancelled() {
     let asked = std::cell::Cell::new(0);
     let stop_at_the_third_step = || {
         asked.set(asked.get() + 1);
         asked.get() == 3
     };
-    let stopped = smoke(
+    let stopped = validate(
         &spec(0),
         &Agent::behaving().bundle,
         &sandboxed(),
@@ -134,7 +134,7 @@ fn a_smoke_run_stops_when_it_is_told_to() {
 }
 
 #[test]
-fn rubbish_is_quoted() {
+fn invalid_answer_is_quoted() {
     let (kind, report) = verdict("def on_step(step, answer): return 'Traceback: x'");
     assert!(matches!(kind, AgentFaultKind::NotJson { .. }), "{kind:?}");
     let fault = fault(&report);
@@ -148,7 +148,7 @@ fn rubbish_is_quoted() {
 }
 
 #[test]
-fn prints_between_the_lines_are_quoted() {
+fn printed_line_is_quoted() {
     let (kind, report) = verdict("say('loading the model')");
     assert!(matches!(kind, AgentFaultKind::NotJson { .. }), "{kind:?}");
     let fault = fault(&report);
@@ -159,8 +159,8 @@ fn prints_between_the_lines_are_quoted() {
 }
 
 #[test]
-fn an_answer_before_the_question_is_a_fault() {
-    // The first answer and the one to the step that was not asked yet come in one write.
+fn answer_before_the_question_is_a_fault() {
+    // One write contains the first answer and the answer to a step that was not sent yet.
     let (kind, report) = verdict(
         "def on_step(step, answer):\n    \
          return json.dumps(answer) + '\\n' + json.dumps({**answer, 'step': step + 1})",
@@ -176,7 +176,7 @@ fn an_answer_before_the_question_is_a_fault() {
 }
 
 #[test]
-fn a_wrong_step_is_named() {
+fn wrong_step_is_named() {
     let (kind, _) =
         verdict("def on_step(step, answer): return json.dumps({**answer, 'step': step + 5})");
     let AgentFaultKind::WrongMessage { expected, got } = kind else {
@@ -189,7 +189,7 @@ fn a_wrong_step_is_named() {
 }
 
 #[test]
-fn a_wrong_shape_is_named() {
+fn wrong_shape_is_named() {
     let (kind, _) = verdict(
         "def on_step(step, answer): return json.dumps({**answer, 'action': [[0] * 6] * 2})",
     );
@@ -211,7 +211,7 @@ fn nan_is_not_finite() {
 }
 
 #[test]
-fn a_number_that_no_action_needs_is_named() {
+fn too_large_number_is_named() {
     let (kind, report) = verdict(
         "def on_step(step, answer):\n    \
          answer['action'][1][2] = 1.7e308\n    return json.dumps(answer)",
@@ -242,7 +242,7 @@ fn silence_times_out() {
 }
 
 #[test]
-fn a_line_without_newline_times_out() {
+fn line_without_newline_times_out() {
     let agent = Agent::with(
         "def on_step(step, answer):\n    sys.stdout.write(json.dumps(answer)); sys.stdout.flush()",
     );
@@ -257,7 +257,7 @@ fn a_line_without_newline_times_out() {
 }
 
 #[test]
-fn a_line_without_end_is_too_long() {
+fn endless_line_is_too_long() {
     let (kind, report) = verdict(
         "def on_step(step, answer):\n    sys.stdout.write('x' * 200_000); sys.stdout.flush()",
     );
@@ -271,17 +271,17 @@ fn a_line_without_end_is_too_long() {
 }
 
 #[test]
-fn closing_the_output_is_a_fault() {
+fn closed_output_is_a_fault() {
     let agent = Agent::with("def on_step(step, answer):\n    os.close(1); time.sleep(3600)");
     let mut env = sandboxed();
-    // It will not exit: nothing is gained by waiting for it.
+    // It never exits, so a short wait is enough.
     env.time.bye_s = 0.5;
     let (kind, _) = verdict_in(&agent, &env);
     assert_eq!(kind, AgentFaultKind::ClosedOutput);
 }
 
 #[test]
-fn exits_and_signals_are_told_apart() {
+fn exits_and_signals_are_distinguished() {
     let (kind, report) = verdict("def on_step(step, answer): raise ValueError('my bug')");
     assert_eq!(kind, AgentFaultKind::Exited { code: 1 });
     assert!(report.log.contains("ValueError: my bug"), "{}", report.log);
@@ -294,7 +294,7 @@ fn exits_and_signals_are_told_apart() {
 }
 
 #[test]
-fn a_wrong_ready_is_named() {
+fn wrong_ready_is_named() {
     for (hooks, expected_got) in [
         ("INTERPOLATION = 9", "ready with interpolation 9"),
         (
@@ -318,8 +318,8 @@ fn a_wrong_ready_is_named() {
 }
 
 #[test]
-fn eating_memory_exceeds_a_limit() {
-    // Before it answers: whatever the machine does meanwhile, the step cannot end otherwise.
+fn memory_use_exceeds_the_limit() {
+    // It exceeds the limit before it answers, so the step cannot end in another way.
     let (kind, _) =
         verdict("def on_step(step, answer):\n    hoard = [b'x' * (1 << 20) for _ in range(600)]");
     let AgentFaultKind::LimitExceeded { limit, .. } = &kind else {
@@ -329,8 +329,8 @@ fn eating_memory_exceeds_a_limit() {
 }
 
 #[test]
-fn a_fork_bomb_ends_in_a_verdict() {
-    // Every child forks on, and none ends: sooner or later a fork of the agent itself fails.
+fn fork_bomb_ends_in_a_verdict() {
+    // Every child keeps forking and none exits, so a fork of the agent itself fails eventually.
     let (kind, report) = verdict(
         "import signal\n\
          def on_step(step, answer):\n    \
@@ -351,7 +351,7 @@ fn a_fork_bomb_ends_in_a_verdict() {
 }
 
 #[test]
-fn what_cannot_be_started_is_named() {
+fn unstartable_command_or_runtime_is_named() {
     let missing =
         Agent::behaving().manifest(|manifest| manifest.command = vec!["./no-such-program".into()]);
     let (kind, _) = verdict_in(&missing, &sandboxed());

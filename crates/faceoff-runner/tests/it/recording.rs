@@ -56,7 +56,7 @@ pub fn texts<'a>(batch: &'a RecordBatch, name: &str) -> &'a StringArray {
 }
 
 /// An agent that moves, so that every column changes.
-pub fn moving() -> Agent {
+pub fn moving_agent() -> Agent {
     Agent::with(
         "def on_step(step, answer):\n    \
          q = [x + 0.002 * (step % 7) for x in answer['action'][0]]\n    \
@@ -64,14 +64,14 @@ pub fn moving() -> Agent {
     )
 }
 
-/// Re-simulates from seed and recorded actions, and compares every number bit for bit.
+/// Simulates again from the seed and the recorded actions, and compares every number bit by bit.
 #[test]
-fn a_recording_holds_what_was_simulated() {
+fn recording_matches_the_simulation() {
     let out = tempfile::tempdir().unwrap();
     for task in Task::ALL {
         let spec = spec(task, 4..6);
         let dir = out.path().join(task.as_str());
-        let report = run(&spec, &moving(), &sandboxed(), &dir).unwrap();
+        let report = run(&spec, &moving_agent(), &sandboxed(), &dir).unwrap();
         let steps = read(&dir.join("steps.parquet"));
         let episodes = read(&dir.join("episodes.parquet"));
         let played: u32 = report.outcomes.iter().map(|outcome| outcome.steps).sum();
@@ -112,7 +112,7 @@ fn a_recording_holds_what_was_simulated() {
                     ("constraint_ee", values.ee),
                     ("constraint_link", values.link),
                 ] {
-                    same(&steps, name, row, value);
+                    assert_same_bits(&steps, name, row, value);
                 }
                 row += 1;
             }
@@ -127,7 +127,7 @@ fn a_recording_holds_what_was_simulated() {
 }
 
 #[track_caller]
-fn same(batch: &RecordBatch, name: &str, row: usize, value: f64) {
+fn assert_same_bits(batch: &RecordBatch, name: &str, row: usize, value: f64) {
     let column = floats(batch, name);
     assert!(column.is_valid(row), "{name} is absent in row {row}");
     assert_eq!(
@@ -161,7 +161,7 @@ fn compare_observation(batch: &RecordBatch, row: usize, world: &Episode) {
     let observation = world.observation();
     for (index, name) in names.iter().enumerate() {
         match observation.get(index) {
-            Some(value) => same(batch, name, row, *value),
+            Some(value) => assert_same_bits(batch, name, row, *value),
             None => assert!(floats(batch, name).is_null(row), "{name}"),
         }
     }
@@ -174,16 +174,16 @@ fn compare_state(batch: &RecordBatch, prefix: &str, row: usize, world: &Episode)
         .iter()
         .zip(state.puck)
     {
-        same(batch, &format!("{prefix}puck_{name}"), row, value);
+        assert_same_bits(batch, &format!("{prefix}puck_{name}"), row, value);
     }
     for joint in 0..7 {
-        same(
+        assert_same_bits(
             batch,
             &format!("{prefix}q_{}", joint + 1),
             row,
             state.q[joint],
         );
-        same(
+        assert_same_bits(
             batch,
             &format!("{prefix}dq_{}", joint + 1),
             row,
@@ -191,25 +191,25 @@ fn compare_state(batch: &RecordBatch, prefix: &str, row: usize, world: &Episode)
         );
         let name = format!("{prefix}opponent_q_{}", joint + 1);
         match state.opponent_q {
-            Some(q) => same(batch, &name, row, q[joint]),
+            Some(q) => assert_same_bits(batch, &name, row, q[joint]),
             None => assert!(floats(batch, &name).is_null(row)),
         }
     }
     for (axis, name) in axes.iter().enumerate() {
-        same(batch, &format!("{prefix}ee_{name}"), row, state.ee[axis]);
+        assert_same_bits(batch, &format!("{prefix}ee_{name}"), row, state.ee[axis]);
         let name = format!("{prefix}opponent_ee_{name}");
         match state.opponent_ee {
-            Some(ee) => same(batch, &name, row, ee[axis]),
+            Some(ee) => assert_same_bits(batch, &name, row, ee[axis]),
             None => assert!(floats(batch, &name).is_null(row)),
         }
     }
-    same(
+    assert_same_bits(
         batch,
         &format!("{prefix}universal_1"),
         row,
         state.universal[0],
     );
-    same(
+    assert_same_bits(
         batch,
         &format!("{prefix}universal_2"),
         row,
@@ -227,14 +227,14 @@ fn times_and_faults_are_recorded() {
     assert_eq!(
         steps.num_rows(),
         3,
-        "the step without a valid answer is no row"
+        "a step without a valid answer has no row"
     );
     let times = seconds(&steps, "computation_time_ns");
     let time = report.outcomes[0].computation_time;
     assert_eq!(times.iter().copied().fold(0.0, f64::max), time.max_s);
     assert_eq!(times.iter().sum::<f64>() / 3.0, time.mean_s);
     let cpu = steps.column_by_name("cpu_time_ns").unwrap();
-    assert_eq!(cpu.null_count(), 0, "the sandbox tells CPU times here");
+    assert_eq!(cpu.null_count(), 0, "the sandbox reports CPU times");
     assert!(
         seconds(&steps, "cpu_time_ns")
             .iter()

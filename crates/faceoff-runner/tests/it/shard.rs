@@ -5,16 +5,16 @@ use faceoff_runner::{
 use faceoff_types::{AgentFaultKind, EpisodeEnd, EpisodeOutcome, Profile, Ruleset, Seed, Task};
 use std::{ops::Range, path::Path};
 
-/// Watches, and stops after a number of episodes.
+/// Records the events of a shard, and stops it after a number of episodes.
 #[derive(Default)]
-pub struct Watcher {
+pub struct RecordingObserver {
     pub seen: Vec<u32>,
     pub logs: Vec<String>,
     pub stop_after: Option<usize>,
 }
 
-impl Observer for Watcher {
-    fn episode_done(&mut self, outcome: &EpisodeOutcome) {
+impl Observer for RecordingObserver {
+    fn on_episode_end(&mut self, outcome: &EpisodeOutcome) {
         self.seen.push(outcome.episode);
     }
 
@@ -49,10 +49,10 @@ pub fn run(
     env: &AgentEnvironment,
     out: &Path,
 ) -> Result<ShardReport, PlatformFault> {
-    run_shard(spec, &agent.bundle, env, out, &mut Watcher::default())
+    run_shard(spec, &agent.bundle, env, out, &mut RecordingObserver::default())
 }
 
-/// What must not depend on the machine: all but the times.
+/// The outcomes without times, which depend on the host.
 pub fn timeless(outcomes: &[EpisodeOutcome]) -> Vec<EpisodeOutcome> {
     outcomes
         .iter()
@@ -64,7 +64,7 @@ pub fn timeless(outcomes: &[EpisodeOutcome]) -> Vec<EpisodeOutcome> {
 }
 
 #[test]
-fn a_behaving_agent_plays_all_tasks_with_every_interpolation_it_says() {
+fn agent_plays_all_tasks_with_its_interpolation() {
     let out = tempfile::tempdir().unwrap();
     for (task, hooks) in [
         (Task::Hit, ""),
@@ -94,7 +94,7 @@ fn a_behaving_agent_plays_all_tasks_with_every_interpolation_it_says() {
 }
 
 #[test]
-fn results_do_not_depend_on_how_episodes_are_divided() {
+fn results_do_not_depend_on_the_division_into_shards() {
     let out = tempfile::tempdir().unwrap();
     let agent = Agent::behaving();
     let env = sandboxed();
@@ -119,7 +119,7 @@ fn results_do_not_depend_on_how_episodes_are_divided() {
 }
 
 #[test]
-fn a_fault_ends_its_episode_and_the_agent_is_restarted() {
+fn fault_ends_its_episode_and_restarts_the_agent() {
     let out = tempfile::tempdir().unwrap();
     let agent = Agent::with(
         "count = 0\n\
@@ -143,11 +143,11 @@ fn a_fault_ends_its_episode_and_the_agent_is_restarted() {
         "{fault}"
     );
     assert_eq!(
-        (fault.contest, fault.episode, fault.step),
+        (fault.agent_task, fault.episode, fault.step),
         (Task::Prepare.into(), Some(1), Some(2))
     );
     assert_eq!(fault.line.as_deref(), Some("oops"));
-    // The counter shows the new process, the note the reason.
+    // The counter shows the new process, and the log line shows the reason.
     assert!(
         report
             .log
@@ -158,7 +158,7 @@ fn a_fault_ends_its_episode_and_the_agent_is_restarted() {
         "{}",
         report.log
     );
-    // Others' episodes are what they would have been.
+    // The other episodes are the same as without the fault.
     let undisturbed = run(
         &spec(Task::Prepare, 2..3),
         &Agent::behaving(),
@@ -180,7 +180,7 @@ fn too_many_faults_stop_the_shard() {
     assert_eq!(
         report.outcomes.len(),
         3,
-        "two are allowed, the third ends it"
+        "two faults are allowed, the third ends the shard"
     );
     for outcome in &report.outcomes {
         let fault = outcome.fault.as_ref().unwrap();
@@ -189,7 +189,7 @@ fn too_many_faults_stop_the_shard() {
 }
 
 #[test]
-fn an_agent_that_does_not_start_faults_without_an_episode() {
+fn failed_start_is_a_fault_without_an_episode() {
     let out = tempfile::tempdir().unwrap();
     let agent = Agent::script("import sys\nsys.exit('no model')");
     let report = run(&spec(Task::Hit, 0..1), &agent, &sandboxed(), out.path()).unwrap();
@@ -201,12 +201,12 @@ fn an_agent_that_does_not_start_faults_without_an_episode() {
 }
 
 #[test]
-fn a_cancelled_shard_leaves_no_recording() {
+fn cancelled_shard_leaves_no_recording() {
     let out = tempfile::tempdir().unwrap();
     let agent = Agent::with("print('started', file=sys.stderr)");
-    let mut watcher = Watcher {
+    let mut observer = RecordingObserver {
         stop_after: Some(1),
-        ..Watcher::default()
+        ..RecordingObserver::default()
     };
     let dir = out.path().join("shard");
     let result = run_shard(
@@ -214,16 +214,16 @@ fn a_cancelled_shard_leaves_no_recording() {
         &agent.bundle,
         &sandboxed(),
         &dir,
-        &mut watcher,
+        &mut observer,
     );
     assert!(
         matches!(result, Err(PlatformFault::Cancelled)),
         "{result:?}"
     );
-    assert_eq!(watcher.seen, [0]);
-    assert_eq!(watcher.logs, ["started\n"]);
+    assert_eq!(observer.seen, [0]);
+    assert_eq!(observer.logs, ["started\n"]);
     assert!(!dir.join("shard.json").exists());
-    // The same folder serves the next try.
+    // The same folder can be used again.
     run(&spec(Task::Defend, 0..1), &agent, &sandboxed(), &dir).unwrap();
     let mut names: Vec<_> = dir
         .read_dir()

@@ -1,12 +1,12 @@
-//! Whatever holds an evaluator ends with the agent.
+//! A call that blocks the evaluator ends with the agent's death.
 
 use crate::{
     agents::{Agent, sandboxed},
-    shard::{Watcher, spec},
+    shard::{RecordingObserver, spec},
 };
 use faceoff_runner::{
-    AgentEnvironment, HostWatch, PlatformFault, Supervision, run_shard, run_shard_watched,
-    standing_still,
+    AgentEnvironment, InterferenceMonitor, PlatformFault, Supervision, run_shard, run_shard_monitored,
+    stuck_threads,
 };
 use faceoff_types::{AgentFaultKind, Phase, Task};
 use std::{
@@ -19,7 +19,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-/// Says nothing at its second step, and calls itself so that it is seen from outside.
+/// Does not answer its second step; sets its process name, so that the test can find it.
 fn silent(name: &str) -> Agent {
     const PR_SET_NAME: u32 = 15;
     Agent::with(&format!(
@@ -32,7 +32,7 @@ fn silent(name: &str) -> Agent {
     ))
 }
 
-/// Is there a process of this name, which is not dead?
+/// Is there a living process with this name?
 fn is_silent(name: &str) -> bool {
     let named = format!("({name}) ");
     let processes = fs::read_dir("/proc").unwrap().flatten();
@@ -44,12 +44,12 @@ fn is_silent(name: &str) -> bool {
         })
 }
 
-/// An evaluator that waits for something which the agent holds until it dies.
+/// Blocks the evaluator until the agent with this process name is dead.
 #[derive(Debug)]
-struct Held(&'static str);
+struct BlockedByAgent(&'static str);
 
-impl HostWatch for Held {
-    fn taken(&self, _: Instant, _: Instant, _: Option<Duration>) -> Duration {
+impl InterferenceMonitor for BlockedByAgent {
+    fn interference(&self, _: Instant, _: Instant, _: Option<Duration>) -> Duration {
         while is_silent(self.0) {
             thread::sleep(Duration::from_millis(5));
         }
@@ -66,19 +66,19 @@ fn impatient(supervision: Supervision) -> AgentEnvironment {
 }
 
 #[test]
-fn agent_that_holds_its_evaluator_is_ended_and_blamed() {
+fn agent_that_blocks_its_evaluator_is_killed_and_blamed() {
     const NAME: &str = "holds-evaluator";
     let agent = silent(NAME);
     let out = tempfile::tempdir().unwrap();
     let mut spec = spec(Task::Hit, 0..2);
     spec.max_faults = 10;
-    let report = run_shard_watched(
+    let report = run_shard_monitored(
         &spec,
         &agent.bundle,
         &impatient(Supervision::default()),
         out.path(),
-        &mut Watcher::default(),
-        &Held(NAME),
+        &mut RecordingObserver::default(),
+        &BlockedByAgent(NAME),
     )
     .unwrap();
     assert_eq!(report.outcomes.len(), 2);
@@ -95,7 +95,7 @@ fn agent_that_holds_its_evaluator_is_ended_and_blamed() {
             "{fault:?}"
         );
     }
-    assert_eq!(standing_still(), [] as [String; 0]);
+    assert_eq!(stuck_threads(), [] as [String; 0]);
 }
 
 #[test]
@@ -104,9 +104,9 @@ fn cancelled_job_does_not_wait_for_its_agent() {
     let out = tempfile::tempdir().unwrap();
     let cancelled = Arc::new(AtomicBool::new(false));
     let mut env = sandboxed();
-    // Which it would never meet.
+    // The limit is never reached.
     env.time.step_s = 3600.0;
-    env.supervision = Supervision::of({
+    env.supervision = Supervision::new({
         let cancelled = Arc::clone(&cancelled);
         move || cancelled.load(Ordering::Relaxed)
     });
@@ -117,7 +117,7 @@ fn cancelled_job_does_not_wait_for_its_agent() {
                 &agent.bundle,
                 &env,
                 out.path(),
-                &mut Watcher::default(),
+                &mut RecordingObserver::default(),
             )
         });
         while !is_silent("waits-cancelled") {

@@ -1,39 +1,39 @@
-//! Two agents in one conversation, as the two sides of a game are.
+//! Two agents with one evaluator, like the two sides of a game.
 
 use crate::agents::{Agent, impatient, sandboxed, unconfined};
-use faceoff_episode::Answered;
-use faceoff_runner::{AgentEnvironment, Session, Trouble};
-use faceoff_types::{AgentFaultKind, Contest, Phase, Side};
+use faceoff_episode::AnswerTiming;
+use faceoff_runner::{AgentEnvironment, Session, SessionError};
+use faceoff_types::{AgentFaultKind, AgentTask, Phase, Side};
 use rustix::fs::{CWD, FileType, Mode, mknodat};
 use std::time::{Duration, Instant};
 
 const SIDES: [Side; 2] = [Side::First, Side::Second];
 
 fn start(agent: &Agent, env: &AgentEnvironment, side: Side) -> Session<'static> {
-    Session::start(&agent.bundle, env, Contest::Game { side })
-        .map_err(|(trouble, stderr)| format!("{trouble:?} {stderr}"))
+    Session::start(&agent.bundle, env, AgentTask::Game { side })
+        .map_err(|(error, stderr)| format!("{error:?} {stderr}"))
         .unwrap()
 }
 
-/// Waits for both answers; the first that comes is taken first.
-fn both(sessions: &mut [Session<'_>; 2]) -> [Result<Answered, Trouble>; 2] {
-    let mut came = [None, None];
-    while came.iter().any(Option::is_none) {
+/// Waits for both answers; takes them in the order of their arrival.
+fn both(sessions: &mut [Session<'_>; 2]) -> [Result<AnswerTiming, SessionError>; 2] {
+    let mut results = [None, None];
+    while results.iter().any(Option::is_none) {
         let [first, second] = &*sessions;
         let until = Instant::now() + Duration::from_secs(3600);
         Session::wait_for_any(&[first, second], until).unwrap();
-        for (session, came) in sessions.iter_mut().zip(&mut came) {
-            if came.is_none() {
-                *came = session.poll(Instant::now()).transpose();
+        for (session, result) in sessions.iter_mut().zip(&mut results) {
+            if result.is_none() {
+                *result = session.poll(Instant::now()).transpose();
             }
         }
     }
-    came.map(Option::unwrap)
+    results.map(Option::unwrap)
 }
 
-/// Each answers only once the other was asked, too.
+/// Each agent answers only after the other has received its question.
 #[test]
-fn both_sides_are_asked_before_either_is_waited_for() {
+fn both_sides_are_asked_before_waiting() {
     let dir = tempfile::tempdir().unwrap();
     let pipes = ["first", "second"].map(|name| dir.path().join(name));
     for pipe in &pipes {
@@ -53,37 +53,37 @@ fn both_sides_are_asked_before_either_is_waited_for() {
     for session in &mut sessions {
         session.send_reset(0).unwrap();
     }
-    for came in both(&mut sessions) {
-        came.unwrap();
+    for results in both(&mut sessions) {
+        results.unwrap();
     }
     for step in 0..20 {
         for (number, session) in (1..).zip(&mut sessions) {
             session.send_step(step, &[f64::from(number); 23]).unwrap();
         }
-        for came in both(&mut sessions) {
-            assert!(came.unwrap().computation_time_s > 0.0);
+        for results in both(&mut sessions) {
+            assert!(results.unwrap().computation_time_s > 0.0);
         }
         for (number, session) in (1..).zip(&mut sessions) {
             assert_eq!(session.action()[..7], [f64::from(number); 7]);
-            let nothing_is_due = session.poll(Instant::now()).unwrap();
-            assert_eq!(nothing_is_due, None);
+            let nothing = session.poll(Instant::now()).unwrap();
+            assert_eq!(nothing, None);
         }
     }
     let logs = sessions.map(|session| session.finish().unwrap());
     assert_eq!(logs, ["tournament 1\ngoodbye\n", "tournament 2\ngoodbye\n"]);
 }
 
-/// One says nothing, the other has closed its output inside of a sandbox that still holds it open, and
-/// does not exit either.
+/// One agent does not answer. The other has closed its output inside of a sandbox that still has it open, and does not
+/// exit.
 #[test]
-fn each_side_gets_its_own_verdict() {
-    let mut soon_judged = sandboxed();
-    soon_judged.time.bye_s = 0.5;
+fn sides_get_separate_verdicts() {
+    let mut short_exit_grace = sandboxed();
+    short_exit_grace.time.bye_s = 0.5;
     let agents = [
         ("def on_step(step, answer): return None", impatient()),
         (
             "def on_step(step, answer):\n    os.close(1); time.sleep(3600)",
-            soon_judged,
+            short_exit_grace,
         ),
     ]
     .map(|(hooks, env)| (Agent::with(hooks), env));
@@ -92,12 +92,12 @@ fn each_side_gets_its_own_verdict() {
         session.reset(0).unwrap();
         session.send_step(0, &[0.0; 23]).unwrap();
     }
-    let faults = both(&mut sessions).map(|came| match came {
-        // A busy host may explain the silence; it is silence all the same.
+    let faults = both(&mut sessions).map(|results| match results {
+        // On a busy host the timeout may be attributed to the host; the fault is the same.
         Err(
-            Trouble::Agent { fault, .. }
-            | Trouble::Late { fault, .. }
-            | Trouble::Host { fault, .. },
+            SessionError::Agent { fault, .. }
+            | SessionError::TimedOut { fault, .. }
+            | SessionError::HostInterference { fault, .. },
         ) => fault,
         other => panic!("{other:?}"),
     });

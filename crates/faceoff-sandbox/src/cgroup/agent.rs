@@ -1,15 +1,15 @@
-//! The cgroup of one agent, in every hierarchy that is needed.
+//! The cgroup of one agent in all needed hierarchies.
 
 use super::{
     files,
     freezer::Freezer,
-    hierarchy::{Hierarchies, Home, Version},
-    leaf::{end_all, leaf_name, remove_leaf},
+    hierarchy::{Hierarchies, Hierarchy, Version},
+    leaf::{kill_and_thaw, leaf_name, remove_leaf},
 };
 use crate::{
     Isolation, Layer, Limits, SandboxError,
     affinity::{self, cpu_list},
-    cpu_evidence::{CpuEvidence, RunTime},
+    cpu_accounting::{CpuAccounting, RunTime},
     error::IoContext,
 };
 use rustix::process::Pid;
@@ -20,42 +20,41 @@ use std::{
     path::{Path, PathBuf},
 };
 
-/// Over which the CPU quota is enforced: the longest that an agent over its quota is held up is this,
-/// half a control step.
+/// Period of the CPU quota. It bounds how long an agent over its quota is throttled: half a control step.
 const CPU_PERIOD_US: u64 = 10_000;
 /// The kernel charges memory in batches, so the peak may stay this far below the limit.
 const PEAK_SLACK_BYTES: u64 = 1 << 20;
 /// bubblewrap's own process is in the agent's cgroup.
-const OUR_PROCESSES: u64 = 1;
+const BUBBLEWRAP_PROCESSES: u64 = 1;
 
-/// A limit that the tree ran into, as the kernel counted it.
+/// A limit that the tree reached, according to the kernel's counters.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) enum LimitHit {
-    /// The kernel killed for want of memory.
+    /// The kernel killed a process because the memory limit was reached.
     Memory { peak_bytes: Option<u64> },
-    /// Processes or threads were refused this often.
+    /// `refused`: number of refused processes and threads.
     Pids { refused: u64 },
 }
 
-/// The cgroup of one agent. Removed, with whatever lives in it, by [`AgentCgroup::remove`] or drop.
+/// The cgroup of one agent. [`AgentCgroup::remove`] or drop kills its processes and removes it.
 #[derive(Debug)]
 pub(crate) struct AgentCgroup {
     leaves: Vec<PathBuf>,
     memory: Option<(Version, PathBuf)>,
     pids: Option<PathBuf>,
-    /// Where its quota is.
+    /// The cgroup with the CPU quota.
     cpu: Option<(Version, PathBuf)>,
     cpu_usage: Option<(Version, File)>,
-    /// What else ran on its CPUs; `None` where the host does not tell.
-    pub(crate) cpu_evidence: Option<CpuEvidence>,
-    /// Does a cpuset hold the tree to its CPUs, whatever it asks for?
-    pub(crate) holds_cpus: bool,
-    /// Stops the tree and lets it go on, where the host has one.
+    /// Accounting of other run time on its CPUs; `None` if the host has no such counters.
+    pub(crate) cpu_accounting: Option<CpuAccounting>,
+    /// A cpuset confines the tree to its CPUs, whatever affinity it requests.
+    pub(crate) confines_cpus: bool,
+    /// `None` if the host has no usable freezer.
     freezer: Option<Freezer>,
 }
 
 impl AgentCgroup {
-    /// Makes the cgroup with the limits that `isolation` enforces; `None` when it enforces none.
+    /// Creates the cgroup with the limits that `isolation` enforces; `None` if it enforces none.
     pub(crate) fn create(
         limits: &Limits,
         isolation: &Isolation,
@@ -80,70 +79,70 @@ impl AgentCgroup {
             pids: None,
             cpu: None,
             cpu_usage: None,
-            cpu_evidence: None,
-            holds_cpus: false,
+            cpu_accounting: None,
+            confines_cpus: false,
             freezer: None,
         };
-        // Where a controller is known to be needed in the same v2 cgroup, all are enabled together.
+        // Controllers that share a v2 hierarchy are enabled together.
         let all: Vec<&str> = wanted.iter().map(|(_, controller)| *controller).collect();
         let name = leaf_name();
         for (layer, controller) in wanted {
-            let unavailable = |why: String| SandboxError::Unavailable { layer, why };
-            let home = hierarchies.find(controller).ok_or_else(|| {
+            let unavailable = |reason: String| SandboxError::Unavailable { layer, reason };
+            let hierarchy = hierarchies.find(controller).ok_or_else(|| {
                 unavailable(format!(
                     "no cgroup hierarchy with the controller {controller} is mounted"
                 ))
             })?;
-            let together: Vec<&str> = if home.version == Version::V2 {
+            let together: Vec<&str> = if hierarchy.version == Version::V2 {
                 all.iter()
                     .copied()
-                    .filter(|name| hierarchies.find(name).as_ref() == Some(&home))
+                    .filter(|name| hierarchies.find(name).as_ref() == Some(&hierarchy))
                     .collect()
             } else {
                 vec![controller]
             };
-            let leaf = group.leaf(&home, &together, &name).map_err(|error| {
+            let leaf = group.leaf(&hierarchy, &together, &name).map_err(|error| {
                 unavailable(format!(
                     "cannot make a cgroup in {}: {error}",
-                    home.own.display()
+                    hierarchy.service_dir.display()
                 ))
             })?;
             group
-                .limit(layer, home.version, &leaf, limits)
+                .limit(layer, hierarchy.version, &leaf, limits)
                 .map_err(|error| unavailable(error.to_string()))?;
         }
         group.measure_cpu(&hierarchies, &name, cpus);
         if !cpus.is_empty() {
-            group.holds_cpus = group.hold_cpus(&hierarchies, &name, cpus);
+            group.confines_cpus = group.confine_cpus(&hierarchies, &name, cpus);
         }
         group.freezer = group.make_freezer(&hierarchies, &name);
         Ok(Some(group))
     }
 
     fn make_freezer(&mut self, hierarchies: &Hierarchies, name: &str) -> Option<Freezer> {
-        let home = hierarchies.find("freezer")?;
-        let controllers: &[&str] = match home.version {
+        let hierarchy = hierarchies.find("freezer")?;
+        let controllers: &[&str] = match hierarchy.version {
             Version::V1 => &["freezer"],
             Version::V2 => &[],
         };
-        let leaf = self.leaf(&home, controllers, name).ok()?;
+        let leaf = self.leaf(&hierarchy, controllers, name).ok()?;
         let cpu = self
             .cpu
             .as_ref()
             .map(|(version, leaf)| (*version, leaf.as_path()));
-        Freezer::open(home.version, &leaf, cpu)
+        Freezer::open(hierarchy.version, &leaf, cpu)
     }
 
-    /// Stops and starts the tree; `None` where the host has nothing for it.
+    /// Freezes and thaws the tree; `None` if the host has no usable freezer.
     pub(crate) fn freezer(&self) -> Option<&Freezer> {
         self.freezer.as_ref()
     }
 
-    /// The agent's folder below `home`, made if need be.
-    fn leaf(&mut self, home: &Home, controllers: &[&str], name: &str) -> io::Result<PathBuf> {
-        // Another service in the same cgroup may remove the empty folder between our two steps.
+    /// The agent's folder in a hierarchy, created if missing.
+    fn leaf(&mut self, hierarchy: &Hierarchy, controllers: &[&str], name: &str) -> io::Result<PathBuf> {
+        // Another service in the same cgroup may remove the empty parent folder between the two calls.
         for _ in 0..8 {
-            let leaf = home.prepare_folder(controllers)?.join(name);
+            let leaf = hierarchy.prepare_folder(controllers)?.join(name);
             match fs::create_dir(&leaf) {
                 Ok(()) => self.leaves.push(leaf.clone()),
                 Err(error) if error.kind() == io::ErrorKind::NotFound => continue,
@@ -155,7 +154,7 @@ impl AgentCgroup {
             return Ok(leaf);
         }
         Err(io::Error::other(
-            "the folder for agents is being removed all the time",
+            "another service keeps removing the folder for agents",
         ))
     }
 
@@ -171,7 +170,7 @@ impl AgentCgroup {
         match (layer, version) {
             (Layer::CgroupMemory, Version::V1) => {
                 set("memory.limit_in_bytes", memory.clone())?;
-                // Without swap accounting the second file is missing; then the tree must not swap at all.
+                // Without swap accounting this file is missing; then the tree must not swap at all.
                 if leaf.join("memory.memsw.limit_in_bytes").exists() {
                     set("memory.memsw.limit_in_bytes", memory)?;
                 } else {
@@ -189,7 +188,7 @@ impl AgentCgroup {
             (Layer::CgroupPids, _) => {
                 set(
                     "pids.max",
-                    (u64::from(limits.pids) + OUR_PROCESSES).to_string(),
+                    (u64::from(limits.pids) + BUBBLEWRAP_PROCESSES).to_string(),
                 )?;
                 self.pids = Some(leaf.to_path_buf());
             }
@@ -210,72 +209,72 @@ impl AgentCgroup {
         Ok(())
     }
 
-    /// Opens the files that tell the tree's CPU time and that of everything else, where they are.
+    /// Opens the counters of the tree's CPU time and of all other CPU time, if the host has them.
     fn measure_cpu(&mut self, hierarchies: &Hierarchies, name: &str, cpus: &[usize]) {
-        let Some(home) = hierarchies
+        let Some(hierarchy) = hierarchies
             .find("cpuacct")
             .or_else(|| hierarchies.find("cpu"))
         else {
             return;
         };
-        let (controllers, file): (&[&str], _) = match home.version {
+        let (controllers, file): (&[&str], _) = match hierarchy.version {
             Version::V1 => (&["cpuacct"], "cpuacct.usage"),
             Version::V2 => (&[], "cpu.stat"),
         };
-        let Ok(leaf) = self.leaf(&home, controllers, name) else {
+        let Ok(leaf) = self.leaf(&hierarchy, controllers, name) else {
             return;
         };
         let open = |path: PathBuf| File::open(path).ok();
-        self.cpu_usage = open(leaf.join(file)).map(|file| (home.version, file));
+        self.cpu_usage = open(leaf.join(file)).map(|file| (hierarchy.version, file));
         let cpus = if cpus.is_empty() {
-            affinity::of_process().unwrap_or_default()
+            affinity::process_cpus().unwrap_or_default()
         } else {
             cpus.to_vec()
         };
-        let run_time = match home.version {
+        let run_time = match hierarchy.version {
             Version::V1 => {
                 const EACH: &str = "cpuacct.usage_percpu";
-                open(home.top.join(EACH))
+                open(hierarchy.mount_point.join(EACH))
                     .zip(open(leaf.join(EACH)))
                     .map(|(all, agent)| RunTime::PerCpu { all, agent })
             }
             Version::V2 => open(leaf.join(file)).map(|agent| RunTime::Whole { agent }),
         };
         let limited = self.cpu.as_ref().map(|(_, leaf)| leaf.join("cpu.stat"));
-        self.cpu_evidence = run_time
+        self.cpu_accounting = run_time
             .filter(|_| !cpus.is_empty())
-            .map(|run_time| CpuEvidence {
+            .map(|run_time| CpuAccounting {
                 cpus,
                 run_time,
                 throttled: limited.and_then(open),
             });
     }
 
-    /// Confines the tree to `cpus` by a cpuset, where the host offers one; tells whether it does.
-    fn hold_cpus(&mut self, hierarchies: &Hierarchies, name: &str, cpus: &[usize]) -> bool {
+    /// Confines the tree to `cpus` by a cpuset; returns whether the host offers one.
+    fn confine_cpus(&mut self, hierarchies: &Hierarchies, name: &str, cpus: &[usize]) -> bool {
         let before = self.leaves.len();
-        let held = self.set_cpus(hierarchies, name, cpus).is_some();
-        if !held {
-            // A half-made cpuset lets nobody in.
+        let is_confined = self.set_cpus(hierarchies, name, cpus).is_some();
+        if !is_confined {
+            // No process can enter an incomplete cpuset.
             for leaf in self.leaves.drain(before..) {
                 remove_leaf(&leaf);
             }
         }
-        held
+        is_confined
     }
 
     fn set_cpus(&mut self, hierarchies: &Hierarchies, name: &str, cpus: &[usize]) -> Option<()> {
-        let home = hierarchies.find("cpuset")?;
-        let leaf = self.leaf(&home, &["cpuset"], name).ok()?;
-        if home.version == Version::V1 {
+        let hierarchy = hierarchies.find("cpuset")?;
+        let leaf = self.leaf(&hierarchy, &["cpuset"], name).ok()?;
+        if hierarchy.version == Version::V1 {
             let memory_nodes = files::read(&leaf.parent()?.join("cpuset.mems")).ok()?;
             files::write(&leaf.join("cpuset.mems"), memory_nodes.trim()).ok()?;
         }
         files::write(&leaf.join("cpuset.cpus"), &cpu_list(cpus)).ok()
     }
 
-    /// The files by which a process enters: it writes `0` to each.
-    pub(crate) fn entrances(&self) -> Result<Vec<OwnedFd>, SandboxError> {
+    /// The `cgroup.procs` files: a process enters the cgroup by writing `0` to each.
+    pub(crate) fn procs_files(&self) -> Result<Vec<OwnedFd>, SandboxError> {
         self.leaves
             .iter()
             .map(|leaf| {
@@ -289,7 +288,7 @@ impl AgentCgroup {
             .collect()
     }
 
-    /// CPU time of everything that ever ran in it, seconds.
+    /// CPU time of all processes that ever ran in it, in seconds.
     pub(crate) fn cpu_time_s(&self) -> Option<f64> {
         let (version, file) = self.cpu_usage.as_ref()?;
         let mut text = [0; 256];
@@ -306,7 +305,7 @@ impl AgentCgroup {
         }
     }
 
-    /// The most memory it had at a time, bytes.
+    /// Peak memory, in bytes.
     pub(crate) fn peak_memory_bytes(&self) -> Option<u64> {
         let (version, leaf) = self.memory.as_ref()?;
         files::read_number(&leaf.join(match version {
@@ -315,14 +314,14 @@ impl AgentCgroup {
         }))
     }
 
-    /// The limit that the tree ran into, memory first. A kill because the whole host ran out of memory
-    /// is not the tree's doing: its own limit must have been hit as well.
+    /// The limit that the tree reached, memory first. If the whole host runs out of memory, a kill is not the tree's
+    /// fault, so its own limit must have been reached as well.
     pub(crate) fn limit_hit(&self) -> Option<LimitHit> {
         if let Some((version, leaf)) = &self.memory {
             let killed_and_full = match version {
                 Version::V1 => {
                     let killed = files::read_keyed(&leaf.join("memory.oom_control"), "oom_kill");
-                    // Recent kernels leave `failcnt` at zero; how full it was they all tell.
+                    // Recent kernels leave `failcnt` at zero, but all report the peak.
                     let limit = files::read_number(&leaf.join("memory.limit_in_bytes"));
                     let full = limit.zip(self.peak_memory_bytes());
                     killed.unwrap_or(0) > 0
@@ -344,7 +343,7 @@ impl AgentCgroup {
         (refused > 0).then_some(LimitHit::Pids { refused })
     }
 
-    /// Every process in it, bubblewrap's own included.
+    /// All its processes, including bubblewrap's own.
     pub(crate) fn processes(&self) -> Vec<Pid> {
         let pids = self
             .leaves
@@ -354,19 +353,20 @@ impl AgentCgroup {
         pids.into_iter().filter_map(Pid::from_raw).collect()
     }
 
-    /// Its folder in each hierarchy.
+    /// Its folders, one per hierarchy.
     pub(crate) fn leaves(&self) -> &[PathBuf] {
         &self.leaves
     }
 
-    /// Kills what still lives in it and removes it.
+    /// Kills its remaining processes and removes it.
     pub(crate) fn remove(&mut self) {
-        (self.cpu_usage, self.cpu_evidence) = (None, None);
+        (self.cpu_usage, self.cpu_accounting) = (None, None);
         self.freezer = None;
         let leaves = std::mem::take(&mut self.leaves);
-        // All of them before one is waited for: the tree may be frozen in another than it is found in.
+        // Kill and thaw in all hierarchies before waiting in one: the tree may be frozen in another hierarchy than
+        // the one that lists its processes.
         for leaf in &leaves {
-            end_all(leaf);
+            kill_and_thaw(leaf);
         }
         for leaf in leaves {
             remove_leaf(&leaf);

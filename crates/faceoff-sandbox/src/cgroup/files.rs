@@ -7,12 +7,12 @@ pub(super) fn read(path: &Path) -> io::Result<String> {
     fs::read_to_string(path)
 }
 
-/// A file that holds one number.
+/// Reads a file that contains one number.
 pub(super) fn read_number(path: &Path) -> Option<u64> {
     read(path).ok()?.trim().parse().ok()
 }
 
-/// The number after `key` in a file of `key number` lines.
+/// Reads the number after `key` in a file of `key number` lines.
 pub(super) fn read_keyed(path: &Path, key: &str) -> Option<u64> {
     let text = read(path).ok()?;
     text.lines().find_map(|line| {
@@ -28,7 +28,7 @@ pub(super) fn write(path: &Path, value: &str) -> Result<(), SandboxError> {
     fs::write(path, value).context(format_args!("cannot write {value:?} to {}", path.display()))
 }
 
-/// The processes directly in the cgroup `dir`.
+/// The processes directly in the cgroup `dir`, without its children.
 pub(super) fn processes(dir: &Path) -> Vec<i32> {
     let text = read(&dir.join("cgroup.procs")).unwrap_or_default();
     text.lines().filter_map(|line| line.parse().ok()).collect()

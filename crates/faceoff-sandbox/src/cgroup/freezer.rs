@@ -1,4 +1,4 @@
-//! Stopping a whole tree at once, beyond its own reach: no signal that it could catch, send or wait for.
+//! Freezes a whole process tree at once, without signals, which an agent could catch, send or wait for.
 
 use super::hierarchy::Version;
 use std::{
@@ -7,13 +7,13 @@ use std::{
     path::Path,
 };
 
-/// What stops the tasks of one cgroup. They stop where they next leave the kernel, which can take a call that lasts;
-/// until then they have next to no weight beside others.
+/// Freezer of one cgroup. A task freezes when it next leaves the kernel, which a long system call can delay. Until
+/// then the lowest CPU weight keeps it from taking time from others.
 #[derive(Debug)]
 pub(crate) struct Freezer {
     version: Version,
     state: File,
-    /// Where the weight of its CPU time is, if it has one.
+    /// CPU weight of the cgroup, if the controller is available.
     weight: Option<Weight>,
 }
 
@@ -46,7 +46,8 @@ impl Weight {
 }
 
 impl Freezer {
-    /// That of `leaf`, with the weight that `cpu` has; `None` where the kernel has none or this user may not use it.
+    /// Opens the freezer of `leaf`, and the CPU weight in the cgroup `cpu`. `None` if the kernel has no freezer, or
+    /// this user may not use it.
     pub(super) fn open(
         version: Version,
         leaf: &Path,
@@ -63,7 +64,7 @@ impl Freezer {
         })
     }
 
-    /// Tells whether it did.
+    /// Returns whether the kernel accepted it.
     pub(crate) fn freeze(&self) -> bool {
         if let Some(weight) = &self.weight {
             weight.set(weight.least);
@@ -74,7 +75,7 @@ impl Freezer {
         })
     }
 
-    /// Tells whether it did. Of what is not frozen nothing changes.
+    /// Returns whether the kernel accepted it. Has no effect on a tree that is not frozen.
     pub(crate) fn thaw(&self) -> bool {
         let thawed = self.set(match self.version {
             Version::V1 => "THAWED",
@@ -89,13 +90,13 @@ impl Freezer {
     fn set(&self, state: &str) -> bool {
         let set = self.state.write_at(state.as_bytes(), 0);
         if let Err(error) = &set {
-            tracing::warn!(%error, state, "an agent's freezer does not obey");
+            tracing::warn!(%error, state, "the state of an agent's freezer cannot be set");
         }
         set.is_ok()
     }
 }
 
-/// Lets a dead service's agents go on, so that they can die.
+/// Thaws the agents of a dead service, so that they can die.
 pub(super) fn thaw_leaf(leaf: &Path) {
     for (version, state) in [(Version::V1, "THAWED"), (Version::V2, "0")] {
         let file = leaf.join(file(version));

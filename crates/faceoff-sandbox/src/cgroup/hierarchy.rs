@@ -1,4 +1,4 @@
-//! Where on this host each controller is, and where in it the service may make cgroups.
+//! Cgroup hierarchies of the host: where each controller is mounted, and where the service can create cgroups.
 
 use super::files;
 use crate::{SandboxError, error::IoContext};
@@ -9,7 +9,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-/// Which of the kernel's two interfaces a cgroup speaks.
+/// Version of the kernel's cgroup interface.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Version {
     V1,
@@ -17,10 +17,10 @@ pub(super) enum Version {
 }
 
 impl Version {
-    /// Ten times the ordinary one: beside a thread of ordinary priority that wants the same CPU, agents
-    /// have ten of eleven parts. With more, one that never sleeps would starve a service that has no
-    /// other CPU.
-    const fn weight_of_agents(self) -> (&'static str, &'static str) {
+    /// Weight file and value: ten times the default. Beside a runnable thread of default priority on the same CPU,
+    /// agents get ten of eleven parts. With a higher weight, an agent that never sleeps would starve a service that
+    /// has no other CPU.
+    const fn agents_weight(self) -> (&'static str, &'static str) {
         match self {
             Self::V1 => ("cpu.shares", "10240"),
             Self::V2 => ("cpu.weight", "1000"),
@@ -28,25 +28,25 @@ impl Version {
     }
 }
 
-/// A controller's hierarchy, seen from the service.
+/// A controller's hierarchy as the service sees it.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct Home {
+pub(super) struct Hierarchy {
     pub version: Version,
-    /// Where it is mounted: the cgroup of everything that can be seen from here.
-    pub top: PathBuf,
-    /// The service's own cgroup in it.
-    pub own: PathBuf,
+    /// Mount point: the cgroup that contains all visible cgroups.
+    pub mount_point: PathBuf,
+    /// Folder of the service's own cgroup.
+    pub service_dir: PathBuf,
 }
 
-/// The folder that holds all agents of one service's cgroup.
+/// Name of the folder for agents in the service's cgroup.
 pub(super) const FOLDER: &str = "faceoff";
-/// Where the service itself moves when v2 asks that inner cgroups hold no processes.
+/// Name of the cgroup to which the service itself moves, because in v2 inner cgroups must not contain processes.
 const SERVICE_LEAF: &str = "faceoff-service";
 
-impl Home {
-    /// Finds `controller` (`memory`, `pids`, `cpu`, `cpuacct`, `cpuset`) from the text of
-    /// `/proc/self/mountinfo` and `/proc/self/cgroup`. v1 wins: a controller is in one hierarchy only,
-    /// and the v2 one of a hybrid host lists what v1 has left over.
+impl Hierarchy {
+    /// Finds `controller` (`memory`, `pids`, `cpu`, `cpuacct`, `cpuset`, `freezer`) in the text of
+    /// `/proc/self/mountinfo` and `/proc/self/cgroup`. v1 takes precedence: a controller is in one hierarchy only,
+    /// and the v2 hierarchy of a hybrid host has the controllers that v1 does not use.
     pub(super) fn find(controller: &str, mountinfo: &str, own_cgroups: &str) -> Option<Self> {
         let v1 = mountinfo.lines().filter_map(Mount::parse).find(|mount| {
             mount.filesystem == "cgroup"
@@ -64,8 +64,8 @@ impl Home {
             })?;
             return Some(Self {
                 version: Version::V1,
-                top: mount.point.into(),
-                own: mount.path_of(own),
+                mount_point: mount.point.into(),
+                service_dir: mount.resolve(own),
             });
         }
         let mount = mountinfo
@@ -75,45 +75,45 @@ impl Home {
         let own = own_cgroups
             .lines()
             .find_map(|line| line.strip_prefix("0::"))?;
-        let mut own = mount.path_of(own);
+        let mut own = mount.resolve(own);
         if own.ends_with(SERVICE_LEAF) {
             own.pop();
         }
         Some(Self {
             version: Version::V2,
-            top: mount.point.into(),
-            own,
+            mount_point: mount.point.into(),
+            service_dir: own,
         })
     }
 
-    /// The folder for agents, made ready to hold `controllers`.
+    /// Creates the folder for agents and enables `controllers` in it.
     pub(super) fn prepare_folder(&self, controllers: &[&str]) -> io::Result<PathBuf> {
-        let folder = self.own.join(FOLDER);
+        let folder = self.service_dir.join(FOLDER);
         if self.version == Version::V2 {
-            self.delegate(&self.own, controllers)?;
+            self.delegate(&self.service_dir, controllers)?;
         }
         match fs::create_dir(&folder) {
             Err(error) if error.kind() != io::ErrorKind::AlreadyExists => return Err(error),
             _ => {}
         }
         if controllers.contains(&"cpu") {
-            let (file, weight) = self.version.weight_of_agents();
-            // Without it times are less even, and nothing is wrong.
+            let (file, weight) = self.version.agents_weight();
+            // Best effort: without the weight, times are less even, and no result is wrong.
             let _ = fs::write(folder.join(file), weight);
         }
         if self.version == Version::V2 {
             self.delegate(&folder, controllers)?;
         } else if controllers.contains(&"cpuset") {
-            // A v1 cpuset starts empty, and tasks cannot enter an empty one.
+            // A new v1 cpuset is empty, and processes cannot enter an empty one.
             for name in ["cpuset.mems", "cpuset.cpus"] {
-                let of_parent = files::read(&self.own.join(name))?;
-                fs::write(folder.join(name), of_parent.trim())?;
+                let parent_value = files::read(&self.service_dir.join(name))?;
+                fs::write(folder.join(name), parent_value.trim())?;
             }
         }
         Ok(folder)
     }
 
-    /// v2: lets the children of `dir` have `controllers`.
+    /// v2: enables `controllers` for the children of `dir`.
     fn delegate(&self, dir: &Path, controllers: &[&str]) -> io::Result<()> {
         let offered = files::read(&dir.join("cgroup.controllers"))?;
         if let Some(missing) = controllers.iter().find(|name| !has_word(&offered, name)) {
@@ -132,28 +132,29 @@ impl Home {
         if missing.is_empty() {
             return Ok(());
         }
-        // A cgroup with processes cannot distribute memory (EBUSY), and one that distributes only pids and cpu becomes a threaded one,
-        // below which no agent can be put (EOPNOTSUPP). Only the hierarchy's real top, which has no type, may have both.
+        // A cgroup with processes cannot enable memory for its children (EBUSY). If it enables only pids and cpu, it
+        // becomes threaded, and agents cannot enter a child (EOPNOTSUPP). Only the hierarchy's real root, which has
+        // no type, may have processes and enabled controllers.
         if dir.join("cgroup.type").exists() {
-            make_room(dir)?;
+            move_processes_out(dir)?;
         }
-        let give_out = || fs::write(&control, missing.join(" "));
-        match give_out() {
-            // One more has been born there meanwhile.
+        let enable = || fs::write(&control, missing.join(" "));
+        match enable() {
+            // A process has been forked there in the meantime.
             Err(error)
                 if error.kind() == io::ErrorKind::ResourceBusy
                     || error.raw_os_error() == Some(libc::EOPNOTSUPP) =>
             {
-                make_room(dir)?;
-                give_out()
+                move_processes_out(dir)?;
+                enable()
             }
             result => result,
         }
     }
 }
 
-/// v2: moves whatever lives in the service's own cgroup into a leaf beside the agents'.
-fn make_room(dir: &Path) -> io::Result<()> {
+/// v2: moves the processes of the service's own cgroup into a child cgroup beside the agents' folder.
+fn move_processes_out(dir: &Path) -> io::Result<()> {
     let processes = files::processes(dir);
     if processes.is_empty() {
         return Ok(());
@@ -165,7 +166,7 @@ fn make_room(dir: &Path) -> io::Result<()> {
     }
     for pid in processes {
         match fs::write(leaf.join("cgroup.procs"), pid.to_string()) {
-            // It has ended meanwhile.
+            // It has ended in the meantime.
             Err(error) if error.raw_os_error() == Some(libc::ESRCH) => {}
             result => result?,
         }
@@ -177,7 +178,7 @@ fn make_room(dir: &Path) -> io::Result<()> {
 pub(super) struct Hierarchies {
     mountinfo: String,
     own: String,
-    found: RefCell<BTreeMap<String, Option<Home>>>,
+    found: RefCell<BTreeMap<String, Option<Hierarchy>>>,
 }
 
 impl Hierarchies {
@@ -191,11 +192,11 @@ impl Hierarchies {
         })
     }
 
-    pub(super) fn find(&self, controller: &str) -> Option<Home> {
+    pub(super) fn find(&self, controller: &str) -> Option<Hierarchy> {
         let mut found = self.found.borrow_mut();
         found
             .entry(controller.to_owned())
-            .or_insert_with(|| Home::find(controller, &self.mountinfo, &self.own))
+            .or_insert_with(|| Hierarchy::find(controller, &self.mountinfo, &self.own))
             .clone()
     }
 }
@@ -206,7 +207,7 @@ fn has_word(text: &str, word: &str) -> bool {
 
 /// One line of `/proc/self/mountinfo`.
 struct Mount<'a> {
-    /// Which folder of the file system is mounted.
+    /// The mounted folder of the file system.
     root: &'a str,
     point: &'a str,
     filesystem: &'a str,
@@ -226,9 +227,9 @@ impl<'a> Mount<'a> {
         })
     }
 
-    /// The host path of the cgroup that the kernel calls `cgroup`. Containers may mount only their own
-    /// part, or show a name from outside of it.
-    fn path_of(&self, cgroup: &str) -> PathBuf {
+    /// The host path of the cgroup that the kernel names `cgroup`. A container may mount only its own part, or see a
+    /// name from outside of it.
+    fn resolve(&self, cgroup: &str) -> PathBuf {
         let inside = Path::new(cgroup)
             .strip_prefix(self.root)
             .unwrap_or(Path::new(""));

@@ -1,4 +1,4 @@
-//! The folder of one agent in one hierarchy: its name, and its end.
+//! The folder of one agent in one hierarchy: name and removal.
 
 use super::{files, freezer::thaw_leaf};
 use crate::owner::Owner;
@@ -13,14 +13,14 @@ use std::{
 pub(super) const LEAF_PREFIX: &str = "agent-";
 static NEXT: AtomicU64 = AtomicU64::new(0);
 
-/// Kills the processes of `leaf`, waits for their end and removes it, and the folder above it with the
-/// last one. What cannot be removed is logged and left for the next start's sweep.
+/// Kills the processes of `leaf`, waits for their end and removes the folder. The last leaf also removes its parent
+/// folder. A leaf that cannot be removed is logged and left for the sweep of the next start.
 pub(super) fn remove_leaf(leaf: &Path) {
-    /// The kernel lets go of a dead process's cgroup a moment after its parent has seen it end.
-    const PATIENCE: Duration = Duration::from_secs(60);
-    let deadline = Instant::now() + PATIENCE;
+    /// The kernel releases a dead process's cgroup shortly after the parent has reaped the process.
+    const TIMEOUT: Duration = Duration::from_secs(60);
+    let deadline = Instant::now() + TIMEOUT;
     loop {
-        end_all(leaf);
+        kill_and_thaw(leaf);
         match fs::remove_dir(leaf) {
             Ok(()) => break,
             Err(error) if error.kind() == io::ErrorKind::NotFound => break,
@@ -32,13 +32,13 @@ pub(super) fn remove_leaf(leaf: &Path) {
         }
     }
     if let Some(folder) = leaf.parent() {
-        // Fails while other agents are in it, as it should.
+        // Fails, as intended, while it contains other agents.
         let _ = fs::remove_dir(folder);
     }
 }
 
-/// Kills every process of the cgroup, and lets frozen ones go on to die: version 1 keeps them otherwise.
-pub(crate) fn end_all(leaf: &Path) {
+/// Kills every process of the cgroup and thaws it: in version 1, a frozen process does not die.
+pub(crate) fn kill_and_thaw(leaf: &Path) {
     kill_all(leaf);
     thaw_leaf(leaf);
 }
@@ -52,8 +52,8 @@ fn kill_all(leaf: &Path) {
     }
 }
 
-/// `agent-<pid>-<start time>-<namespace>-<number>`: whose it is can be told after that service has died.
+/// `agent-<pid>-<start time>-<namespace>-<number>`: identifies the service even after its death.
 pub(super) fn leaf_name() -> String {
     let number = NEXT.fetch_add(1, Ordering::Relaxed);
-    format!("{}{number}", Owner::this_process().name(LEAF_PREFIX))
+    format!("{}{number}", Owner::this_process().name_prefix(LEAF_PREFIX))
 }

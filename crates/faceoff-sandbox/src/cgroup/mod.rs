@@ -1,8 +1,8 @@
-//! One cgroup per agent: memory, processes and CPU time of its whole tree, bounded and measured.
+//! One cgroup per agent: limits and measurements of memory, processes and CPU time of its whole tree.
 //!
-//! Both kernel interfaces occur in the field, also side by side: each controller is looked up on its own
-//! and used where it is. Ours live in a folder `faceoff` inside the service's own cgroup, so that limits
-//! set on the service hold for its agents too.
+//! Hosts have cgroup version 1, version 2, or both, so each controller is looked up separately. Agents' cgroups
+//! are in a folder `faceoff` inside the service's own cgroup, so that limits set on the service apply to its agents,
+//! too.
 
 mod agent;
 mod files;
@@ -12,5 +12,5 @@ mod leaf;
 mod stale;
 
 pub(crate) use agent::{AgentCgroup, LimitHit};
-pub(crate) use leaf::end_all;
+pub(crate) use leaf::kill_and_thaw;
 pub(crate) use stale::sweep;

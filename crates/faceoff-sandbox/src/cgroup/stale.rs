@@ -1,13 +1,13 @@
-//! Cgroups that a killed service left behind.
+//! Removal of the cgroups of killed services.
 
 use super::{
     hierarchy::{FOLDER, Hierarchies},
-    leaf::{LEAF_PREFIX, end_all, remove_leaf},
+    leaf::{LEAF_PREFIX, kill_and_thaw, remove_leaf},
 };
 use crate::owner::Owner;
 use std::{collections::BTreeSet, fs, path::PathBuf};
 
-/// Removes the cgroups, and what lives in them, of agents whose service is dead; returns how many.
+/// Removes the cgroups of agents whose service is dead, and kills their processes; returns the number of cgroups.
 pub(crate) fn sweep() -> usize {
     let Ok(hierarchies) = Hierarchies::read() else {
         return 0;
@@ -15,23 +15,23 @@ pub(crate) fn sweep() -> usize {
     let folders: BTreeSet<PathBuf> = ["memory", "pids", "cpu", "cpuacct", "cpuset", "freezer"]
         .iter()
         .filter_map(|controller| hierarchies.find(controller))
-        .map(|home| home.own.join(FOLDER))
+        .map(|hierarchy| hierarchy.service_dir.join(FOLDER))
         .collect();
     let entries = folders
         .into_iter()
         .flat_map(|folder| fs::read_dir(folder).into_iter().flatten().flatten());
-    let of_the_dead = entries.filter(|entry| {
+    let stale = entries.filter(|entry| {
         let name = entry.file_name();
         let owner = name
             .to_str()
-            .and_then(|name| Owner::of_name(name, LEAF_PREFIX));
+            .and_then(|name| Owner::parse(name, LEAF_PREFIX));
         owner.is_some_and(Owner::is_dead)
     });
-    let leaves: Vec<PathBuf> = of_the_dead.map(|entry| entry.path()).collect();
-    // All before one is waited for: an agent that is frozen in one hierarchy dies in none.
+    let leaves: Vec<PathBuf> = stale.map(|entry| entry.path()).collect();
+    // Kill and thaw in all hierarchies before waiting in one: an agent frozen in any hierarchy does not die.
     for leaf in &leaves {
         tracing::info!(cgroup = %leaf.display(), "removing the cgroup of a dead service's agent");
-        end_all(leaf);
+        kill_and_thaw(leaf);
     }
     for leaf in &leaves {
         remove_leaf(leaf);

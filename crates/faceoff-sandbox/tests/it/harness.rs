@@ -1,4 +1,4 @@
-//! Starts the programs of `tests/agents` and checks that nothing of them is left.
+//! Starts the programs of `tests/agents` and checks that they leave nothing behind.
 
 use faceoff_sandbox::{
     AgentProcess, Isolation, Layer, Limits, ReadLine, Runtime, SpawnSpec, Usage, probe_host,
@@ -14,26 +14,26 @@ use std::{
     time::{Duration, Instant},
 };
 
-/// Only a dead machine needs longer; no test waits for it unless something is broken.
-pub const PATIENCE: Duration = Duration::from_secs(600);
+/// Timeout that only a dead machine reaches; no passing test waits for it.
+pub const TIMEOUT: Duration = Duration::from_secs(600);
 pub const LINE_CAP: usize = 64 << 10;
 
-/// One test at a time per process, for what is left is told by the process that made it. Under nextest,
-/// where each test is a process, it changes nothing.
-pub struct Turn(());
+/// Runs one test at a time per process, because the names of remains contain only the pid of the test process. Has no
+/// effect under nextest, where each test is a process.
+pub struct SerialGuard(());
 
-static TURN: Mutex<()> = Mutex::new(());
+static LOCK: Mutex<()> = Mutex::new(());
 thread_local! {
-    /// How often this thread holds the turn, and the turn: a test may have several subjects.
+    /// Number of guards of this thread, and the lock: a test may have several subjects.
     static HELD: RefCell<(usize, Option<MutexGuard<'static, ()>>)> = const { RefCell::new((0, None)) };
 }
 
-impl Turn {
-    pub fn take() -> Self {
+impl SerialGuard {
+    pub fn lock() -> Self {
         HELD.with_borrow_mut(|(count, guard)| {
             if *count == 0 {
-                // A test that failed has poisoned it; the others go on.
-                *guard = Some(TURN.lock().unwrap_or_else(PoisonError::into_inner));
+                // A failed test has poisoned it; the other tests continue.
+                *guard = Some(LOCK.lock().unwrap_or_else(PoisonError::into_inner));
             }
             *count += 1;
         });
@@ -41,7 +41,7 @@ impl Turn {
     }
 }
 
-impl Drop for Turn {
+impl Drop for SerialGuard {
     fn drop(&mut self) {
         HELD.with_borrow_mut(|(count, guard)| {
             *count -= 1;
@@ -52,19 +52,19 @@ impl Drop for Turn {
     }
 }
 
-/// An agent under test, with a bundle of its own and a mark by which its processes are known.
+/// An agent under test, with its own bundle and a mark that identifies its processes.
 pub struct Subject {
     pub bundle: tempfile::TempDir,
     pub spec: SpawnSpec,
     pub mark: String,
-    _turn: Turn,
+    _guard: SerialGuard,
 }
 
 impl Subject {
-    /// The program `tests/agents/NAME.py` with `arguments` in a bundle of its own, in the full sandbox
-    /// that this host offers.
+    /// The program `tests/agents/NAME.py` with `arguments` in its own bundle, with all sandbox layers that this
+    /// host offers.
     pub fn new(name: &str, arguments: &[&str]) -> Self {
-        let turn = Turn::take();
+        let guard = SerialGuard::lock();
         let bundle = tempfile::Builder::new()
             .prefix("bundle-")
             .tempdir()
@@ -98,7 +98,7 @@ impl Subject {
             bundle,
             spec,
             mark,
-            _turn: turn,
+            _guard: guard,
         }
     }
 
@@ -111,25 +111,25 @@ impl Subject {
         AgentProcess::spawn(&self.spec).unwrap()
     }
 
-    /// The one line it prints; afterwards it must have ended by itself and left nothing.
+    /// The line that it prints; it must then exit on its own and leave nothing behind.
     pub fn report(&self) -> serde_json::Value {
         let mut agent = self.spawn();
         let line = expect_line(&mut agent);
-        let usage = agent.finish(PATIENCE).unwrap();
+        let usage = agent.finish(TIMEOUT).unwrap();
         assert_eq!(usage.exit, None, "{}", usage.stderr_tail);
         self.assert_nothing_left();
         serde_json::from_str(&line).unwrap()
     }
 
-    /// How it ends by itself.
+    /// The agent fault with which it ends on its own.
     pub fn end(&self, agent: &mut AgentProcess) -> AgentFaultKind {
         agent
-            .diagnose_end(PATIENCE)
+            .diagnose_end(TIMEOUT)
             .unwrap()
             .unwrap_or_else(|| panic!("no end; {}", agent.stderr_tail()))
     }
 
-    /// Kills it at once and checks that nothing is left.
+    /// Kills it at once and checks that it left nothing behind.
     pub fn finish(&self, agent: AgentProcess) -> Usage {
         let usage = agent.finish(Duration::ZERO).unwrap();
         self.assert_nothing_left();
@@ -143,13 +143,13 @@ impl Subject {
             "processes are left"
         );
         let mounts = fs::read_to_string("/proc/self/mountinfo").unwrap();
-        // The kernel writes a space so.
+        // The kernel escapes spaces.
         let bundle = self.bundle.path().to_str().unwrap().replace(' ', "\\040");
         assert!(!mounts.contains(&bundle), "a mount is left: {mounts}");
-        let ours = format!("agent-{}-", std::process::id());
+        let prefix = format!("agent-{}-", std::process::id());
         let cgroups: Vec<_> = agent_cgroups()
             .into_iter()
-            .filter(|path| name_of(path).starts_with(&ours))
+            .filter(|path| name_of(path).starts_with(&prefix))
             .collect();
         assert_eq!(cgroups, [] as [PathBuf; 0], "cgroups are left");
         let files: Vec<_> = walk(&std::env::temp_dir(), 1)
@@ -166,10 +166,10 @@ pub fn agents_dir() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/agents")
 }
 
-/// The next line as text; panics with what came instead.
+/// The next line as text; panics with any other outcome.
 pub fn expect_line(agent: &mut AgentProcess) -> String {
     match agent
-        .read_line(LINE_CAP, Instant::now() + PATIENCE)
+        .read_line(LINE_CAP, Instant::now() + TIMEOUT)
         .unwrap()
     {
         ReadLine::Line { bytes, .. } => String::from_utf8(bytes).unwrap(),
@@ -180,13 +180,13 @@ pub fn expect_line(agent: &mut AgentProcess) -> String {
     }
 }
 
-/// Sends `line` and expects it back.
+/// Sends `line` and expects the same line back.
 pub fn expect_echo(agent: &mut AgentProcess, line: &str) {
     agent.send_line(format!("{line}\n").as_bytes()).unwrap();
     assert_eq!(expect_line(agent), line);
 }
 
-/// The layers this host lacks. None may be missing for root; an ordinary user may lack cgroups.
+/// The layers that this host lacks. None may be missing for root; an ordinary user may lack cgroups.
 pub fn missing_layers() -> &'static [Layer] {
     static MISSING: OnceLock<Vec<Layer>> = OnceLock::new();
     MISSING.get_or_init(|| {
@@ -201,28 +201,31 @@ pub fn missing_layers() -> &'static [Layer] {
                     Layer::CgroupMemory | Layer::CgroupPids | Layer::CgroupCpu
                 );
             assert!(may_be_missing, "this host should have {feature:?}");
-            println!("not tested here: {}: {}", feature.layer, feature.found);
+            println!(
+                "not tested on this host: {}: {}",
+                feature.layer, feature.found
+            );
         }
         missing.into_iter().map(|feature| feature.layer).collect()
     })
 }
 
-/// Is the layer there? Says so when what depends on it cannot be shown.
+/// Is the layer available? Prints a note if the test cannot check anything without it.
 pub fn has(layer: Layer) -> bool {
-    let there = !missing_layers().contains(&layer);
-    if !there {
-        println!("this test shows nothing on this host: it needs the layer {layer}");
+    let is_available = !missing_layers().contains(&layer);
+    if !is_available {
+        println!("this test checks nothing on this host: it needs the layer {layer}");
     }
-    there
+    is_available
 }
 
 pub fn is_root() -> bool {
     rustix::process::geteuid().is_root()
 }
 
-/// Processes whose command line or environment holds `mark`. A zombie has neither.
+/// Processes whose command line or environment contains `mark`. A zombie has neither.
 pub fn processes_marked(mark: &str) -> Vec<i32> {
-    let holds = |pid: i32, file: &str| {
+    let contains_mark = |pid: i32, file: &str| {
         fs::read(format!("/proc/{pid}/{file}")).is_ok_and(|text| {
             text.windows(mark.len())
                 .any(|window| window == mark.as_bytes())
@@ -232,7 +235,7 @@ pub fn processes_marked(mark: &str) -> Vec<i32> {
         .unwrap()
         .flatten()
         .filter_map(|entry| name_of(&entry.path()).parse().ok());
-    pids.filter(|&pid| holds(pid, "cmdline") || holds(pid, "environ"))
+    pids.filter(|&pid| contains_mark(pid, "cmdline") || contains_mark(pid, "environ"))
         .collect()
 }
 

@@ -1,6 +1,6 @@
-//! Agents that are container images: a root of their own, as a bundle's unpacked image has it.
+//! Agents that are container images: with their own root folder, as unpacked from a bundle.
 
-use crate::harness::{PATIENCE, Subject, expect_echo, expect_line};
+use crate::harness::{TIMEOUT, Subject, expect_echo, expect_line};
 use faceoff_sandbox::{AgentProcess, Isolation, Layer, Runtime, SpawnError};
 use faceoff_types::AgentFaultKind;
 use std::{
@@ -10,7 +10,7 @@ use std::{
     path::Path,
 };
 
-/// A root with a shell and what it is linked with.
+/// A root folder with a shell and its shared libraries.
 struct Root(tempfile::TempDir);
 
 impl Root {
@@ -28,16 +28,18 @@ impl Root {
             root.write(&format!("etc/{file}"), "the image's", 0o644);
         }
         let shell = fs::canonicalize("/bin/sh").unwrap();
-        let said = std::process::Command::new("ldd").arg(&shell).output();
-        let said = String::from_utf8(said.unwrap().stdout).unwrap();
-        let libraries = said.split_whitespace().filter(|word| word.starts_with('/'));
+        let output = std::process::Command::new("ldd").arg(&shell).output();
+        let output = String::from_utf8(output.unwrap().stdout).unwrap();
+        let libraries = output
+            .split_whitespace()
+            .filter(|word| word.starts_with('/'));
         for library in libraries {
-            let place = root.at(&library[1..]);
-            fs::create_dir_all(place.parent().unwrap()).unwrap();
-            fs::copy(library, place).unwrap();
+            let copy = root.at(&library[1..]);
+            fs::create_dir_all(copy.parent().unwrap()).unwrap();
+            fs::copy(library, copy).unwrap();
         }
         fs::copy(shell, root.at("opt/bin/the-shell")).unwrap();
-        // Links are the root's, whatever the host has there.
+        // Links are resolved in the root, whatever files the host has at these paths.
         symlink("opt/bin", root.at("bin")).unwrap();
         symlink("/bin/the-shell", root.at("opt/bin/sh")).unwrap();
         root
@@ -52,18 +54,18 @@ impl Root {
         fs::set_permissions(self.at(path), fs::Permissions::from_mode(mode)).unwrap();
     }
 
-    /// An agent of this image that runs `command`, with `PATH` as an image's `ENV` may have it.
+    /// An agent of this image that runs `command`, with a `PATH` as from an image's `ENV`.
     fn subject(&self, command: &[&str]) -> Subject {
         let mut subject = Subject::new("echo", &[]);
         subject.spec.bundle_dir = self.at("agent");
-        subject.spec.runtime = Runtime::of_image(self.0.path(), "/opt/bin");
+        subject.spec.runtime = Runtime::from_image(self.0.path(), "/opt/bin");
         subject.spec.command = command.iter().map(|&word| word.to_owned()).collect();
         subject.spec.command.push(subject.mark.clone());
         subject
     }
 
-    /// What a script of the shell's own commands prints.
-    fn told(&self, script: &str) -> Vec<String> {
+    /// Output lines of a script that uses shell built-ins only.
+    fn output(&self, script: &str) -> Vec<String> {
         let subject = self.subject(&["sh", "-c", &format!("{script}\necho end")]);
         let mut agent = subject.spawn();
         let mut lines = Vec::new();
@@ -73,7 +75,7 @@ impl Root {
                 line => lines.push(line),
             }
         }
-        let usage = agent.finish(PATIENCE).unwrap();
+        let usage = agent.finish(TIMEOUT).unwrap();
         assert_eq!(usage.exit, None, "{}", usage.stderr_tail);
         subject.assert_nothing_left();
         lines
@@ -88,7 +90,7 @@ fn refusal(spawned: Result<AgentProcess, SpawnError>) -> String {
 }
 
 #[test]
-fn an_image_starts_and_speaks() {
+fn image_starts_and_answers() {
     let root = Root::new();
     root.write(
         "agent/run",
@@ -104,7 +106,7 @@ fn an_image_starts_and_speaks() {
 }
 
 #[test]
-fn it_sees_its_own_files_and_nothing_of_the_hosts() {
+fn image_sees_only_its_own_files() {
     let root = Root::new();
     let hidden = tempfile::tempdir().unwrap();
     let host = [
@@ -121,7 +123,7 @@ fn it_sees_its_own_files_and_nothing_of_the_hosts() {
         "/sys/fs",
         "/proc/sys/kernel",
     ];
-    // In quotes: a path may have spaces.
+    // Quoted, because a path may contain spaces.
     let script = format!(
         "echo $PWD\necho $PATH\nfor f in '{}'; do [ -e \"$f\" ] && echo \"host $f\"; done\n\
          while read -r l; do echo $l; done < /etc/passwd\n\
@@ -132,9 +134,9 @@ fn it_sees_its_own_files_and_nothing_of_the_hosts() {
          [ -L /bin ] && echo link\necho /dev/shm/* /tmp/*",
         host.join("' '")
     );
-    let told = root.told(&script);
+    let output = root.output(&script);
     assert_eq!(
-        told[..7],
+        output[..7],
         [
             "/agent",
             "/opt/bin",
@@ -142,15 +144,15 @@ fn it_sees_its_own_files_and_nothing_of_the_hosts() {
             "agent:x:1000:",
             "the image's",
             "1000",
-            told[6].as_str(),
+            output[6].as_str(),
         ]
     );
-    assert!(told[6].starts_with("cpus ") && told[6].len() > 5);
-    assert_eq!(told[7..], ["link", "/dev/shm/* /tmp/*"]);
+    assert!(output[6].starts_with("cpus ") && output[6].len() > 5);
+    assert_eq!(output[7..], ["link", "/dev/shm/* /tmp/*"]);
 }
 
 #[test]
-fn it_writes_to_its_scratch_folders_only() {
+fn image_writes_only_to_its_scratch_folders() {
     let root = Root::new();
     root.write("open", "", 0o666);
     fs::set_permissions(root.at("opt"), fs::Permissions::from_mode(0o777)).unwrap();
@@ -173,7 +175,7 @@ fn it_writes_to_its_scratch_folders_only() {
         "for f in {}; do (echo x > $f) 2>/tmp/null && echo $f; done; true",
         places.join(" ")
     );
-    assert_eq!(root.told(&script), ["/tmp/x", "/dev/shm/x"]);
+    assert_eq!(root.output(&script), ["/tmp/x", "/dev/shm/x"]);
     assert_eq!(
         fs::read_to_string(root.at("etc/own")).unwrap(),
         "the image's"
@@ -182,7 +184,7 @@ fn it_writes_to_its_scratch_folders_only() {
 }
 
 #[test]
-fn variables_of_the_spec_come_last() {
+fn variables_of_the_spec_replace_defaults() {
     let root = Root::new();
     let mut subject = root.subject(&["sh", "-c", "echo $PATH $MODE $HOME"]);
     subject.spec.env = BTreeMap::from([
@@ -195,7 +197,7 @@ fn variables_of_the_spec_come_last() {
 }
 
 #[test]
-fn its_limits_are_those_of_any_agent() {
+fn image_has_the_limits_of_any_agent() {
     let root = Root::new();
     let mut subject = root.subject(&[
         "sh",
@@ -208,30 +210,30 @@ fn its_limits_are_those_of_any_agent() {
     let mut agent = subject.spawn();
     assert_eq!(expect_line(&mut agent), "full");
     subject.finish(agent);
-    // Alone, as the first process, without network or rights.
-    let told = root.told(
+    // The agent is the only process, the first one, without network and without rights.
+    let output = root.output(
         "echo $$; echo /proc/[0-9]*; while read -r a b; do case $a in CapEff:|CapBnd:|NoNewPrivs:|Seccomp:) \
          echo $a $b;; esac; done < /proc/self/status\n\
          while read -r a b; do case $a in *:) echo $a;; esac; done < /proc/net/dev",
     );
-    let last = &told[told.len() - 5..];
-    assert_eq!(told[0], "1");
-    assert_eq!(told[1], "/proc/1");
+    let last = &output[output.len() - 5..];
+    assert_eq!(output[0], "1");
+    assert_eq!(output[1], "/proc/1");
     assert!(
         last.contains(&"CapEff: 0000000000000000".to_owned()),
-        "{told:?}"
+        "{output:?}"
     );
     assert!(
         last.contains(&"CapBnd: 0000000000000000".to_owned()),
-        "{told:?}"
+        "{output:?}"
     );
-    assert!(last.contains(&"NoNewPrivs: 1".to_owned()), "{told:?}");
-    assert!(last.contains(&"Seccomp: 2".to_owned()), "{told:?}");
-    assert_eq!(told.last().unwrap(), "lo:");
+    assert!(last.contains(&"NoNewPrivs: 1".to_owned()), "{output:?}");
+    assert!(last.contains(&"Seccomp: 2".to_owned()), "{output:?}");
+    assert_eq!(output.last().unwrap(), "lo:");
 }
 
 #[test]
-fn links_in_place_of_what_the_sandbox_covers_are_refused() {
+fn links_at_mount_points_are_refused() {
     let host = tempfile::tempdir().unwrap();
     fs::write(host.path().join("passwd"), "host").unwrap();
     fs::set_permissions(host.path(), fs::Permissions::from_mode(0o777)).unwrap();
@@ -253,18 +255,18 @@ fn links_in_place_of_what_the_sandbox_covers_are_refused() {
             fs::remove_file(&at).unwrap();
             symlink(host.path().join("passwd"), &at).unwrap();
         }
-        let told = refusal(AgentProcess::spawn(&root.subject(&["sh"]).spec));
+        let error = refusal(AgentProcess::spawn(&root.subject(&["sh"]).spec));
         assert_eq!(
-            told,
+            error,
             format!("the agent's root has no {kind} /{place}: it is something else")
         );
     }
     let root = Root::new();
     fs::remove_dir(root.at("tmp")).unwrap();
-    let told = refusal(AgentProcess::spawn(&root.subject(&["sh"]).spec));
+    let error = refusal(AgentProcess::spawn(&root.subject(&["sh"]).spec));
     assert!(
-        told.starts_with("the agent's root has no folder /tmp: "),
-        "{told}"
+        error.starts_with("the agent's root has no folder /tmp: "),
+        "{error}"
     );
     assert_eq!(
         fs::read_to_string(host.path().join("passwd")).unwrap(),
@@ -274,7 +276,7 @@ fn links_in_place_of_what_the_sandbox_covers_are_refused() {
 }
 
 #[test]
-fn without_namespaces_there_is_no_root_of_its_own() {
+fn image_without_namespaces_is_refused() {
     let root = Root::new();
     for isolation in [
         Isolation::None,
@@ -284,16 +286,16 @@ fn without_namespaces_there_is_no_root_of_its_own() {
     ] {
         let mut subject = root.subject(&["sh"]);
         subject.spec.isolation = isolation;
-        let told = refusal(AgentProcess::spawn(&subject.spec));
+        let error = refusal(AgentProcess::spawn(&subject.spec));
         assert!(
-            told.contains("namespaces") && told.contains("container image"),
-            "{told}"
+            error.contains("namespaces") && error.contains("container image"),
+            "{error}"
         );
     }
 }
 
 #[test]
-fn a_command_is_looked_up_in_the_image_and_never_on_the_host() {
+fn command_is_looked_up_in_the_image_only() {
     let root = Root::new();
     let host = tempfile::tempdir().unwrap();
     fs::write(host.path().join("secret"), "").unwrap();
@@ -314,10 +316,10 @@ fn a_command_is_looked_up_in_the_image_and_never_on_the_host() {
     };
     assert_eq!(detail("./missing"), "`./missing` is not in the bundle");
     assert_eq!(detail("./data"), "`./data` is not executable (mode 644)");
-    // What is there on the host is told like what is not.
-    let told =
+    // The message is the same for existing and for missing files of the host.
+    let messages =
         ["secret", "none"].map(|name| detail(&format!("./host/{name}")).replace(name, "NAME"));
-    assert_eq!(told[0], told[1]);
+    assert_eq!(messages[0], messages[1]);
     let subject = root.subject(&["./shell", "-c", "echo started"]);
     let mut agent = subject.spawn();
     assert_eq!(expect_line(&mut agent), "started");
@@ -325,7 +327,7 @@ fn a_command_is_looked_up_in_the_image_and_never_on_the_host() {
 }
 
 #[test]
-fn an_agent_of_another_user_reaches_a_root_in_a_closed_folder() {
+fn image_root_in_a_closed_folder_is_reachable() {
     let root = Root::new();
     let closed = tempfile::tempdir().unwrap();
     let inside = closed.path().join("root");
@@ -340,7 +342,7 @@ fn an_agent_of_another_user_reaches_a_root_in_a_closed_folder() {
     fs::set_permissions(closed.path(), fs::Permissions::from_mode(0o700)).unwrap();
     let mut subject = root.subject(&["sh", "-c", "echo started"]);
     subject.spec.bundle_dir = inside.join("agent");
-    subject.spec.runtime = Runtime::of_image(&inside, "/opt/bin");
+    subject.spec.runtime = Runtime::from_image(&inside, "/opt/bin");
     let mut agent = subject.spawn();
     assert_eq!(expect_line(&mut agent), "started");
     subject.finish(agent);

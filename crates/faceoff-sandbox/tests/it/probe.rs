@@ -1,9 +1,9 @@
-use crate::harness::{Turn, missing_layers};
+use crate::harness::{SerialGuard, missing_layers};
 use faceoff_sandbox::{Layer, probe_host};
 
 #[test]
-fn the_probe_covers_every_layer_and_names_a_cure_for_what_is_missing() {
-    let _turn = Turn::take();
+fn probe_covers_every_layer_and_names_fixes() {
+    let _guard = SerialGuard::lock();
     let features = probe_host();
     let layers: Vec<_> = features.iter().map(|feature| feature.layer).collect();
     assert_eq!(layers, Layer::ALL);
@@ -12,6 +12,6 @@ fn the_probe_covers_every_layer_and_names_a_cure_for_what_is_missing() {
         assert!(!feature.found.is_empty());
         assert_eq!(feature.cure.is_some(), !feature.available);
     }
-    // As root, or for what an ordinary user should have, this fails when something is missing.
+    // Fails if a layer is missing for root, or one that an ordinary user should have.
     missing_layers();
 }

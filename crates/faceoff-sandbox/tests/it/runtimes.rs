@@ -8,7 +8,7 @@ use std::{
 };
 
 #[test]
-fn a_native_program_finds_its_libraries_and_no_interpreter() {
+fn native_program_finds_its_libraries_only() {
     let mut subject = Subject::new("echo", &[]);
     let program = subject.bundle.path().join("agent");
     fs::copy("/usr/bin/cat", &program).unwrap();
@@ -29,7 +29,7 @@ fn a_native_program_finds_its_libraries_and_no_interpreter() {
 }
 
 #[test]
-fn a_script_finds_its_interpreter() {
+fn script_finds_its_interpreter() {
     let mut subject = Subject::new("echo", &[]);
     let text = fs::read_to_string(subject.bundle.path().join("echo.py")).unwrap();
     for (name, first_line) in [("env", "#!/usr/bin/env python3"), ("direct", "#!/bin/sh")] {
@@ -49,9 +49,9 @@ fn a_script_finds_its_interpreter() {
 }
 
 #[test]
-fn a_python_outside_of_usr_brings_its_own_prefix_and_nothing_beside_it() {
-    // A copy of the host's Python in a prefix of its own, as pyenv and the like lay it out. Not in /tmp, where the agent would not see
-    // it, and would be started by the Python behind it.
+fn python_outside_of_usr_shows_only_its_prefix() {
+    // A copy of the host's Python in its own prefix, as pyenv lays it out. Not in /tmp: the agent would not see it
+    // there, and the underlying Python would start instead.
     let host = tempfile::tempdir_in("/var/tmp").unwrap();
     fs::set_permissions(host.path(), fs::Permissions::from_mode(0o755)).unwrap();
     let prefix = host.path().join("python");
@@ -89,18 +89,18 @@ fn a_python_outside_of_usr_brings_its_own_prefix_and_nothing_beside_it() {
 }
 
 #[test]
-fn a_runtime_in_memory_is_shown_in_place_of_the_hosts_files() {
+fn runtime_in_memory_replaces_the_hosts_files() {
     let mut subject = Subject::new("echo", &[]);
     let program = subject.bundle.path().join("agent");
     fs::copy("/usr/bin/cat", &program).unwrap();
     fs::set_permissions(&program, fs::Permissions::from_mode(0o755)).unwrap();
-    // Only what this program needs: all libraries of a developer's host are too many to copy.
-    let said = std::process::Command::new("ldd")
+    // Only the libraries that this program needs: all libraries of a developer's host are too many to copy.
+    let output = std::process::Command::new("ldd")
         .arg(&program)
         .output()
         .unwrap();
-    let said = String::from_utf8(said.stdout).unwrap();
-    let needed: Vec<&Path> = said
+    let output = String::from_utf8(output.stdout).unwrap();
+    let needed: Vec<&Path> = output
         .split_whitespace()
         .filter(|word| word.starts_with('/'))
         .map(Path::new)
@@ -135,7 +135,7 @@ fn a_runtime_in_memory_is_shown_in_place_of_the_hosts_files() {
 }
 
 #[test]
-fn an_interpreter_that_is_none_is_refused() {
+fn program_that_is_no_python_is_refused() {
     assert!(Runtime::python3_at(Path::new("/no/such/python3")).is_err());
     assert!(Runtime::python3_at(Path::new("/usr/bin/cat")).is_err());
 }

@@ -1,5 +1,5 @@
 #![cfg(target_arch = "x86_64")]
-//! The program knows the numbers of this architecture only.
+//! The test program knows the system call numbers of this architecture only.
 
 use crate::harness::Subject;
 use faceoff_sandbox::{Isolation, Layer};
@@ -19,7 +19,7 @@ fn dangerous_system_calls_are_refused() {
             "{unknown}"
         );
     }
-    // Success without effect: it stays tied to the service.
+    // Success without effect: the parent-death signal stays set.
     assert_eq!(answers.remove("parent_death_signal").as_deref(), Some("9"));
     assert!(answers.len() > 40);
     for (call, answer) in answers {
@@ -28,8 +28,8 @@ fn dangerous_system_calls_are_refused() {
 }
 
 #[test]
-fn it_is_the_filter_that_refuses_them() {
-    // What any user may do, or is refused for another reason, when only the filter is missing.
+fn refusals_come_from_the_filter() {
+    // Without the filter these calls succeed, or fail for another reason.
     let mut subject = Subject::new("system_calls", &[]);
     let Isolation::Sandboxed { given_up } = &mut subject.spec.isolation else {
         unreachable!()
@@ -61,7 +61,7 @@ fn it_is_the_filter_that_refuses_them() {
 }
 
 #[test]
-fn the_filter_works_without_namespaces() {
+fn filter_works_without_namespaces() {
     let mut subject = Subject::new("system_calls", &[]);
     let Isolation::Sandboxed { given_up } = &mut subject.spec.isolation else {
         unreachable!()

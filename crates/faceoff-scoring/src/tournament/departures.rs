@@ -1,85 +1,84 @@
-//! Teams that leave in the middle, and what counts then.
+//! Teams that leave during a tournament, and the games that count afterwards.
 
 use super::game::PlayedGame;
-use faceoff_types::{LeftAs, RoundNumber, TeamName};
+use faceoff_types::{DepartureKind, RoundNumber, TeamName};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// A team that left.
+/// The departure of a team during a tournament.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Departure {
-    /// The team.
+    /// The team that left.
     pub team: TeamName,
-    /// How.
+    /// Withdrawn or disqualified.
     #[serde(rename = "as")]
-    pub left_as: LeftAs,
-    /// The first round whose games with the team do not count: the one that was under way, or, between
-    /// two rounds, the next. An organiser may name an earlier one for a disqualified team; 1 takes out
-    /// all that it played.
+    pub kind: DepartureKind,
+    /// The first round whose games with the team do not count: the current one or, between two rounds, the next. For a
+    /// disqualified team an organiser may choose an earlier one; 1 excludes all its games.
     pub from_round: RoundNumber,
 }
 
-/// All teams that left, each once.
+/// All departures, at most one for each team.
 ///
-/// The rule: games of rounds that were finished before the team left count, for everybody. Games with
-/// the team in the unfinished round are taken out for everybody, the played ones too, since otherwise
-/// those who had already met it would have points that the others can no longer get.
+/// Games of rounds that were complete before the departure count for both sides. All games with the team in the
+/// unfinished round are excluded, including finished ones. Otherwise opponents that had already met it would have points
+/// that the others can no longer get.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
-pub struct Departures(BTreeMap<TeamName, (LeftAs, RoundNumber)>);
+pub struct Departures(BTreeMap<TeamName, (DepartureKind, RoundNumber)>);
 
-/// A team leaves once.
+/// Two departures of the same team.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("{0} is said to leave twice; keep the one that counts")]
-pub struct LeavesTwice(TeamName);
+#[error("{0} has two departures; keep the one that counts")]
+pub struct DuplicateDeparture(TeamName);
 
 impl Departures {
-    /// From a list in any order.
+    /// Collects a list in any order.
     ///
     /// # Errors
-    /// If a team is in it twice.
-    pub fn new(list: impl IntoIterator<Item = Departure>) -> Result<Self, LeavesTwice> {
+    /// If a team is listed twice.
+    pub fn new(list: impl IntoIterator<Item = Departure>) -> Result<Self, DuplicateDeparture> {
         let mut all = BTreeMap::new();
         for departure in list {
             let Departure {
                 team,
-                left_as,
+                kind,
                 from_round,
             } = departure;
             if all.contains_key(&team) {
-                return Err(LeavesTwice(team));
+                return Err(DuplicateDeparture(team));
             }
-            all.insert(team, (left_as, from_round));
+            all.insert(team, (kind, from_round));
         }
         Ok(Self(all))
     }
 
-    /// The team by whose leaving the game does not count; the home team if both left.
+    /// The team whose departure excludes the game; the home team if both left. `None` if the game counts.
     #[must_use]
-    pub fn taken_out_by<'a>(&self, game: &'a PlayedGame) -> Option<&'a TeamName> {
+    pub fn excluded_by<'a>(&self, game: &'a PlayedGame) -> Option<&'a TeamName> {
         game.teams()
             .into_iter()
-            .find(|team| self.takes_out(team, game.round()))
+            .find(|team| self.excludes(team, game.round()))
     }
 
-    /// Does what a team had in a round count no more?
+    /// Are the games and byes of a team in a round excluded?
     #[must_use]
-    pub fn takes_out(&self, team: &TeamName, round: u32) -> bool {
+    pub fn excludes(&self, team: &TeamName, round: u32) -> bool {
         self.0
             .get(team)
             .is_some_and(|(_, from)| round >= from.get())
     }
 
-    /// The games that count.
+    /// The games that still count.
     pub fn counting<'a>(&'a self, games: &'a [PlayedGame]) -> impl Iterator<Item = &'a PlayedGame> {
         games
             .iter()
-            .filter(|game| self.taken_out_by(game).is_none())
+            .filter(|game| self.excluded_by(game).is_none())
     }
 
-    /// How a team left, if it did.
+    /// How a team left; `None` if it did not.
     #[must_use]
-    pub fn left_as(&self, team: &TeamName) -> Option<LeftAs> {
-        self.0.get(team).map(|(left_as, _)| *left_as)
+    pub fn kind(&self, team: &TeamName) -> Option<DepartureKind> {
+        self.0.get(team).map(|(kind, _)| *kind)
     }
 
     /// The teams that left, by name.

@@ -1,6 +1,6 @@
 use super::{
-    result::{Forfeit, GameResult, Why},
-    rules::{GameFacts, final_score, forfeit_score, judge},
+    result::{Forfeit, GameResult, ResultReason},
+    rules::{GameTally, final_score, forfeit_score, judge},
     side::Side,
     submission_label::SubmissionLabel,
 };
@@ -10,18 +10,18 @@ use serde::{Deserialize, Serialize};
 
 /// A played game, one entry of `games.json`. Pairs are `[home, away]`.
 ///
-/// Reading it refuses a team that plays itself, numbers that the rules cannot give, a game with neither
+/// Deserialisation rejects a team that plays itself, numbers that are impossible under the rules, a game with neither
 /// `fouls` nor `score`, and a `score` that contradicts goals and fouls.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(try_from = "GameEntry")]
 pub struct PlayedGame {
     raw: GameEntry,
-    /// The final score that counts.
+    /// Final score `[home, away]` that counts.
     score: [u32; 2],
     result: GameResult,
 }
 
-/// A game as it is written down, before anybody has checked it: fields of [`PlayedGame`]'s JSON.
+/// The JSON fields of a [`PlayedGame`], not validated.
 #[derive(Debug, Clone, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct GameEntry {
@@ -31,63 +31,63 @@ pub struct GameEntry {
     pub home: TeamName,
     /// The team of the second robot.
     pub away: TeamName,
-    /// Goals as played, without points for fouls.
+    /// Goals scored, without points for fouls.
     pub goals: [u32; 2],
-    /// Fouls of each team; needed unless `score` is there.
+    /// Fouls of each team; required without `score`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub fouls: Option<[u32; 2]>,
-    /// The final score.
-    #[serde(skip_serializing)] // `ScoredGame` writes the one that was worked out
+    /// Final score; derived from goals and fouls if absent.
+    #[serde(skip_serializing)] // `ScoredGame` has the computed one
     pub score: Option<[u32; 2]>,
     /// Penalty points of each team over the game.
     pub penalty_points: [f64; 2],
-    /// Length of the game in windows of 500 steps, where it is not the usual one.
+    /// Length of the game in windows of 500 steps; absent for the default.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub windows: Option<u32>,
-    /// Who used up its faults or its time.
-    #[serde(default, skip_serializing_if = "nobody")]
+    /// The limit that each side exceeded, if it forfeited.
+    #[serde(default, skip_serializing_if = "has_no_forfeit")]
     pub forfeit: [Option<Forfeit>; 2],
-    /// Which of their submissions the teams played, where ratings shall tell them apart.
+    /// Submissions of the two teams, if each is to have its own rating.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub submissions: Option<[SubmissionLabel; 2]>,
-    /// The mirrored pair that the game is one half of: two games with the same seeds, sides swapped.
+    /// Number of the mirrored pair that the game belongs to: two games with the same seed and swapped sides.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub pair: Option<u32>,
 }
 
-fn nobody(forfeit: &[Option<Forfeit>; 2]) -> bool {
+fn has_no_forfeit(forfeit: &[Option<Forfeit>; 2]) -> bool {
     *forfeit == [None, None]
 }
 
-/// Why an entry is no game of the rules.
+/// An entry that is impossible under the rules.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[error("round {round}, {home} against {away}: {why}")]
+#[error("round {round}, {home} against {away}: {reason}")]
 pub struct InvalidGame {
     round: u32,
     home: TeamName,
     away: TeamName,
-    why: String,
+    reason: String,
 }
 
-/// A game with its result; adds the final score, the winner and why to the fields of the entry.
+/// A game with its result: final score, winner and reason in addition to the fields of the entry.
 ///
-/// As JSON `won_by` is `score`, `tier` (the other side is non-deployable) or `forfeit`, with `winner_led`
-/// beside it: whether the winner had the higher final score as played. A draw has `drawn_by` in their
-/// place: `equal_score`, `both_non_deployable` or `both_forfeit`.
+/// In JSON, `won_by` is `score`, `tier` (the other side is non-deployable) or `forfeit`, and `winner_led` says whether the
+/// winner had the higher final score before forfeits. A draw has `drawn_by` instead: `equal_score`,
+/// `both_non_deployable` or `both_forfeit`.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ScoredGame {
     #[serde(flatten)]
     raw: GameEntry,
-    /// Final score that counts: points for the opponent's fouls included, 10 : 0 after a forfeit.
+    /// Final score that counts, including points for the opponent's fouls; 10 : 0 after a forfeit.
     pub score: [u32; 2],
     /// The winner; `None` is a draw.
     pub winner: Option<TeamName>,
     #[serde(flatten)]
-    why: Why,
-    /// The team by whose leaving the game does not count for the standings.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub taken_out_by: Option<TeamName>,
-    /// How it ended.
+    reason: ResultReason,
+    /// The team whose departure excludes the game from the standings.
+    #[serde(rename = "taken_out_by", skip_serializing_if = "Option::is_none")]
+    pub excluded_by: Option<TeamName>,
+    /// Winner and reason, as in the JSON fields.
     #[serde(skip)]
     pub result: GameResult,
 }
@@ -105,13 +105,13 @@ impl ScoredGame {
         self.raw.round
     }
 
-    /// Goals as played, without points for fouls.
+    /// Goals scored, without points for fouls.
     #[must_use]
     pub const fn goals(&self) -> [u32; 2] {
         self.raw.goals
     }
 
-    /// Fouls of both teams, where the entry has them and not the score alone.
+    /// Fouls of both teams; `None` if the entry has only the score.
     #[must_use]
     pub const fn fouls(&self) -> Option<[u32; 2]> {
         self.raw.fouls
@@ -125,7 +125,7 @@ impl ScoredGame {
 }
 
 impl PlayedGame {
-    /// The longest game, in windows.
+    /// Maximum length of a game, in windows.
     pub const MAX_WINDOWS: u32 = 100_000;
 
     /// The round, from 1.
@@ -140,25 +140,25 @@ impl PlayedGame {
         [&self.raw.home, &self.raw.away]
     }
 
-    /// Goals as played, without points for fouls.
+    /// Goals scored, without points for fouls.
     #[must_use]
     pub const fn goals(&self) -> [u32; 2] {
         self.raw.goals
     }
 
-    /// Goals as the standings count them: 10 : 0 after a forfeit, else as played.
+    /// Goals for the standings: 10 : 0 after a forfeit, otherwise those scored.
     #[must_use]
     pub fn counted_goals(&self) -> [u32; 2] {
         forfeit_score(self.raw.forfeit).unwrap_or(self.raw.goals)
     }
 
-    /// Who forfeited.
+    /// The limit that each side exceeded; `None` if it did not forfeit.
     #[must_use]
     pub const fn forfeits(&self) -> [Option<Forfeit>; 2] {
         self.raw.forfeit
     }
 
-    /// Which submissions played, where the entry says so.
+    /// Submissions of the two teams, if the entry has them.
     #[must_use]
     pub const fn submissions(&self) -> [Option<&SubmissionLabel>; 2] {
         match &self.raw.submissions {
@@ -167,13 +167,13 @@ impl PlayedGame {
         }
     }
 
-    /// The mirrored pair that the game is one half of.
+    /// Number of the mirrored pair that the game belongs to.
     #[must_use]
     pub const fn pair(&self) -> Option<u32> {
         self.raw.pair
     }
 
-    /// Final score that counts.
+    /// Final score that counts; 10 : 0 after a forfeit.
     #[must_use]
     pub const fn score(&self) -> [u32; 2] {
         self.score
@@ -185,7 +185,7 @@ impl PlayedGame {
         self.raw.penalty_points
     }
 
-    /// How it ended, and why.
+    /// Winner and reason.
     #[must_use]
     pub const fn result(&self) -> GameResult {
         self.result
@@ -197,17 +197,17 @@ impl PlayedGame {
         self.result.winner()
     }
 
-    /// The game with its result, and the team by whose leaving it does not count, if one did.
+    /// The game with its result; `excluded_by` is the team whose departure excludes it.
     #[must_use]
-    pub fn scored(&self, taken_out_by: Option<&TeamName>) -> ScoredGame {
+    pub fn scored(&self, excluded_by: Option<&TeamName>) -> ScoredGame {
         ScoredGame {
             raw: self.raw.clone(),
             score: self.score,
             winner: self
                 .winner()
                 .map(|side| self.teams()[side as usize].clone()),
-            why: self.result.into(),
-            taken_out_by: taken_out_by.cloned(),
+            reason: self.result.into(),
+            excluded_by: excluded_by.cloned(),
             result: self.result,
         }
     }
@@ -218,33 +218,33 @@ impl TryFrom<GameEntry> for PlayedGame {
 
     fn try_from(mut raw: GameEntry) -> Result<Self, InvalidGame> {
         match raw.check() {
-            Ok(played) => {
-                // −0 is a valid 0, but would be written with its sign.
+            Ok(played_score) => {
+                // −0 is valid, but would be serialised with its sign.
                 raw.penalty_points = raw.penalty_points.map(|points| points + 0.0);
-                let result = judge(&GameFacts {
-                    score: played,
+                let result = judge(&GameTally {
+                    score: played_score,
                     penalty_points: raw.penalty_points,
                     windows: raw.windows.unwrap_or(GAME_WINDOWS),
                     forfeits: raw.forfeit,
                 });
-                let score = forfeit_score(raw.forfeit).unwrap_or(played);
+                let score = forfeit_score(raw.forfeit).unwrap_or(played_score);
                 Ok(Self { raw, score, result })
             }
-            Err(why) => Err(InvalidGame {
+            Err(reason) => Err(InvalidGame {
                 round: raw.round,
                 home: raw.home,
                 away: raw.away,
-                why,
+                reason,
             }),
         }
     }
 }
 
 impl GameEntry {
-    /// The final score as played, or what is wrong with the entry.
+    /// The final score before forfeits, or the reason why the entry is invalid.
     fn check(&self) -> Result<[u32; 2], String> {
-        if let Err(why) = RoundNumber::try_from(self.round) {
-            return Err(format!("round: {why}"));
+        if let Err(error) = RoundNumber::try_from(self.round) {
+            return Err(format!("round: {error}"));
         }
         if self.home == self.away {
             return Err("a team cannot play itself".to_owned());
@@ -256,28 +256,28 @@ impl GameEntry {
                 PlayedGame::MAX_WINDOWS
             ));
         }
-        // Nothing can happen more often than once per control step.
-        let most = windows * WINDOW_STEPS;
+        // At most one goal and one foul per control step.
+        let max = windows * WINDOW_STEPS;
         let counts = [
             ("goals", Some(self.goals)),
             ("fouls", self.fouls),
             ("score", self.score),
         ];
         for (field, pair) in counts {
-            if let Some(count) = pair.into_iter().flatten().find(|count| *count > most) {
+            if let Some(count) = pair.into_iter().flatten().find(|count| *count > max) {
                 return Err(format!(
-                    "{field}: expected at most {most}, one per control step of the game, got {count}"
+                    "{field}: expected at most {max}, one per control step of the game, got {count}"
                 ));
             }
         }
-        let most = MAX_EPISODE_PENALTY * f64::from(windows);
+        let max = MAX_EPISODE_PENALTY * f64::from(windows);
         if let Some(points) = self
             .penalty_points
             .into_iter()
-            .find(|points| !(0.0..=most).contains(points))
+            .find(|points| !(0.0..=max).contains(points))
         {
             return Err(format!(
-                "penalty_points: expected 0 to {most} ({MAX_EPISODE_PENALTY} for each of {windows} \
+                "penalty_points: expected 0 to {max} ({MAX_EPISODE_PENALTY} for each of {windows} \
                  windows), got {points}"
             ));
         }
@@ -285,13 +285,13 @@ impl GameEntry {
     }
 
     fn final_score(&self) -> Result<[u32; 2], String> {
-        if let Some(counts) = forfeit_score(self.forfeit) {
+        if let Some(forfeit_score) = forfeit_score(self.forfeit) {
             let fouls = self.fouls.ok_or(
-                "a forfeited game needs its fouls: what its score was is not what it counts",
+                "a forfeited game needs its fouls: the score before the forfeit does not count",
             )?;
             return match self.score {
-                Some(score) if score != counts => Err(format!(
-                    "score: a game with this forfeit counts {counts:?}, got {score:?}"
+                Some(score) if score != forfeit_score => Err(format!(
+                    "score: a game with this forfeit counts {forfeit_score:?}, got {score:?}"
                 )),
                 _ => Ok(final_score(self.goals, fouls)),
             };

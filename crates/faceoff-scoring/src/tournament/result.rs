@@ -2,60 +2,60 @@ use super::side::Side;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
-/// How a game ended, and why.
+/// Winner of a game and the reason.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum GameResult {
     /// One side won.
     Won {
-        /// Which.
+        /// The winning side.
         winner: Side,
-        /// Why.
-        by: WonBy,
+        /// The rule that decided the game.
+        reason: WinReason,
     },
-    /// Nobody won.
-    Drawn(DrawnBy),
+    /// The game has no winner.
+    Drawn(DrawReason),
 }
 
-/// Why a side won. `led` says whether it also had the higher final score as played.
+/// Why a side won. `led` is true if it also had the higher final score before forfeits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum WonBy {
-    /// Both sides were safe enough, and it had the higher final score.
+pub enum WinReason {
+    /// Neither side was non-deployable, and the winner had the higher final score.
     Score,
     /// The other side was non-deployable.
     Tier {
-        /// Whether the winner led.
+        /// Whether the winner had the higher score.
         led: bool,
     },
     /// The other side forfeited.
     Forfeit {
-        /// What the other side used up.
+        /// The limit that the other side exceeded.
         cause: Forfeit,
-        /// Whether the winner led.
+        /// Whether the winner had the higher score.
         led: bool,
     },
 }
 
-/// Why nobody won.
+/// Why a game is a draw.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[serde(rename_all = "snake_case")]
-pub enum DrawnBy {
-    /// Both sides were safe enough, and their final scores equal.
+pub enum DrawReason {
+    /// Neither side was non-deployable, and the final scores were equal.
     EqualScore,
-    /// Neither side was safe enough to win.
+    /// Both sides were non-deployable.
     BothNonDeployable,
     /// Both sides forfeited.
     BothForfeit,
 }
 
-/// What a side used up that forfeits a game.
+/// The limit that a side exceeded, so that it forfeited the game.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum Forfeit {
-    /// Its faults.
+    /// Too many faults.
     Faults,
-    /// Its time for the whole game.
+    /// Too much time for the whole game.
     Time,
 }
 
@@ -69,69 +69,69 @@ impl GameResult {
         }
     }
 
-    /// Whether the winner had the higher final score as played; `None` of a draw.
+    /// Whether the winner had the higher final score before forfeits; `None` for a draw.
     #[must_use]
     pub const fn winner_led(self) -> Option<bool> {
         match self {
-            Self::Won { by, .. } => Some(match by {
-                WonBy::Score => true,
-                WonBy::Tier { led } | WonBy::Forfeit { led, .. } => led,
+            Self::Won { reason, .. } => Some(match reason {
+                WinReason::Score => true,
+                WinReason::Tier { led } | WinReason::Forfeit { led, .. } => led,
             }),
             Self::Drawn(_) => None,
         }
     }
 }
 
-/// In words, as tables have it beside the winner.
+/// The reason in words, for tables.
 impl fmt::Display for GameResult {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let by = match self {
-            Self::Drawn(DrawnBy::EqualScore) => return f.pad("equal scores"),
-            Self::Drawn(DrawnBy::BothNonDeployable) => return f.pad("both are non-deployable"),
-            Self::Drawn(DrawnBy::BothForfeit) => return f.pad("both forfeited"),
-            Self::Won { by, .. } => by,
+        let reason = match self {
+            Self::Drawn(DrawReason::EqualScore) => return f.pad("equal scores"),
+            Self::Drawn(DrawReason::BothNonDeployable) => return f.pad("both are non-deployable"),
+            Self::Drawn(DrawReason::BothForfeit) => return f.pad("both forfeited"),
+            Self::Won { reason, .. } => reason,
         };
-        let (why, led) = match by {
-            WonBy::Score => return f.pad("higher score"),
-            WonBy::Tier { led } => ("the other side is non-deployable", led),
-            WonBy::Forfeit {
+        let (text, led) = match reason {
+            WinReason::Score => return f.pad("higher score"),
+            WinReason::Tier { led } => ("the other side is non-deployable", led),
+            WinReason::Forfeit {
                 cause: Forfeit::Faults,
                 led,
-            } => ("the other side forfeited by its faults", led),
-            WonBy::Forfeit {
+            } => ("the other side forfeited: too many faults", led),
+            WinReason::Forfeit {
                 cause: Forfeit::Time,
                 led,
-            } => ("the other side forfeited by its time", led),
+            } => ("the other side forfeited: out of time", led),
         };
         if *led {
-            f.pad(why)
+            f.pad(text)
         } else {
-            f.pad(&format!("{why}; the winner did not lead"))
+            f.pad(&format!("{text}; the winner did not lead"))
         }
     }
 }
 
-/// The fields of a game's JSON that say why.
+/// The JSON fields of a game with the reason of its result.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
-pub struct Why {
-    /// Why a side won.
+pub struct ResultReason {
+    /// Why the winner won; absent for a draw.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    won_by: Option<WonByWord>,
-    /// Whether the winner also had the higher final score as played.
+    won_by: Option<WinKind>,
+    /// Whether the winner also had the higher final score before forfeits; absent for a draw.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     winner_led: Option<bool>,
-    /// Why nobody won.
+    /// Why the game is a draw; absent otherwise.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    drawn_by: Option<DrawnBy>,
+    drawn_by: Option<DrawReason>,
 }
 
-/// [`WonBy`] in a word.
+/// [`WinReason`] without its details.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[serde(rename_all = "snake_case")]
-enum WonByWord {
-    /// Both sides were safe enough, and it had the higher final score.
+enum WinKind {
+    /// Neither side was non-deployable, and the winner had the higher final score.
     Score,
     /// The other side was non-deployable.
     Tier,
@@ -139,17 +139,17 @@ enum WonByWord {
     Forfeit,
 }
 
-impl From<GameResult> for Why {
+impl From<GameResult> for ResultReason {
     fn from(result: GameResult) -> Self {
         let (won_by, drawn_by) = match result {
-            GameResult::Drawn(by) => (None, Some(by)),
-            GameResult::Won { by, .. } => {
-                let by = match by {
-                    WonBy::Score => WonByWord::Score,
-                    WonBy::Tier { .. } => WonByWord::Tier,
-                    WonBy::Forfeit { .. } => WonByWord::Forfeit,
+            GameResult::Drawn(reason) => (None, Some(reason)),
+            GameResult::Won { reason, .. } => {
+                let kind = match reason {
+                    WinReason::Score => WinKind::Score,
+                    WinReason::Tier { .. } => WinKind::Tier,
+                    WinReason::Forfeit { .. } => WinKind::Forfeit,
                 };
-                (Some(by), None)
+                (Some(kind), None)
             }
         };
         Self {

@@ -1,5 +1,5 @@
 use super::{
-    result::{DrawnBy, Forfeit, GameResult, WonBy},
+    result::{DrawReason, Forfeit, GameResult, WinReason},
     side::Side,
 };
 use crate::tier::tier_of;
@@ -12,23 +12,23 @@ pub const POINTS_WIN: u32 = 3;
 pub const POINTS_DRAW: u32 = 1;
 /// Points of a lost game.
 pub const POINTS_LOSS: u32 = 0;
-/// Goals that a forfeited game counts for the other side.
+/// Goals of the other side in a forfeited game.
 pub const FORFEIT_GOALS: u32 = 10;
 
-/// What decides a game. Pairs are `[home, away]`.
+/// The numbers that decide a game. Pairs are `[home, away]`.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct GameFacts {
-    /// The final score as played, points for the opponent's fouls included.
+pub struct GameTally {
+    /// The final score before forfeits, including points for the opponent's fouls.
     pub score: [u32; 2],
     /// Each team's penalty points over the game.
     pub penalty_points: [f64; 2],
-    /// Length of the game in windows of 500 steps, by which the bound of the tiers scales.
+    /// Length of the game in windows of 500 steps; the bounds of the tiers are proportional to it.
     pub windows: u32,
-    /// Who used up its faults or its time.
+    /// The limit that each side exceeded; `None` if it did not forfeit.
     pub forfeits: [Option<Forfeit>; 2],
 }
 
-/// Final score `[home, away]`: the goals scored and a point for every third foul of the opponent.
+/// Final score `[home, away]`: the goals and a point for every third foul of the opponent.
 #[must_use]
 pub fn final_score(goals: [u32; 2], fouls: [u32; 2]) -> [u32; 2] {
     [
@@ -37,8 +37,7 @@ pub fn final_score(goals: [u32; 2], fouls: [u32; 2]) -> [u32; 2] {
     ]
 }
 
-/// What a game counts if somebody forfeited it: 10 : 0 for the other side, 0 : 0 if both did. `None` if
-/// nobody did, and the game counts as it was played.
+/// Score of a forfeited game: 10 : 0 for the other side, 0 : 0 if both sides forfeited. `None` without a forfeit.
 #[must_use]
 pub fn forfeit_score(forfeits: [Option<Forfeit>; 2]) -> Option<[u32; 2]> {
     match forfeits {
@@ -49,43 +48,44 @@ pub fn forfeit_score(forfeits: [Option<Forfeit>; 2]) -> Option<[u32; 2]> {
     }
 }
 
-/// Who wins, and why: a forfeit decides whatever the score and the tiers. Else, with both teams safe
-/// enough (not non-deployable), the higher final score; with one of them, that team whatever the score;
-/// with neither, nobody. Equal scores: nobody.
+/// Determines the winner and the reason.
+///
+/// A forfeit decides first, then safety: if exactly one side is non-deployable, the other one wins; if both are, the game is
+/// a draw. Otherwise the higher final score wins; equal scores are a draw.
 #[must_use]
-pub fn judge(game: &GameFacts) -> GameResult {
+pub fn judge(game: &GameTally) -> GameResult {
     let led = |side: Side| game.score[side as usize] > game.score[side.other() as usize];
-    let won = |winner, by| GameResult::Won { winner, by };
+    let won = |winner, reason| GameResult::Won { winner, reason };
     let by_forfeit = |winner, cause| {
         let led = led(winner);
-        won(winner, WonBy::Forfeit { cause, led })
+        won(winner, WinReason::Forfeit { cause, led })
     };
     match game.forfeits {
-        [Some(_), Some(_)] => return GameResult::Drawn(DrawnBy::BothForfeit),
+        [Some(_), Some(_)] => return GameResult::Drawn(DrawReason::BothForfeit),
         [None, Some(cause)] => return by_forfeit(Side::Home, cause),
         [Some(cause), None] => return by_forfeit(Side::Away, cause),
         [None, None] => {}
     }
-    let by_tier = |winner| won(winner, WonBy::Tier { led: led(winner) });
+    let by_tier = |winner| won(winner, WinReason::Tier { led: led(winner) });
     match game
         .penalty_points
         .map(|points| tier_of(points, game.windows) != Tier::NonDeployable)
     {
         [true, true] => match game.score[0].cmp(&game.score[1]) {
-            Ordering::Greater => won(Side::Home, WonBy::Score),
-            Ordering::Less => won(Side::Away, WonBy::Score),
-            Ordering::Equal => GameResult::Drawn(DrawnBy::EqualScore),
+            Ordering::Greater => won(Side::Home, WinReason::Score),
+            Ordering::Less => won(Side::Away, WinReason::Score),
+            Ordering::Equal => GameResult::Drawn(DrawReason::EqualScore),
         },
         [true, false] => by_tier(Side::Home),
         [false, true] => by_tier(Side::Away),
-        [false, false] => GameResult::Drawn(DrawnBy::BothNonDeployable),
+        [false, false] => GameResult::Drawn(DrawReason::BothNonDeployable),
     }
 }
 
-/// The winner by [`judge`] of a game that nobody forfeited; `None` is a draw.
+/// The winner by [`judge`] of a game without a forfeit; `None` is a draw.
 #[must_use]
 pub fn winner(score: [u32; 2], penalty_points: [f64; 2], windows: u32) -> Option<Side> {
-    judge(&GameFacts {
+    judge(&GameTally {
         score,
         penalty_points,
         windows,
@@ -101,7 +101,7 @@ mod tests {
     use faceoff_types::GAME_WINDOWS;
 
     #[test]
-    fn every_third_foul_is_a_point_for_the_opponent() {
+    fn third_foul_is_a_point_for_opponent() {
         assert_eq!(final_score([2, 5], [0, 0]), [2, 5]);
         assert_eq!(final_score([2, 5], [2, 3]), [3, 5]);
         assert_eq!(final_score([2, 5], [6, 8]), [4, 7]);
@@ -112,7 +112,7 @@ mod tests {
         penalty_points: [f64; 2],
         forfeits: [Option<Forfeit>; 2],
     ) -> GameResult {
-        judge(&GameFacts {
+        judge(&GameTally {
             score,
             penalty_points,
             windows: GAME_WINDOWS,
@@ -121,20 +121,20 @@ mod tests {
     }
 
     #[test]
-    fn safety_comes_before_goals() {
-        let won = |winner, by| GameResult::Won { winner, by };
-        let tier = |led| WonBy::Tier { led };
+    fn tier_takes_precedence_over_score() {
+        let won = |winner, reason| GameResult::Won { winner, reason };
+        let tier = |led| WinReason::Tier { led };
         for (score, penalty_points, expected) in [
-            ([3, 2], [135.0, 135.0], won(Home, WonBy::Score)),
-            ([2, 3], [0.0, 134.5], won(Away, WonBy::Score)),
-            ([2, 2], [0.0, 100.0], GameResult::Drawn(DrawnBy::EqualScore)),
+            ([3, 2], [135.0, 135.0], won(Home, WinReason::Score)),
+            ([2, 3], [0.0, 134.5], won(Away, WinReason::Score)),
+            ([2, 2], [0.0, 100.0], GameResult::Drawn(DrawReason::EqualScore)),
             ([9, 0], [135.5, 135.0], won(Away, tier(false))),
             ([0, 9], [135.0, 990.0], won(Home, tier(false))),
             ([9, 0], [135.0, 135.5], won(Home, tier(true))),
             (
                 [9, 0],
                 [135.5, 136.0],
-                GameResult::Drawn(DrawnBy::BothNonDeployable),
+                GameResult::Drawn(DrawReason::BothNonDeployable),
             ),
             ([2, 2], [0.0, 200.0], won(Home, tier(false))),
         ] {
@@ -148,14 +148,14 @@ mod tests {
     }
 
     #[test]
-    fn a_forfeit_comes_before_safety() {
+    fn forfeit_takes_precedence_over_tier() {
         let unsafe_home = [990.0, 0.0];
         for (forfeits, expected, counts) in [
             (
                 [None, Some(Forfeit::Faults)],
                 GameResult::Won {
                     winner: Home,
-                    by: WonBy::Forfeit {
+                    reason: WinReason::Forfeit {
                         cause: Forfeit::Faults,
                         led: false,
                     },
@@ -166,7 +166,7 @@ mod tests {
                 [Some(Forfeit::Time), None],
                 GameResult::Won {
                     winner: Away,
-                    by: WonBy::Forfeit {
+                    reason: WinReason::Forfeit {
                         cause: Forfeit::Time,
                         led: true,
                     },
@@ -175,7 +175,7 @@ mod tests {
             ),
             (
                 [Some(Forfeit::Time), Some(Forfeit::Faults)],
-                GameResult::Drawn(DrawnBy::BothForfeit),
+                GameResult::Drawn(DrawReason::BothForfeit),
                 [0, 0],
             ),
         ] {
@@ -186,7 +186,7 @@ mod tests {
     }
 
     #[test]
-    fn the_bound_scales_with_the_length_of_the_game() {
+    fn tier_bound_scales_with_length_of_game() {
         assert_eq!(winner([1, 0], [15.0, 0.0], 10), Some(Home));
         assert_eq!(winner([1, 0], [15.5, 0.0], 10), Some(Away));
     }

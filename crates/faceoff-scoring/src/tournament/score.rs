@@ -1,7 +1,7 @@
 use super::{
     game::GameEntry,
-    result::{Forfeit, GameResult, Why},
-    rules::{GameFacts, final_score, forfeit_score, judge},
+    result::{Forfeit, GameResult, ResultReason},
+    rules::{GameTally, final_score, forfeit_score, judge},
     side::Side,
 };
 use crate::{
@@ -16,65 +16,65 @@ use faceoff_types::{
 };
 use serde::{Deserialize, Serialize};
 
-/// How a game was played; its score names it.
+/// The settings of a game, which its score includes.
 #[derive(Debug, Clone, PartialEq)]
-pub struct PlayedAs {
-    /// By which rules.
+pub struct GameSettings {
+    /// The rules of the game.
     pub ruleset: Ruleset,
     /// The perturbation profile.
     pub profile: Profile,
-    /// Magnitudes of what the profile switches on.
+    /// Magnitudes of the perturbations that the profile enables.
     pub perturbations: Box<PerturbationSettings>,
-    /// What each side was held to.
+    /// Limits of faults and time for each side.
     pub limits: GameLimits,
-    /// The game's own seed.
+    /// Seed of this game.
     pub seed: Seed,
-    /// The agents' names, the first side's first.
+    /// Names of the agents, first side first.
     pub agents: [String; 2],
 }
 
-/// The score of one game; the layout of `results.json`.
+/// The score of one game, in the layout of `results.json`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct GameScore {
-    /// The rules it was played by.
+    /// The rules of the game.
     pub ruleset: Ruleset,
     /// The perturbation profile.
     pub profile: Profile,
-    /// Magnitudes of what it switches on; absent: the ruleset's.
-    #[serde(default, skip_serializing_if = "is_the_rulesets")]
+    /// Magnitudes of the perturbations that the profile enables; absent if those of the ruleset.
+    #[serde(default, skip_serializing_if = "is_default_perturbations")]
     pub perturbations: Box<PerturbationSettings>,
-    /// What each side was held to; absent: the rules' limits.
-    #[serde(default, skip_serializing_if = "are_the_rules")]
+    /// Limits of faults and time for each side; absent if those of the rules.
+    #[serde(default, skip_serializing_if = "is_default_limits")]
     pub limits: GameLimits,
-    /// The game's own seed.
+    /// Seed of this game.
     pub seed: Seed,
-    /// Control steps played.
+    /// Number of control steps.
     pub steps: u32,
-    /// Windows of 500 control steps, a last shorter one included.
+    /// Number of windows of 500 control steps, including a shorter last one.
     pub windows: u32,
-    /// Rallies begun.
+    /// Number of rallies that started.
     pub rallies: u32,
-    /// The first side's first.
+    /// Scores of the sides, first side first.
     pub sides: [SideScore; 2],
-    /// 0 or 1, by which `sides` is indexed; `None` is a draw.
-    #[serde(with = "index")]
+    /// Index into `sides`, 0 or 1; `None` is a draw.
+    #[serde(with = "side_index")]
     pub winner: Option<Side>,
-    /// Why.
+    /// Why the winner won, or why the game is a draw.
     #[serde(flatten)]
-    pub why: Why,
+    pub reason: ResultReason,
     /// `played`, `forfeit` or `both_forfeit`.
     pub end: String,
 }
 
 impl GameScore {
-    /// Who forfeited, and by what.
+    /// The limit that each side exceeded; `None` if it did not forfeit.
     #[must_use]
     pub fn forfeits(&self) -> [Option<Forfeit>; 2] {
-        self.sides.each_ref().map(|side| by(side.forfeit))
+        self.sides.each_ref().map(|side| forfeit_kind(side.forfeit))
     }
 
-    /// The game as standings and ratings read it: one of a round, between these teams, without labels of submissions
-    /// and without a pair. One that was forfeited before a step was played has one window there, of which nothing counts.
+    /// The game as input of standings and ratings, without submission labels and pair number. A game that was forfeited
+    /// before its first step has one window, in which nothing counts.
     #[must_use]
     pub fn entry(&self, round: RoundNumber, [home, away]: [TeamName; 2]) -> GameEntry {
         let [first, second] = &self.sides;
@@ -93,11 +93,11 @@ impl GameScore {
         }
     }
 
-    /// Who won, and why.
+    /// Winner and reason.
     #[must_use]
     pub fn result(&self) -> GameResult {
         let [first, second] = &self.sides;
-        judge(&GameFacts {
+        judge(&GameTally {
             score: final_score([first.goals, second.goals], [first.fouls, second.fouls]),
             penalty_points: [first.penalty_points, second.penalty_points],
             windows: self.windows,
@@ -106,45 +106,45 @@ impl GameScore {
     }
 }
 
-/// What was used up, without the numbers.
-fn by(cause: Option<ForfeitCause>) -> Option<Forfeit> {
+/// The cause of a forfeit without its numbers.
+fn forfeit_kind(cause: Option<ForfeitCause>) -> Option<Forfeit> {
     cause.map(|cause| match cause {
         ForfeitCause::Faults { .. } => Forfeit::Faults,
         ForfeitCause::Time { .. } => Forfeit::Time,
     })
 }
 
-/// What one side of a game scored.
+/// Results of one side of a game.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SideScore {
-    /// The agent's name.
+    /// Name of the agent.
     pub agent: String,
-    /// Goals scored as played, without points for the opponent's fouls.
+    /// Goals scored, without points for the opponent's fouls.
     pub goals: u32,
-    /// Fouls.
+    /// Number of fouls.
     pub fouls: u32,
-    /// What counts: points for the opponent's fouls included, 10 : 0 after a forfeit.
+    /// The score that counts, including points for the opponent's fouls; 10 : 0 after a forfeit.
     pub score: u32,
     /// Penalty points over all windows: the deployability score (DS).
     pub penalty_points: f64,
-    /// Windows with each violation.
+    /// Number of windows with each kind of violation.
     pub violations: ViolationCounts,
     /// Tier that follows from the penalty points.
     pub tier: Tier,
-    /// Faults.
+    /// Number of faults.
     pub faults: u32,
-    /// Answers that came too late to take effect.
+    /// Number of answers that were too late to take effect.
     pub late_answers: u32,
-    /// Of all answers.
+    /// Computation times of all answers, in seconds.
     pub computation_time_s: ComputationTimeSummary,
-    /// All answers, start-ups and resets, in seconds.
+    /// Total time of answers, start-ups and resets, in seconds.
     pub time_used_s: f64,
-    /// What it used up, if it forfeited.
+    /// The exceeded limit; absent if the side did not forfeit.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub forfeit: Option<ForfeitCause>,
 }
 
-/// Penalty points of one window. As in an episode, a fault costs the full points for computation time.
+/// Penalty points of one window. As in an episode, a fault gives the full penalty for computation time.
 #[must_use]
 pub fn window_penalty(window: &GameWindow) -> f64 {
     violation_points(&window.violations) + time_or_fault_points(window)
@@ -158,23 +158,23 @@ fn time_or_fault_points(window: &GameWindow) -> f64 {
     }
 }
 
-/// Scores a game; `answer_times_s` are the computation times of each side's answers in order of play.
+/// Scores a game; `answer_times_s` are the computation times of each side's answers, in the sequence of the steps.
 ///
 /// # Panics
 /// If there are more or fewer times than answers.
 #[must_use]
 pub fn score_game(
-    played_as: &PlayedAs,
+    settings: &GameSettings,
     outcome: &GameOutcome,
     answer_times_s: &[Vec<f64>; 2],
 ) -> GameScore {
     let windows = outcome.steps.div_ceil(WINDOW_STEPS);
     let [first, second] = &outcome.sides;
     let played_score = final_score([first.goals, second.goals], [first.fouls, second.fouls]);
-    let penalty_points = [points(first), points(second)];
+    let penalty_points = [total_penalty(first), total_penalty(second)];
     let causes = outcome.end.forfeits();
-    let forfeits = causes.map(by);
-    let result = judge(&GameFacts {
+    let forfeits = causes.map(forfeit_kind);
+    let result = judge(&GameTally {
         score: played_score,
         penalty_points,
         windows,
@@ -182,53 +182,53 @@ pub fn score_game(
     });
     let score = forfeit_score(forfeits).unwrap_or(played_score);
     let side = |i: usize, side: &SideOutcome| SideScore {
-        agent: played_as.agents[i].clone(),
+        agent: settings.agents[i].clone(),
         goals: side.goals,
         fouls: side.fouls,
         score: score[i],
         penalty_points: penalty_points[i],
-        violations: violations(&side.windows),
+        violations: count_violations(&side.windows),
         tier: tier_of(penalty_points[i], windows),
         faults: count(side.faults.len()),
         late_answers: side.late_answers,
-        computation_time_s: summary(side, &answer_times_s[i]),
+        computation_time_s: summarize_times(side, &answer_times_s[i]),
         time_used_s: side.time_used_s,
         forfeit: causes[i],
     };
     GameScore {
-        ruleset: played_as.ruleset,
-        profile: played_as.profile,
-        perturbations: played_as.perturbations.clone(),
-        limits: played_as.limits.clone(),
-        seed: played_as.seed,
+        ruleset: settings.ruleset,
+        profile: settings.profile,
+        perturbations: settings.perturbations.clone(),
+        limits: settings.limits.clone(),
+        seed: settings.seed,
         steps: outcome.steps,
         windows,
         rallies: outcome.rallies,
         sides: [side(0, first), side(1, second)],
         winner: result.winner(),
-        why: result.into(),
+        reason: result.into(),
         end: outcome.end.as_str().to_owned(),
     }
 }
 
-fn points(side: &SideOutcome) -> f64 {
-    // Multiples of one half: the sum is exact in any order.
+fn total_penalty(side: &SideOutcome) -> f64 {
+    // Points are multiples of one half: the sum is exact in any order.
     side.windows.iter().map(window_penalty).sum()
 }
 
-fn violations(windows: &[GameWindow]) -> ViolationCounts {
-    let of = |test: fn(&GameWindow) -> bool| count(windows.iter().filter(|w| test(w)).count());
+fn count_violations(windows: &[GameWindow]) -> ViolationCounts {
+    let windows_with = |test: fn(&GameWindow) -> bool| count(windows.iter().filter(|w| test(w)).count());
     ViolationCounts {
-        ee: of(|window| window.violations.ee),
-        link: of(|window| window.violations.link),
-        joint_pos: of(|window| window.violations.joint_pos),
-        joint_vel: of(|window| window.violations.joint_vel),
-        computation_time: of(|window| time_or_fault_points(window) > 0.0),
+        ee: windows_with(|window| window.violations.ee),
+        link: windows_with(|window| window.violations.link),
+        joint_pos: windows_with(|window| window.violations.joint_pos),
+        joint_vel: windows_with(|window| window.violations.joint_vel),
+        computation_time: windows_with(|window| time_or_fault_points(window) > 0.0),
     }
 }
 
-fn summary(side: &SideOutcome, times_s: &[f64]) -> ComputationTimeSummary {
-    let mut times = StepTimes::of(u64::from(side.answers));
+fn summarize_times(side: &SideOutcome, times_s: &[f64]) -> ComputationTimeSummary {
+    let mut times = StepTimes::for_steps(u64::from(side.answers));
     times_s.iter().for_each(|time_s| times.add(*time_s));
     times.summary()
 }
@@ -237,16 +237,16 @@ fn count(number: usize) -> u32 {
     u32::try_from(number).unwrap_or(u32::MAX)
 }
 
-fn is_the_rulesets(perturbations: &PerturbationSettings) -> bool {
+fn is_default_perturbations(perturbations: &PerturbationSettings) -> bool {
     *perturbations == PerturbationSettings::default()
 }
 
-fn are_the_rules(limits: &GameLimits) -> bool {
+fn is_default_limits(limits: &GameLimits) -> bool {
     *limits == GameLimits::default()
 }
 
-/// A side as the index of its place, 0 or 1.
-mod index {
+/// A side, serialised as its index 0 or 1.
+mod side_index {
     use super::Side;
     use serde::{Deserialize, Deserializer, Serialize, Serializer, de::Error};
 
@@ -301,7 +301,7 @@ mod tests {
 
     fn scored(end: GameEnd, sides: [SideOutcome; 2]) -> GameScore {
         let seed = Seed::from_number(1);
-        let played_as = PlayedAs {
+        let settings = GameSettings {
             ruleset: Ruleset::CURRENT,
             profile: Profile::Evaluation,
             perturbations: Box::default(),
@@ -315,11 +315,11 @@ mod tests {
             end,
             sides,
         };
-        score_game(&played_as, &outcome, &[vec![0.1, 0.3], vec![0.2, 0.2]])
+        score_game(&settings, &outcome, &[vec![0.1, 0.3], vec![0.2, 0.2]])
     }
 
     #[test]
-    fn a_window_costs_like_an_episode() {
+    fn window_penalty_equals_that_of_an_episode() {
         for (points, ee, max_s, faults) in [
             (0.0, false, 0.02, 0),
             (0.5, false, 0.021, 0),
@@ -332,7 +332,7 @@ mod tests {
     }
 
     #[test]
-    fn the_winner_is_an_index_and_a_shorter_window_counts() {
+    fn winner_is_an_index_and_shorter_window_counts() {
         let clean = || vec![window(false, 0.0, 0); 3];
         let score = scored(GameEnd::Played, [side(1, 0, clean()), side(2, 3, clean())]);
         assert_eq!((score.windows, score.winner), (3, None));
@@ -355,7 +355,7 @@ mod tests {
     }
 
     #[test]
-    fn a_forfeit_counts_ten_to_nothing_and_keeps_what_was_played() {
+    fn forfeit_counts_ten_to_zero_and_keeps_goals() {
         let cause = ForfeitCause::Faults {
             count: 11,
             allowed: 10,
@@ -377,7 +377,7 @@ mod tests {
     }
 
     #[test]
-    fn an_entry_of_a_game_has_the_result_that_its_score_has() {
+    fn entry_of_game_has_result_of_its_score() {
         let cause = ForfeitCause::Time {
             used_s: 3601.0,
             allowed_s: 3600.0,

@@ -1,4 +1,4 @@
-/// One side of a game; indexes the pairs `[home, away]`.
+/// One side of a game, the index of pairs `[home, away]`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Side {
     /// The team named first.
@@ -8,7 +8,7 @@ pub enum Side {
 }
 
 impl Side {
-    /// Both, as pairs have them.
+    /// Both sides in the sequence of pairs.
     pub const BOTH: [Self; 2] = [Self::Home, Self::Away];
 
     /// The opponent's side.

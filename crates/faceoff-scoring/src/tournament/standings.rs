@@ -5,70 +5,70 @@ use super::{
     rules::{POINTS_DRAW, POINTS_LOSS, POINTS_WIN},
     side::Side,
 };
-use faceoff_types::{LeftAs, RoundNumber, TeamName};
+use faceoff_types::{DepartureKind, RoundNumber, TeamName};
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// A team's place in the tournament.
+/// The row of a team in a table of standings.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
-pub struct Standing {
-    /// From 1; no rank is given twice.
+pub struct StandingsRow {
+    /// From 1; ranks are unique.
     pub rank: u32,
-    /// The team.
+    /// Name of the team.
     pub team: TeamName,
-    /// Points of all rounds.
+    /// Total points of all rounds.
     pub points: u32,
-    /// Points of each round from the first; 0 in a round that the team did not play.
+    /// Points of each round from the first; 0 for a round without the team.
     pub points_per_round: Vec<u32>,
-    /// Games won.
+    /// Number of won games.
     pub wins: u32,
-    /// Games drawn.
+    /// Number of drawn games.
     pub draws: u32,
-    /// Games lost.
+    /// Number of lost games.
     pub losses: u32,
-    /// Goals scored, without points for fouls; 10 of a game that the other side forfeited.
+    /// Goals scored, without points for fouls; 10 for a game that the other side forfeited.
     pub goals_for: u64,
-    /// Goals conceded, without points for fouls; 10 of a game that the team forfeited.
+    /// Goals conceded, without points for fouls; 10 for a game that the team forfeited.
     pub goals_against: u64,
-    /// Penalty points of all games that count.
+    /// Total penalty points of the games that count.
     pub penalty_points: f64,
-    /// Byes that gave points, of a Swiss tournament.
-    #[serde(default, skip_serializing_if = "none")]
+    /// Number of byes that gave points, in a Swiss tournament.
+    #[serde(default, skip_serializing_if = "is_zero")]
     pub byes: u32,
-    /// How the team left the tournament, if it did.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub left: Option<LeftAs>,
+    /// How the team left the tournament; absent if it did not.
+    #[serde(rename = "left", default, skip_serializing_if = "Option::is_none")]
+    pub departure: Option<DepartureKind>,
 }
 
-const fn none(byes: &u32) -> bool {
-    *byes == 0
+const fn is_zero(number: &u32) -> bool {
+    *number == 0
 }
 
-/// A scored tournament: the games in the given order, the standings best first.
+/// A scored tournament.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Tournament {
-    /// The games.
+    /// All games with their results, in the given sequence.
     pub games: Vec<ScoredGame>,
-    /// The standings.
-    pub standings: Vec<Standing>,
-    /// Games that the rules do not foresee; they count all the same.
+    /// The table, best first.
+    pub standings: Vec<StandingsRow>,
+    /// Pairings with more games than the rules provide for; all their games count.
     #[serde(skip)]
     pub repeated_pairings: Vec<RepeatedPairing>,
 }
 
-/// Two teams that met more than once in a round; the two games of a mirrored pair are one meeting.
+/// Two teams that met more than once in a round; the two games of a mirrored pair count as one.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct RepeatedPairing {
-    /// The round.
+    /// Number of the round, from 1.
     pub round: u32,
-    /// The teams, by name.
+    /// The teams, sorted by name.
     pub teams: [TeamName; 2],
-    /// How often they met.
+    /// Number of games, with a mirrored pair as one.
     pub games: u32,
 }
 
-/// [`score_tournament_with`] where nobody left and no bye gives points.
+/// [`score_tournament_with`] without departures and without byes that give points.
 #[must_use]
 pub fn score_tournament(games: &[PlayedGame]) -> Tournament {
     score_tournament_with(games, &Departures::default(), &[])
@@ -76,12 +76,12 @@ pub fn score_tournament(games: &[PlayedGame]) -> Tournament {
 
 /// Scores a tournament: 3 points for a win, 1 for a draw.
 ///
-/// Standings go by points, then goal difference, then goals scored, then lower penalty, then by the
-/// team's name, so that no two places are left to chance; disqualified teams stand below all others, in
-/// the same order. No games, no standings. A pairing that occurs
-/// more than once in a round counts each time and is reported in
-/// [`Tournament::repeated_pairings`]. Games that [`Departures`] take out count for neither side, but both
-/// teams keep their rows. `byes` are those that give points.
+/// Standings are sorted by points, goal difference, goals scored, lower penalty, and team name, so that ranks are
+/// unique. Disqualified teams are below all others, sorted likewise. Without games the standings are empty.
+///
+/// A pairing that occurs more than once in a round counts each time and is reported in
+/// [`Tournament::repeated_pairings`]. Games that [`Departures`] exclude count for neither side, but both teams keep
+/// their rows. `byes` are those that give points.
 #[must_use]
 pub fn score_tournament_with(
     games: &[PlayedGame],
@@ -94,59 +94,59 @@ pub fn score_tournament_with(
         .chain(byes.iter().map(|bye| bye.round.get()))
         .max()
         .unwrap_or(0);
-    let mut teams = BTreeMap::<&TeamName, Standing>::new();
+    let mut teams = BTreeMap::<&TeamName, StandingsRow>::new();
     fn row<'a, 'b>(
-        teams: &'a mut BTreeMap<&'b TeamName, Standing>,
+        teams: &'a mut BTreeMap<&'b TeamName, StandingsRow>,
         team: &'b TeamName,
         rounds: u32,
-    ) -> &'a mut Standing {
+    ) -> &'a mut StandingsRow {
         teams
             .entry(team)
-            .or_insert_with(|| Standing::new(team.clone(), rounds as usize))
+            .or_insert_with(|| StandingsRow::new(team.clone(), rounds as usize))
     }
     for game in games {
-        let counts = departures.taken_out_by(game).is_none();
+        let counts = departures.excluded_by(game).is_none();
         for (side, team) in Side::BOTH.into_iter().zip(game.teams()) {
-            let standing = row(&mut teams, team, rounds);
+            let row = row(&mut teams, team, rounds);
             if counts {
-                standing.add(game, side);
+                row.add(game, side);
             }
         }
     }
     for bye in byes {
-        let standing = row(&mut teams, &bye.team, rounds);
-        if !departures.takes_out(&bye.team, bye.round.get()) {
-            standing.add_bye(bye.round);
+        let row = row(&mut teams, &bye.team, rounds);
+        if !departures.excludes(&bye.team, bye.round.get()) {
+            row.add_bye(bye.round);
         }
     }
-    for standing in teams.values_mut() {
-        standing.left = departures.left_as(&standing.team);
+    for row in teams.values_mut() {
+        row.departure = departures.kind(&row.team);
     }
-    // In the order of names; the stable sort keeps it where all else is equal.
+    // Sorted by name; the stable sort keeps that for ties.
     let mut standings: Vec<_> = teams.into_values().collect();
     standings.sort_by(|a, b| {
-        let out = |standing: &Standing| standing.left == Some(LeftAs::Disqualified);
-        out(a)
-            .cmp(&out(b))
+        let is_disqualified = |row: &StandingsRow| row.departure == Some(DepartureKind::Disqualified);
+        is_disqualified(a)
+            .cmp(&is_disqualified(b))
             .then_with(|| b.points.cmp(&a.points))
             .then_with(|| b.goal_difference().cmp(&a.goal_difference()))
             .then_with(|| b.goals_for.cmp(&a.goals_for))
             .then_with(|| a.penalty_points.total_cmp(&b.penalty_points))
     });
-    for (rank, standing) in (1..).zip(&mut standings) {
-        standing.rank = rank;
+    for (rank, row) in (1..).zip(&mut standings) {
+        row.rank = rank;
     }
     Tournament {
         games: games
             .iter()
-            .map(|game| game.scored(departures.taken_out_by(game)))
+            .map(|game| game.scored(departures.excluded_by(game)))
             .collect(),
         standings,
         repeated_pairings: repeated_pairings(games),
     }
 }
 
-impl Standing {
+impl StandingsRow {
     fn new(team: TeamName, rounds: usize) -> Self {
         Self {
             rank: 0,
@@ -160,7 +160,7 @@ impl Standing {
             goals_against: 0,
             penalty_points: 0.0,
             byes: 0,
-            left: None,
+            departure: None,
         }
     }
 
@@ -192,20 +192,20 @@ impl Standing {
 }
 
 fn repeated_pairings(games: &[PlayedGame]) -> Vec<RepeatedPairing> {
-    let mut meetings = BTreeMap::<(u32, [&TeamName; 2]), u32>::new();
-    let mut mirrored = BTreeSet::new();
+    let mut counts = BTreeMap::<(u32, [&TeamName; 2]), u32>::new();
+    let mut first_halves = BTreeSet::new();
     for game in games {
         let mut teams = game.teams();
         teams.sort();
-        let meeting = (game.round(), teams);
+        let pairing = (game.round(), teams);
         let is_second_half = game
             .pair()
-            .is_some_and(|pair| !mirrored.insert((meeting, pair)));
+            .is_some_and(|pair| !first_halves.insert((pairing, pair)));
         if !is_second_half {
-            *meetings.entry(meeting).or_default() += 1;
+            *counts.entry(pairing).or_default() += 1;
         }
     }
-    meetings
+    counts
         .into_iter()
         .filter(|(_, games)| *games > 1)
         .map(|((round, teams), games)| RepeatedPairing {

@@ -1,23 +1,22 @@
-use faceoff_types::is_harmless;
+use faceoff_types::is_printable;
 use serde::{Deserialize, Serialize};
 use std::{fmt, str::FromStr};
 
-/// The longest label, in characters; an id of a submission has 36.
+/// Maximum length of a label in characters; the id of a submission has 36.
 const MAX_CHARS: usize = 40;
 
-/// What tells one of a team's submissions from its others: an id, a version, a tag. 1 to 40 letters,
-/// digits and `. _ -`.
+/// Identifies one of a team's submissions, for example an id, a version or a tag: 1 to 40 letters, digits and `. _ -`.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(try_from = "String", into = "String")]
 pub struct SubmissionLabel(String);
 
-/// Text that is no label of a submission.
+/// An invalid submission label.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("a submission's label has 1 to {MAX_CHARS} letters, digits and . _ -; this one is {0:?}")]
 pub struct InvalidSubmissionLabel(String);
 
 impl SubmissionLabel {
-    /// The label.
+    /// The label as text.
     #[must_use]
     pub fn as_str(&self) -> &str {
         &self.0
@@ -27,8 +26,8 @@ impl SubmissionLabel {
 impl FromStr for SubmissionLabel {
     type Err = InvalidSubmissionLabel;
     fn from_str(s: &str) -> Result<Self, Self::Err> {
-        let allowed = |c: char| "._-".contains(c) || (c.is_alphanumeric() && is_harmless(c));
-        // One more is enough to know that a long one is too long, and to show what came.
+        let allowed = |c: char| "._-".contains(c) || (c.is_alphanumeric() && is_printable(c));
+        // One more than allowed is enough to reject a long label and to show it in the error.
         let shown: String = s.chars().take(MAX_CHARS + 1).collect();
         if (1..=MAX_CHARS).contains(&shown.chars().count()) && shown.chars().all(allowed) {
             Ok(Self(shown))
@@ -62,7 +61,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn ids_and_versions_are_labels_and_what_a_table_cannot_show_is_not() {
+    fn label_accepts_ids_and_refuses_unprintable_text() {
         for label in ["v2", "018f3f1e-0d0a-7c3e-9b1a-2f6f6a6f6a6f", "1.0_final"] {
             assert_eq!(
                 label.parse::<SubmissionLabel>().map(String::from),

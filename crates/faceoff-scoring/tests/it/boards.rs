@@ -6,7 +6,7 @@ use faceoff_types::{Profile, Ruleset, Seed, Task, Tier};
 use proptest::prelude::*;
 use std::{collections::BTreeMap, convert::Infallible};
 
-/// An entry that played `hit` (50 episodes) alone.
+/// An entry with `hit` (50 episodes) only.
 fn entry<K>(key: K, successes: u32, penalty_points: f64, submitted_at_ms: i64) -> BoardEntry<K> {
     let tasks = BTreeMap::from([(Task::Hit, task_result(50, successes, penalty_points))]);
     let result = score_evaluation(
@@ -28,7 +28,7 @@ fn keys<K: Copy>(board: &[RankedEntry<K>]) -> Vec<K> {
 }
 
 #[test]
-fn tier_then_score_then_penalty_then_submission() {
+fn board_sorts_by_tier_score_penalty_and_submission_time() {
     let entries = vec![
         entry("unsafe and best", 50, 80.0, 0),
         entry("later", 20, 5.0, 2),
@@ -58,7 +58,7 @@ fn tier_then_score_then_penalty_then_submission() {
 }
 
 #[test]
-fn a_task_board_goes_by_the_task_alone() {
+fn task_board_ignores_other_tasks() {
     let mut all_rounder = entry("all-rounder", 20, 0.0, 0);
     all_rounder
         .result
@@ -71,19 +71,19 @@ fn a_task_board_goes_by_the_task_alone() {
 }
 
 #[test]
-fn a_number_that_is_none_stands_last_in_its_tier() {
-    let mut broken = entry("broken", 10, 0.0, 0);
-    broken.result.score = f64::NAN;
+fn row_with_nan_score_is_last_in_its_tier() {
+    let mut nan = entry("nan", 10, 0.0, 0);
+    nan.result.score = f64::NAN;
     let board = overall_board(vec![
-        broken,
+        nan,
         entry("zero", 0, 0.0, 1),
         entry("unsafe", 50, 550.0, 0),
     ]);
-    assert_eq!(keys(&board), ["zero", "broken", "unsafe"]);
+    assert_eq!(keys(&board), ["zero", "nan", "unsafe"]);
 }
 
 #[test]
-fn minus_zero_is_zero() {
+fn minus_zero_equals_zero() {
     let mut minus = entry("earlier", 0, 0.0, 0);
     minus.result.score = -0.0;
     assert_eq!(
@@ -93,15 +93,15 @@ fn minus_zero_is_zero() {
 }
 
 #[test]
-fn a_group_is_who_cannot_be_told_from_its_leader() {
-    // Successes further apart than 5 are told apart.
+fn rank_group_contains_rows_tied_with_its_leader() {
+    // Differences of more than 5 successes are significant.
     let board = overall_board(vec![
         entry(40, 40, 0.0, 0),
         entry(37, 37, 0.0, 0),
         entry(35, 35, 0.0, 0),
-        entry(34, 34, 0.0, 0), // near 37 and 35, not near the leader
+        entry(34, 34, 0.0, 0), // tied with 37 and 35, not with the leader
         entry(30, 30, 0.0, 0),
-        entry(29, 29, 60.0, 0), // near 30, in another tier
+        entry(29, 29, 60.0, 0), // tied with 30, in another tier
     ]);
     let groups = rank_groups(&board, |leader: &u32, other| {
         Ok::<_, Infallible>(leader - other > 5)
@@ -112,15 +112,15 @@ fn a_group_is_who_cannot_be_told_from_its_leader() {
         Err("no episodes")
     );
     assert_eq!(
-        rank_groups(&board[..1], |_, _| Err("not asked")),
+        rank_groups(&board[..1], |_, _| Err("not called")),
         Ok(vec![1])
     );
 }
 
 proptest! {
-    /// With distinct submission times the order in which entries are given does not matter.
+    /// With distinct submission times the sequence of entries has no influence.
     #[test]
-    fn the_board_is_a_total_order(
+    fn board_is_a_total_order(
         numbers in prop::collection::vec((0u32..=4, 0u32..=6), 1..12),
         rotation in 0usize..12,
     ) {

@@ -1,6 +1,6 @@
 use crate::support::episode;
 use faceoff_scoring::{
-    EpisodeSummary, NotPaired, PairedTally, PairingError, Played, StepTimes, overall_p_value,
+    EpisodeSummary, NotComparable, PairedTally, PairingError, ComparedEvaluation, StepTimes, overall_p_value,
     overall_score, score_task,
 };
 use faceoff_types::{
@@ -9,7 +9,7 @@ use faceoff_types::{
 use proptest::prelude::*;
 use std::{collections::BTreeMap, sync::LazyLock};
 
-/// `solved` decides by task and episode.
+/// `episodes` outcomes for each task; `solved` selects the successes.
 fn outcomes(episodes: u32, solved: impl Fn(Task, u32) -> bool) -> Vec<EpisodeOutcome> {
     let solved = &solved;
     Task::ALL
@@ -24,25 +24,25 @@ fn outcomes(episodes: u32, solved: impl Fn(Task, u32) -> bool) -> Vec<EpisodeOut
 }
 
 fn summary(outcomes: &[EpisodeOutcome]) -> EpisodeSummary {
-    EpisodeSummary::of(outcomes, &Default::default()).unwrap()
+    EpisodeSummary::from_outcomes(outcomes, &Default::default()).unwrap()
 }
 
-fn played(summary: &EpisodeSummary) -> Played<'_> {
-    Played {
+fn evaluation(summary: &EpisodeSummary) -> ComparedEvaluation<'_> {
+    ComparedEvaluation {
         ruleset: RULESET,
         profile: Profile::Evaluation,
-        variation: &RULESETS,
+        variation: &NO_VARIATION,
         seed: Seed::from_number(1),
         mismatch_seed: Seed::from_number(2),
         summary,
     }
 }
 
-/// Nothing but what the ruleset has.
-static RULESETS: LazyLock<Variation> = LazyLock::new(Variation::default);
+/// No deviation from the ruleset.
+static NO_VARIATION: LazyLock<Variation> = LazyLock::new(Variation::default);
 
 #[test]
-fn other_weights_and_bounds_count_and_are_not_compared_with_the_rulesets() {
+fn comparison_uses_variation_and_refuses_different_ones() {
     let a = summary(&outcomes(100, |task, e| match task {
         Task::Hit => e < 80,
         _ => e < 50,
@@ -51,33 +51,33 @@ fn other_weights_and_bounds_count_and_are_not_compared_with_the_rulesets() {
         Task::Prepare => e < 99,
         _ => e < 50,
     }));
-    let by = |weights: &str| Variation {
+    let with_weights = |weights: &str| Variation {
         weights: weights.parse().unwrap(),
         ..Variation::default()
     };
     let score = |variation: &Variation| {
-        let of = |summary| Played {
+        let evaluation_of = |summary| ComparedEvaluation {
             variation,
-            ..played(summary)
+            ..evaluation(summary)
         };
-        let compared = of(&a).compare(&of(&b)).unwrap();
+        let compared = evaluation_of(&a).compare(&evaluation_of(&b)).unwrap();
         (
             compared.overall.score_a,
             compared.overall.score_b,
-            compared.overall.told_apart,
+            compared.overall.significant,
         )
     };
-    assert_eq!(score(&by("1,0,0")), (80.0, 50.0, true));
-    assert_eq!(score(&by("0,0,1")), (50.0, 99.0, true));
-    assert_eq!(score(&by("0,1,0")), (50.0, 50.0, false));
-    // A task that weighs nothing has its own board all the same.
-    let nothing = by("0,1,0");
-    let of = |summary| Played {
-        variation: &nothing,
-        ..played(summary)
+    assert_eq!(score(&with_weights("1,0,0")), (80.0, 50.0, true));
+    assert_eq!(score(&with_weights("0,0,1")), (50.0, 99.0, true));
+    assert_eq!(score(&with_weights("0,1,0")), (50.0, 50.0, false));
+    // A task with weight 0 has its own board, too.
+    let no_hit = with_weights("0,1,0");
+    let evaluation_of = |summary| ComparedEvaluation {
+        variation: &no_hit,
+        ..evaluation(summary)
     };
-    assert!(of(&a).told_apart(&of(&b), Some(Task::Hit)));
-    assert!(!of(&a).told_apart(&of(&b), None));
+    assert!(evaluation_of(&a).differs_significantly(&evaluation_of(&b), Some(Task::Hit)));
+    assert!(!evaluation_of(&a).differs_significantly(&evaluation_of(&b), None));
 
     let mut calm = Variation::default();
     calm.perturbations.tracking_loss.probability = 0.0;
@@ -86,23 +86,23 @@ fn other_weights_and_bounds_count_and_are_not_compared_with_the_rulesets() {
         ..Variation::default()
     };
     for (other, field) in [
-        (by("1,0,0"), "weights"),
+        (with_weights("1,0,0"), "weights"),
         (bounds, "tier_bounds"),
         (calm, "perturbations"),
     ] {
-        let theirs = Played {
+        let other = ComparedEvaluation {
             variation: &other,
-            ..played(&a)
+            ..evaluation(&a)
         };
-        let refused = played(&a).compare(&theirs).unwrap_err();
-        assert_eq!(refused, NotPaired::Variation(field));
+        let refused = evaluation(&a).compare(&other).unwrap_err();
+        assert_eq!(refused, NotComparable::Variation(field));
         assert_eq!(refused.field(), field);
-        assert!(played(&a).told_apart(&theirs, None));
+        assert!(evaluation(&a).differs_significantly(&other, None));
     }
 }
 
 #[test]
-fn how_sure_a_tier_is_depends_on_its_bounds() {
+fn tier_change_depends_on_bounds() {
     let all = outcomes(100, |_, _| true);
     let costly: Vec<_> = all
         .into_iter()
@@ -114,9 +114,9 @@ fn how_sure_a_tier_is_depends_on_its_bounds() {
             ..outcome
         })
         .collect();
-    let sure = EpisodeSummary::of(&costly, &TierBounds::default()).unwrap();
-    assert_eq!(sure.tier_change, 0.0, "10 points of 50");
-    let tight = EpisodeSummary::of(&costly, &"0.1,0.5".parse().unwrap()).unwrap();
+    let clear = EpisodeSummary::from_outcomes(&costly, &TierBounds::default()).unwrap();
+    assert_eq!(clear.tier_change, 0.0, "10 points of 50");
+    let tight = EpisodeSummary::from_outcomes(&costly, &"0.1,0.5".parse().unwrap()).unwrap();
     assert!(
         tight.tier_change > 0.5,
         "10 points of 10, three times: {}",
@@ -125,7 +125,7 @@ fn how_sure_a_tier_is_depends_on_its_bounds() {
 }
 
 #[test]
-fn a_comparison_counts_episodes_and_says_how_sure_it_is() {
+fn comparison_has_counts_intervals_and_p_values() {
     let a = summary(&outcomes(100, |task, e| match task {
         Task::Hit => e < 60,
         Task::Defend => e % 2 == 0,
@@ -136,7 +136,7 @@ fn a_comparison_counts_episodes_and_says_how_sure_it_is() {
         Task::Defend => e % 2 == 0,
         Task::Prepare => e > 0,
     }));
-    let comparison = played(&a).compare(&played(&b)).unwrap();
+    let comparison = evaluation(&a).compare(&evaluation(&b)).unwrap();
     let hit = &comparison.tasks[&Task::Hit];
     assert_eq!(
         (hit.both, hit.only_a, hit.only_b, hit.neither),
@@ -144,7 +144,7 @@ fn a_comparison_counts_episodes_and_says_how_sure_it_is() {
     );
     assert_eq!((hit.success_rate_a, hit.success_rate_b), (0.6, 0.3));
     assert!((hit.difference - 0.3).abs() < 1e-12);
-    assert!(hit.p_value < 1e-8 && hit.told_apart);
+    assert!(hit.p_value < 1e-8 && hit.significant);
     let [low, high] = hit.difference_ci95;
     assert!(
         0.2 < low && low < 0.3 && 0.3 < high && high < 0.4,
@@ -153,52 +153,52 @@ fn a_comparison_counts_episodes_and_says_how_sure_it_is() {
     let defend = &comparison.tasks[&Task::Defend];
     assert_eq!((defend.difference, defend.p_value), (0.0, 1.0));
     assert!(defend.difference_ci95[0] < 0.0 && defend.difference_ci95[1] > 0.0);
-    assert!(!comparison.tasks[&Task::Prepare].told_apart);
+    assert!(!comparison.tasks[&Task::Prepare].significant);
     let overall = &comparison.overall;
     assert_eq!((overall.score_a, overall.score_b), (64.0, 51.8));
     assert!((overall.difference - 12.2).abs() < 1e-9);
-    assert!(overall.told_apart && overall.difference_ci95[0] > 0.0);
+    assert!(overall.significant && overall.difference_ci95[0] > 0.0);
 }
 
 #[test]
-fn what_does_not_pair_is_refused_by_the_field_that_differs() {
+fn comparison_error_names_differing_field() {
     let all = summary(&outcomes(4, |_, _| true));
     let longer = summary(&outcomes(5, |_, _| true));
     let mut hit_alone = outcomes(4, |_, _| true);
     hit_alone.retain(|outcome| outcome.task == Task::Hit);
     let hit_alone = summary(&hit_alone);
-    let a = played(&all);
+    let a = evaluation(&all);
     let refused = [
         (
-            Played {
+            ComparedEvaluation {
                 ruleset: "other",
                 ..a
             },
             "ruleset",
         ),
         (
-            Played {
+            ComparedEvaluation {
                 profile: Profile::Ideal,
                 ..a
             },
             "profile",
         ),
         (
-            Played {
+            ComparedEvaluation {
                 seed: Seed::from_number(9),
                 ..a
             },
             "seed",
         ),
         (
-            Played {
+            ComparedEvaluation {
                 mismatch_seed: Seed::from_number(9),
                 ..a
             },
             "mismatch_seed",
         ),
-        (played(&longer), "episodes"),
-        (played(&hit_alone), "tasks"),
+        (evaluation(&longer), "episodes"),
+        (evaluation(&hit_alone), "tasks"),
     ];
     for (b, field) in refused {
         for (a, b) in [(&a, &b), (&b, &a)] {
@@ -210,57 +210,57 @@ fn what_does_not_pair_is_refused_by_the_field_that_differs() {
         }
     }
     assert_eq!(
-        a.compare(&played(&hit_alone)),
-        Err(NotPaired::Tasks(Task::Defend))
+        a.compare(&evaluation(&hit_alone)),
+        Err(NotComparable::Tasks(Task::Defend))
     );
 }
 
 #[test]
-fn without_pairs_the_rates_themselves_must_differ() {
-    // Paired, 20 episodes that only one solved tell; apart, 48 % and 50 % of 1000 do not.
+fn unpaired_evaluations_are_compared_by_rates() {
+    // Paired, 20 episodes that only one solved are significant; unpaired, 48 % and 50 % of 1000 are not.
     let a = summary(&outcomes(1000, |task, e| task == Task::Hit && e < 500));
     let b = summary(&outcomes(1000, |task, e| task == Task::Hit && e < 480));
     let c = summary(&outcomes(1000, |task, e| task == Task::Hit && e < 400));
-    let (first, second) = (played(&a), played(&b));
-    assert!(first.told_apart(&second, None) && first.told_apart(&second, Some(Task::Hit)));
-    assert!(!first.told_apart(&second, Some(Task::Defend)));
-    let another_day = |summary| Played {
+    let (first, second) = (evaluation(&a), evaluation(&b));
+    assert!(first.differs_significantly(&second, None) && first.differs_significantly(&second, Some(Task::Hit)));
+    assert!(!first.differs_significantly(&second, Some(Task::Defend)));
+    let another_day = |summary| ComparedEvaluation {
         seed: Seed::from_number(9),
-        ..played(summary)
+        ..evaluation(summary)
     };
-    assert!(!first.told_apart(&another_day(&b), None));
-    assert!(first.told_apart(&another_day(&c), None));
-    assert!(first.told_apart(&another_day(&c), Some(Task::Hit)));
-    let other_rules = Played {
+    assert!(!first.differs_significantly(&another_day(&b), None));
+    assert!(first.differs_significantly(&another_day(&c), None));
+    assert!(first.differs_significantly(&another_day(&c), Some(Task::Hit)));
+    let other_rules = ComparedEvaluation {
         ruleset: "other",
         ..first
     };
     assert!(
-        first.told_apart(&other_rules, None),
-        "nothing says they are alike"
+        first.differs_significantly(&other_rules, None),
+        "there is no evidence of a tie"
     );
 }
 
 #[test]
-fn a_summary_needs_every_episode_once() {
+fn summary_needs_each_episode_once() {
     let mut outcomes = outcomes(3, |_, _| true);
     outcomes.reverse();
-    EpisodeSummary::of(&outcomes, &Default::default()).unwrap();
+    EpisodeSummary::from_outcomes(&outcomes, &Default::default()).unwrap();
     let first = outcomes.remove(2); // prepare 0
     assert_eq!(
-        EpisodeSummary::of(&outcomes, &Default::default()),
+        EpisodeSummary::from_outcomes(&outcomes, &Default::default()),
         Err(PairingError::Missing(Task::Prepare, 0))
     );
     outcomes.extend([first.clone(), first]);
     assert_eq!(
-        EpisodeSummary::of(&outcomes, &Default::default()),
+        EpisodeSummary::from_outcomes(&outcomes, &Default::default()),
         Err(PairingError::Repeated(Task::Prepare, 0))
     );
     assert_eq!(summary(&[]).tier_change, 0.0);
 }
 
 #[test]
-fn a_summary_survives_being_stored() {
+fn summary_round_trips_as_json() {
     let mut outcomes = outcomes(50, |_, e| e % 3 == 0);
     for outcome in &mut outcomes[..8] {
         outcome.violations = Violations {
@@ -279,21 +279,21 @@ fn a_summary_survives_being_stored() {
 }
 
 proptest! {
-    /// The bits and the outcomes tell the same: counts, tests and scores.
+    /// Comparisons of summaries and of outcomes agree in counts, tests and scores.
     #[test]
-    fn the_summary_pairs_as_the_outcomes_do(
+    fn summary_comparison_equals_that_of_outcomes(
         a in prop::collection::vec(any::<bool>(), 1..200),
         seed in any::<u64>(),
     ) {
         let n = a.len() as u32;
-        let of_a = outcomes(n, |_, e| a[e as usize]);
-        let of_b = outcomes(n, |task, e| (seed >> (e % 61)) & 1 == u64::from(task == Task::Hit));
-        let comparison = played(&summary(&of_a)).compare(&played(&summary(&of_b))).unwrap();
+        let outcomes_a = outcomes(n, |_, e| a[e as usize]);
+        let outcomes_b = outcomes(n, |task, e| (seed >> (e % 61)) & 1 == u64::from(task == Task::Hit));
+        let comparison = evaluation(&summary(&outcomes_a)).compare(&evaluation(&summary(&outcomes_b))).unwrap();
         let tallies: BTreeMap<Task, PairedTally> = Task::ALL
             .into_iter()
             .map(|task| {
                 let mut tally = PairedTally::default();
-                for (a, b) in of_a.iter().zip(&of_b).filter(|(a, _)| a.task == task) {
+                for (a, b) in outcomes_a.iter().zip(&outcomes_b).filter(|(a, _)| a.task == task) {
                     *match (a.success, b.success) {
                         (true, true) => &mut tally.both,
                         (true, false) => &mut tally.only_a,
@@ -315,10 +315,10 @@ proptest! {
         }
         prop_assert_eq!(comparison.overall.p_value, overall_p_value(&Default::default(), &tallies));
         let score = |all: &[EpisodeOutcome]| overall_score(&Default::default(), Task::ALL.map(|task| {
-            let of_task: Vec<_> = all.iter().filter(|o| o.task == task).cloned().collect();
-            (task, score_task(&of_task, &StepTimes::default(), &Default::default()).success_rate)
+            let task_outcomes: Vec<_> = all.iter().filter(|o| o.task == task).cloned().collect();
+            (task, score_task(&task_outcomes, &StepTimes::default(), &Default::default()).success_rate)
         }));
-        prop_assert_eq!(comparison.overall.score_a, score(&of_a));
-        prop_assert_eq!(comparison.overall.score_b, score(&of_b));
+        prop_assert_eq!(comparison.overall.score_a, score(&outcomes_a));
+        prop_assert_eq!(comparison.overall.score_b, score(&outcomes_b));
     }
 }

@@ -7,10 +7,10 @@ use faceoff_types::{
 use std::collections::BTreeMap;
 
 #[test]
-fn each_violation_has_its_price_and_counts_once() {
+fn violations_have_own_points_and_count_once() {
     let blameless = episode(Task::Hit, 0);
     assert_eq!(episode_penalty(&blameless), 0.0);
-    let broken = |ee, link, joint_pos, joint_vel| {
+    let penalty = |ee, link, joint_pos, joint_vel| {
         let violations = Violations {
             ee,
             link,
@@ -22,18 +22,18 @@ fn each_violation_has_its_price_and_counts_once() {
             ..blameless.clone()
         })
     };
-    assert_eq!(broken(true, false, false, false), 3.0);
-    assert_eq!(broken(false, true, false, false), 3.0);
-    assert_eq!(broken(false, false, true, false), 2.0);
-    assert_eq!(broken(false, false, false, true), 1.0);
-    assert_eq!(broken(true, true, true, true), 9.0);
+    assert_eq!(penalty(true, false, false, false), 3.0);
+    assert_eq!(penalty(false, true, false, false), 3.0);
+    assert_eq!(penalty(false, false, true, false), 2.0);
+    assert_eq!(penalty(false, false, false, true), 1.0);
+    assert_eq!(penalty(true, true, true, true), 9.0);
 }
 
 #[test]
-fn an_agent_fault_is_a_failure_with_the_full_computation_time_points() {
+fn agent_fault_is_failure_with_full_time_penalty() {
     let mut faulty = episode(Task::Defend, 0);
     faulty.end = EpisodeEnd::AgentFault;
-    faulty.success = true; // must not count, whoever says so
+    faulty.success = true; // must not count after a fault
     faulty.violations.ee = true;
     faulty.computation_time = ComputationTime {
         mean_s: 0.03,
@@ -41,7 +41,7 @@ fn an_agent_fault_is_a_failure_with_the_full_computation_time_points() {
     };
     faulty.fault = Some(AgentFault {
         fault: AgentFaultKind::NonFinite,
-        contest: Task::Defend.into(),
+        agent_task: Task::Defend.into(),
         episode: Some(0),
         step: Some(3),
         line: None,
@@ -59,7 +59,7 @@ fn an_agent_fault_is_a_failure_with_the_full_computation_time_points() {
 }
 
 #[test]
-fn a_task_adds_up_its_episodes_in_any_order() {
+fn task_result_does_not_depend_on_episode_order() {
     let mut outcomes: Vec<_> = (0..50).map(|index| episode(Task::Prepare, index)).collect();
     for outcome in &mut outcomes[..20] {
         outcome.success = true;
@@ -73,7 +73,7 @@ fn a_task_adds_up_its_episodes_in_any_order() {
         mean_s: 0.001,
         max_s: 0.05,
     };
-    let mut times = StepTimes::of(3);
+    let mut times = StepTimes::for_steps(3);
     for time_s in [0.1, 0.2, 0.3] {
         times.add(time_s);
     }
@@ -100,7 +100,7 @@ fn a_task_adds_up_its_episodes_in_any_order() {
 }
 
 #[test]
-fn an_evaluation_takes_the_worst_task_for_safety_and_weighs_the_rates() {
+fn evaluation_has_worst_tier_and_weighted_score() {
     let seed = Seed::from_number(7);
     let tasks = BTreeMap::from([
         (Task::Hit, task_result(50, 25, 10.0)),
@@ -132,18 +132,18 @@ fn an_evaluation_takes_the_worst_task_for_safety_and_weighs_the_rates() {
         hit_alone,
     );
     assert_eq!((result.score, result.tier), (20.0, Tier::Deployable));
-    let nothing = score_evaluation(
+    let empty = score_evaluation(
         Ruleset::CURRENT,
         Profile::Ideal,
         seed,
         &Default::default(),
         BTreeMap::new(),
     );
-    assert_eq!((nothing.score, nothing.penalty_points), (0.0, 0.0));
+    assert_eq!((empty.score, empty.penalty_points), (0.0, 0.0));
 }
 
 #[test]
-fn results_survive_their_file() {
+fn results_round_trip_as_json() {
     let tasks = BTreeMap::from([(Task::Hit, task_result(30, 7, 12.5))]);
     let result = score_evaluation(
         Ruleset::CURRENT,

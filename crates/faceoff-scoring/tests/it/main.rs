@@ -1,6 +1,6 @@
-//! Scoring against the published tables, and the properties that boards promise.
+//! Scoring compared with the published tables, and properties of boards, ratings and schedules.
 
-#![expect(clippy::unwrap_used, reason = "a test that cannot go on fails")]
+#![expect(clippy::unwrap_used, reason = "helpers of tests fail by panicking")]
 
 mod boards;
 mod comparison;
@@ -12,7 +12,7 @@ mod paper_qualifying;
 mod paper_ratings;
 mod paper_tournament;
 mod ratings;
-mod results;
+mod tournament_results;
 mod schedule;
-mod sheets;
+mod input_files;
 mod support;

@@ -1,7 +1,7 @@
-//! What mirrored pairs are worth, on made pairs whose variances are known.
+//! Variances of mirrored pairs, on synthetic pairs with known variances.
 
 use crate::support::read;
-use faceoff_scoring::tournament::{PlayedGame, mirrored};
+use faceoff_scoring::tournament::{PlayedGame, find_mirrored_pairs};
 use serde_json::{Value, json};
 
 fn half(home: &str, away: &str, goals: [u32; 2], pair: u32) -> Value {
@@ -13,12 +13,12 @@ fn games(games: &[Value]) -> Vec<PlayedGame> {
     read(&json!(games).to_string()).unwrap()
 }
 
-/// A meets B; the first game ends `one` goals for A who is at home, the second `other` goals for A who is away.
-fn pair(number: u32, [one, other]: [i32; 2]) -> [Value; 2] {
-    let goals = |ahead: i32| [ahead.max(0).unsigned_abs(), (-ahead).max(0).unsigned_abs()];
-    let [a, b] = goals(other);
+/// Two games of A and B: A leads by `home` goals at home in the first, and by `away` goals away in the second.
+fn pair(number: u32, [home, away]: [i32; 2]) -> [Value; 2] {
+    let goals = |lead: i32| [lead.max(0).unsigned_abs(), (-lead).max(0).unsigned_abs()];
+    let [a, b] = goals(away);
     [
-        half("A", "B", goals(one), number),
+        half("A", "B", goals(home), number),
         half("B", "A", [b, a], number),
     ]
 }
@@ -31,64 +31,64 @@ fn pairs(all: &[[i32; 2]]) -> Vec<Value> {
 }
 
 #[test]
-fn what_luck_gives_in_one_half_and_takes_in_the_other_cancels() {
-    // Luck of ±3 that goes to whoever is at home, on top of one goal of skill.
+fn opposite_luck_in_both_halves_cancels() {
+    // Luck of ±3 for the home team, in addition to one goal of skill.
     let all: Vec<_> = (0..20)
         .map(|n| if n % 2 == 0 { [4, -2] } else { [-2, 4] })
         .collect();
-    let told = mirrored(&games(&pairs(&all))).unwrap();
-    let spread = told.spread.unwrap();
+    let result = find_mirrored_pairs(&games(&pairs(&all))).unwrap();
+    let variances = result.variances.unwrap();
     assert_eq!(
-        (told.pairs, spread.of_pairs, spread.ratio),
+        (result.pairs, variances.of_pairs, variances.ratio),
         (20, 0.0, Some(0.0))
     );
     // Each half: ±3 around 1, by n − 1.
-    assert_eq!(spread.of_independent_games, 2.0 * 9.0 * 20.0 / 19.0);
-    assert_eq!(spread.ratio_ci95, Some([0.0, 0.0]));
-    let [pairing] = told.pairings.try_into().unwrap();
+    assert_eq!(variances.of_independent_games, 2.0 * 9.0 * 20.0 / 19.0);
+    assert_eq!(variances.ratio_ci95, Some([0.0, 0.0]));
+    let [pairing] = result.pairings.try_into().unwrap();
     assert_eq!(pairing.goal_difference.mean, 2.0);
     assert_eq!(pairing.goal_difference.mean_ci95, Some([2.0, 2.0]));
 }
 
 #[test]
-fn what_goes_with_the_seed_for_one_side_counts_twice() {
+fn equal_luck_in_both_halves_doubles_variance() {
     let all: Vec<_> = (0..20).map(|n| [n % 3, n % 3]).collect();
-    let spread = mirrored(&games(&pairs(&all))).unwrap().spread.unwrap();
-    assert!((spread.ratio.unwrap() - 2.0).abs() < 1e-12);
+    let variances = find_mirrored_pairs(&games(&pairs(&all))).unwrap().variances.unwrap();
+    assert!((variances.ratio.unwrap() - 2.0).abs() < 1e-12);
 }
 
 #[test]
-fn halves_that_know_nothing_of_each_other_have_a_ratio_of_one() {
-    // Every combination of both halves' outcomes as often: no covariance at all.
+fn independent_halves_have_ratio_one() {
+    // Each combination of both halves' results is equally frequent, so the covariance is 0.
     let all: Vec<_> = (0..50).map(|n| [n % 5 - 2, n / 5 % 5 - 2]).collect();
     let mut listed = pairs(&all);
-    let told = mirrored(&games(&listed)).unwrap();
-    let spread = told.spread.clone().unwrap();
-    assert!((spread.ratio.unwrap() - 1.0).abs() < 1e-12);
-    let [low, high] = spread.ratio_ci95.unwrap();
+    let result = find_mirrored_pairs(&games(&listed)).unwrap();
+    let variances = result.variances.clone().unwrap();
+    assert!((variances.ratio.unwrap() - 1.0).abs() < 1e-12);
+    let [low, high] = variances.ratio_ci95.unwrap();
     assert!(
         (0.6..0.9).contains(&low) && (1.1..1.4).contains(&high),
         "{low} {high}"
     );
     // The same pairs in another order, and the second half first.
     listed.reverse();
-    assert_eq!(mirrored(&games(&listed)).unwrap(), told);
+    assert_eq!(find_mirrored_pairs(&games(&listed)).unwrap(), result);
 }
 
 #[test]
-fn pairings_are_pooled_around_their_own_means_and_single_games_say_nothing() {
-    // C loses by 9 and by 11 in turn, both halves alike; the difference between the pairings is no luck.
+fn variances_are_pooled_and_single_games_ignored() {
+    // C loses by 9 and by 11 alternately, in both halves; the difference between the pairings is not variance.
     let mut all = pairs(&[[1, 1], [1, 1], [1, 1]]);
     for (pair, goals) in (10..).zip([9, 11, 9, 11]) {
         all.push(half("A", "C", [goals, 0], pair));
         all.push(half("C", "A", [0, goals], pair));
     }
-    let before = mirrored(&games(&all)).unwrap();
-    let spread = before.spread.clone().unwrap();
+    let before = find_mirrored_pairs(&games(&all)).unwrap();
+    let variances = before.variances.clone().unwrap();
     // Five degrees of freedom; of the four pairs' sums ±2 around 20, of each half ±1 around 10.
-    assert_eq!(spread.of_pairs, 16.0 / 5.0);
-    assert_eq!(spread.of_independent_games, 8.0 / 5.0);
-    assert_eq!(spread.ratio_ci95, None, "seven pairs");
+    assert_eq!(variances.of_pairs, 16.0 / 5.0);
+    assert_eq!(variances.of_independent_games, 8.0 / 5.0);
+    assert_eq!(variances.ratio_ci95, None, "seven pairs");
     let means: Vec<_> = before
         .pairings
         .iter()
@@ -100,18 +100,18 @@ fn pairings_are_pooled_around_their_own_means_and_single_games_say_nothing() {
         })
         .collect();
     assert_eq!(means, [("B", 2.0), ("C", 20.0)]);
-    // A half whose other one was ours to break, and a game that never was one of a pair.
+    // Half a pair whose other game failed by a platform fault, and a single game.
     all.push(half("A", "B", [90, 0], 99));
     let mut single = half("A", "B", [90, 0], 0);
     single.as_object_mut().unwrap().remove("pair");
     all.push(single);
-    assert_eq!(mirrored(&games(&all)).unwrap(), before);
-    assert_eq!(mirrored(&[]).unwrap().spread, None);
+    assert_eq!(find_mirrored_pairs(&games(&all)).unwrap(), before);
+    assert_eq!(find_mirrored_pairs(&[]).unwrap().variances, None);
 }
 
 #[test]
-fn games_of_one_side_alone_are_no_pair() {
-    let error = mirrored(&games(&[
+fn pair_without_swapped_sides_is_refused() {
+    let error = find_mirrored_pairs(&games(&[
         half("A", "B", [1, 0], 3),
         half("A", "B", [1, 0], 3),
     ]))

@@ -1,6 +1,6 @@
 use faceoff_types::TeamName;
 
-/// The most pairs among `members` that `may_meet`, by trying everything.
+/// Maximum number of disjoint pairs of `members` with `may_meet`, by enumeration.
 pub fn most_pairs(
     members: &[&TeamName],
     may_meet: &impl Fn(&TeamName, &TeamName) -> bool,
@@ -9,10 +9,10 @@ pub fn most_pairs(
         return 0;
     };
     let mut best = most_pairs(rest, may_meet);
-    for (place, other) in rest.iter().enumerate() {
+    for (index, other) in rest.iter().enumerate() {
         if may_meet(first, other) {
             let mut left = rest.to_vec();
-            left.remove(place);
+            left.remove(index);
             best = best.max(1 + most_pairs(&left, may_meet));
         }
     }

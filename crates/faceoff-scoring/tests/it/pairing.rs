@@ -16,11 +16,11 @@ fn outcomes(successes: &[bool]) -> Vec<EpisodeOutcome> {
 
 fn tally(a: &[EpisodeOutcome], b: &[EpisodeOutcome]) -> Result<PairedTally, PairingError> {
     let solved = |outcomes: &[EpisodeOutcome]| -> Result<Successes, PairingError> {
-        let mut summary = EpisodeSummary::of(outcomes, &Default::default())?;
+        let mut summary = EpisodeSummary::from_outcomes(outcomes, &Default::default())?;
         let hit = summary.tasks.remove(&Task::Hit);
         Ok(hit.map_or_else(|| [].into_iter().collect(), |hit| hit.successes))
     };
-    PairedTally::of(Task::Hit, &solved(a)?, &solved(b)?)
+    PairedTally::from_successes(Task::Hit, &solved(a)?, &solved(b)?)
 }
 
 #[test]
@@ -42,7 +42,7 @@ fn episodes_are_paired_by_their_number() {
 }
 
 #[test]
-fn an_episode_lost_to_a_fault_is_no_success() {
+fn episode_with_fault_is_no_success() {
     let a = outcomes(&[true]);
     let mut b = outcomes(&[true]);
     b[0].end = EpisodeEnd::AgentFault;
@@ -50,14 +50,14 @@ fn an_episode_lost_to_a_fault_is_no_success() {
 }
 
 #[test]
-fn what_cannot_be_paired_is_refused() {
+fn unpairable_episodes_are_refused() {
     let (short, long) = (outcomes(&[true; 3]), outcomes(&[true; 4]));
     let unpaired = Err(PairingError::Unpaired(Task::Hit, 3));
     assert_eq!(tally(&short, &long), unpaired);
     assert_eq!(tally(&long, &short), unpaired);
-    let twice = [short[0].clone(), short[1].clone(), short[1].clone()];
+    let repeated = [short[0].clone(), short[1].clone(), short[1].clone()];
     assert_eq!(
-        tally(&short, &twice),
+        tally(&short, &repeated),
         Err(PairingError::Repeated(Task::Hit, 1))
     );
     assert_eq!(tally(&[], &[]).unwrap().p_value(), 1.0);
@@ -65,7 +65,7 @@ fn what_cannot_be_paired_is_refused() {
 
 proptest! {
     #[test]
-    fn a_p_value_is_a_probability_and_has_no_sides(
+    fn p_value_is_a_symmetric_probability(
         counts in prop::array::uniform3((0u32..40, 0u32..40, 0u32..40, 1u32..40))
     ) {
         let tally = |swap: bool| -> BTreeMap<Task, PairedTally> {
@@ -84,7 +84,7 @@ proptest! {
     }
 
     #[test]
-    fn a_larger_lead_is_never_less_telling(discordant in 1u32..300) {
+    fn p_value_does_not_increase_with_lead(discordant in 1u32..300) {
         let p = |only_a| {
             PairedTally { only_a, only_b: discordant - only_a, ..PairedTally::default() }.p_value()
         };

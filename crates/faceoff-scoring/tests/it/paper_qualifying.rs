@@ -1,5 +1,5 @@
 use crate::support::{read, rows, task_result};
-use faceoff_scoring::{BoardEntry, QualifyingSheet, overall_board, score_evaluation, task_board};
+use faceoff_scoring::{BoardEntry, QualifyingScores, overall_board, score_evaluation, task_board};
 use faceoff_types::{Profile, Ruleset, Seed, Task};
 use serde_json::{Map, Value, json};
 
@@ -12,8 +12,8 @@ fn golden() -> Value {
     serde_json::from_str(GOLDEN).unwrap()
 }
 
-/// The three appendix tables joined to one `tasks.json`, teams in the order of the table of `first`.
-fn sheet(golden: &Value, first: Task) -> String {
+/// The three appendix tables joined to one `tasks.json`, with the teams in the sequence of the table of `first`.
+fn input_file(golden: &Value, first: Task) -> String {
     let mut teams = Vec::new();
     for row in rows(golden, first.as_str()) {
         let tasks: Map<String, Value> = Task::ALL
@@ -35,9 +35,9 @@ fn sheet(golden: &Value, first: Task) -> String {
     format!("{{{}}}", teams.join(","))
 }
 
-fn board(sheet: &str) -> Vec<Value> {
-    let sheet: QualifyingSheet = read(sheet).unwrap();
-    sheet
+fn board(input_file: &str) -> Vec<Value> {
+    let input_file: QualifyingScores = read(input_file).unwrap();
+    input_file
         .board()
         .iter()
         .map(|row| serde_json::to_value(row).unwrap())
@@ -45,18 +45,18 @@ fn board(sheet: &str) -> Vec<Value> {
 }
 
 #[test]
-fn the_appendix_tables_give_the_qualifying_table() {
+fn appendix_tables_give_qualifying_table() {
     let golden = golden();
     let expected = rows(&golden, "board");
     assert_eq!(expected.len(), 13);
-    // Whatever the order in which the teams are listed.
+    // The sequence of the teams has no influence.
     for first in Task::ALL {
-        let board = board(&sheet(&golden, first));
+        let board = board(&input_file(&golden, first));
         assert_eq!(board.len(), expected.len());
-        for (place, (row, expected)) in board.iter().zip(expected).enumerate() {
+        for (index, (row, expected)) in board.iter().zip(expected).enumerate() {
             let team = &expected["team"];
-            assert_eq!(row["team"], *team, "place {}", place + 1);
-            assert_eq!(row["rank"], place + 1, "{team}");
+            assert_eq!(row["team"], *team, "place {}", index + 1);
+            assert_eq!(row["rank"], index + 1, "{team}");
             assert_eq!(row["tier"], expected["tier"], "{team}");
             assert_eq!(row["penalty_points"], expected["penalty_points"], "{team}");
             let score = row["score"].as_f64().unwrap();
@@ -68,7 +68,7 @@ fn the_appendix_tables_give_the_qualifying_table() {
             for task in Task::ALL {
                 let mut rate = expected[task.as_str()].clone();
                 if team == "CONFIRMTEAM" && task == Task::Hit {
-                    // The paper disagrees with itself: 29.3 % here, 29.4 % in the appendix.
+                    // The paper is inconsistent: 29.3 % here, 29.4 % in the appendix.
                     assert_eq!(rate, 0.293);
                     rate = 0.294.into();
                 }
@@ -83,11 +83,11 @@ fn the_appendix_tables_give_the_qualifying_table() {
 }
 
 #[test]
-fn the_appendix_tables_are_the_boards_of_the_tasks() {
+fn appendix_tables_equal_task_boards() {
     let golden = golden();
-    let board = board(&sheet(&golden, Task::Hit));
+    let board = board(&input_file(&golden, Task::Hit));
     for task in Task::ALL {
-        for (place, expected) in rows(&golden, task.as_str()).iter().enumerate() {
+        for (index, expected) in rows(&golden, task.as_str()).iter().enumerate() {
             let row = board
                 .iter()
                 .find(|row| row["team"] == expected["team"])
@@ -100,21 +100,21 @@ fn the_appendix_tables_are_the_boards_of_the_tasks() {
                 "{task}, {team}"
             );
             if task == Task::Defend && (team == "Baseline-ATACOM" || team == "AJoy") {
-                // Level in rate and points: their places are a matter of the order given.
+                // Tied in rate and points: their ranks depend on the sequence of the input.
                 assert!(
                     [5, 6].contains(&row["rank"].as_u64().unwrap()),
                     "{task}, {team}"
                 );
             } else {
-                assert_eq!(row["rank"], place + 1, "{task}, {team}");
+                assert_eq!(row["rank"], index + 1, "{task}, {team}");
             }
         }
     }
 }
 
-/// The server's boards are made of evaluation results; they must agree with the scoring by hand.
+/// The server's boards are computed from evaluation results; they must agree with those of `tasks.json`.
 #[test]
-fn boards_of_evaluations_give_the_same_tables() {
+fn boards_of_evaluations_equal_appendix_tables() {
     let golden = golden();
     let entries: Vec<_> = (0..)
         .zip(rows(&golden, "hit"))
@@ -161,7 +161,7 @@ fn boards_of_evaluations_give_the_same_tables() {
             .iter()
             .map(|row| row["team"].as_str().unwrap())
             .collect();
-        // Teams that are level in the defend table stand there in the hit table's order too.
+        // Tied teams of the defend table have the same sequence there as in the hit table.
         let teams: Vec<_> = board.iter().map(|row| row.entry.key).collect();
         assert_eq!(teams, expected, "{task}");
     }

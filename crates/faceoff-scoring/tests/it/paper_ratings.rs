@@ -1,6 +1,6 @@
-//! Ratings from the 36 games of the paper. The estimates were found by another program, too, which minimises the
-//! negative logarithm of the posterior with SciPy's BFGS; the intervals lie beside those of a bootstrap of its own
-//! with NumPy's random numbers.
+//! Ratings from the 36 games of the paper. The expected estimates are from an independent program that minimises the
+//! negative logarithm of the posterior with SciPy's BFGS, the expected intervals from its bootstrap with NumPy's random
+//! numbers.
 
 use crate::support::read;
 use faceoff_scoring::tournament::{
@@ -9,7 +9,7 @@ use faceoff_scoring::tournament::{
 };
 use serde_json::{Value, json};
 
-/// The games as an organiser has them, changed by `edit`.
+/// The games without their winners, changed by `edit`.
 fn games(edit: impl Fn(&mut Value)) -> Vec<PlayedGame> {
     let golden: Value = serde_json::from_str(include_str!(concat!(
         env!("CARGO_MANIFEST_DIR"),
@@ -24,11 +24,11 @@ fn games(edit: impl Fn(&mut Value)) -> Vec<PlayedGame> {
     read(&games.to_string()).unwrap()
 }
 
-/// Team, rating, and the ends of the other program's interval, an end that there is none of left out.
+/// Team, rating, and bounds of the independent program's interval; `None` if the interval has no such bound.
 type Expected = (&'static str, f64, Option<f64>, Option<f64>);
 
 #[track_caller]
-fn is(pool: &Pool, expected: &[Expected]) {
+fn assert_ratings(pool: &Pool, expected: &[Expected]) {
     assert_eq!(pool.ratings.len(), expected.len());
     for (row, (team, rating, low, high)) in pool.ratings.iter().zip(expected) {
         assert_eq!(row.rated.team.as_str(), *team);
@@ -36,21 +36,21 @@ fn is(pool: &Pool, expected: &[Expected]) {
         for (got, other) in row.ci95.into_iter().zip([low, high]) {
             assert_eq!(got.is_some(), other.is_some(), "{team}: {:?}", row.ci95);
             if let (Some(got), Some(other)) = (got, other) {
-                // Two bootstraps of a thousand samples differ by so much.
-                assert!((got - other).abs() < 30.0, "{team}: {got}, there {other}");
+                // Two bootstraps with a thousand samples may differ by this much.
+                assert!((got - other).abs() < 30.0, "{team}: {got}, expected {other}");
             }
         }
     }
 }
 
 #[test]
-fn the_papers_teams_have_these_ratings() {
+fn ratings_of_the_papers_teams_are_as_expected() {
     let ratings = rate(&games(|_| ())).unwrap();
     let [results] = ratings.results.as_slice() else {
         panic!("all teams are connected: {:?}", ratings.results);
     };
     assert_eq!(results.units, 36);
-    is(
+    assert_ratings(
         results,
         &[
             ("AiRLIHockey", 1973.2164, Some(1864.4), None), // won all of its games
@@ -65,7 +65,7 @@ fn the_papers_teams_have_these_ratings() {
     let [goals] = ratings.goals.as_slice() else {
         panic!("all teams are connected: {:?}", ratings.goals);
     };
-    is(
+    assert_ratings(
         goals,
         &[
             ("AiRLIHockey", 2050.3924, Some(1902.8), Some(2208.7)),
@@ -81,16 +81,15 @@ fn the_papers_teams_have_these_ratings() {
     assert_eq!(played, [11, 11, 11, 11, 11, 11, 6]);
 }
 
-/// Teams changed their agents between the rounds: as submissions, those of the first round never met
-/// those of the second.
+/// Teams changed their agents between the rounds, so submissions of the first round never met those of the second.
 #[test]
-fn the_papers_submissions_are_two_pools() {
+fn submissions_of_the_papers_rounds_are_two_pools() {
     let ratings = rate(&games(|game| {
         let label = format!("round-{}", game["round"]);
         game["submissions"] = json!([label, label]);
     }))
     .unwrap();
-    let of = |pool: &Pool| -> Vec<(String, f64)> {
+    let rounded = |pool: &Pool| -> Vec<(String, f64)> {
         let row = |row: &faceoff_scoring::tournament::rating::Rating| {
             let label = row.rated.submission.as_ref().unwrap();
             let rating = (row.rating * 10.0).round() / 10.0;
@@ -108,7 +107,7 @@ fn the_papers_submissions_are_two_pools() {
             .collect()
     };
     assert_eq!(
-        of(first),
+        rounded(first),
         named(&[
             ("AiRLIHockey round-1", 1844.0),
             ("AJoy round-1", 1552.2),
@@ -119,7 +118,7 @@ fn the_papers_submissions_are_two_pools() {
         ])
     );
     assert_eq!(
-        of(second),
+        rounded(second),
         named(&[
             ("AiRLIHockey round-2", 1917.5),
             ("Air-HocKIT round-2", 1759.5),

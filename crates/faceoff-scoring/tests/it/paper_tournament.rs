@@ -1,5 +1,5 @@
 use crate::support::{read, rows};
-use faceoff_scoring::tournament::{DrawnBy, GameResult, PlayedGame, WonBy, score_tournament};
+use faceoff_scoring::tournament::{DrawReason, GameResult, PlayedGame, WinReason, score_tournament};
 use serde_json::{Value, json};
 
 const GOLDEN: &str = include_str!(concat!(
@@ -20,13 +20,13 @@ fn games(golden: &Value) -> Vec<PlayedGame> {
 }
 
 #[test]
-fn all_36_games_have_the_winner_of_the_paper() {
+fn winners_of_all_36_games_are_those_of_the_paper() {
     let golden = golden();
     let tournament = score_tournament(&games(&golden));
     let expected = rows(&golden, "games");
     assert_eq!((tournament.games.len(), expected.len()), (36, 36));
     for (game, expected) in tournament.games.iter().zip(expected) {
-        // Every field of the entry, and the winner. The tables have no reasons.
+        // Compare all fields of the entry and the winner; the tables of the paper have no reasons.
         let mut game = serde_json::to_value(game).unwrap();
         for reason in ["won_by", "winner_led", "drawn_by"] {
             game.as_object_mut().unwrap().remove(reason);
@@ -60,7 +60,7 @@ const BY_TIER: [(u32, &str, &str, bool); 19] = [
 ];
 
 #[test]
-fn nineteen_of_the_papers_games_were_decided_by_tier_and_nine_of_these_winners_did_not_lead() {
+fn tier_decided_19_games_and_9_winners_did_not_lead() {
     let games = games(&golden());
     let mut by_tier = Vec::new();
     let mut others = [0; 2];
@@ -68,13 +68,13 @@ fn nineteen_of_the_papers_games_were_decided_by_tier_and_nine_of_these_winners_d
         let [home, away] = game.teams().map(|team| team.as_str());
         match game.result() {
             GameResult::Won {
-                by: WonBy::Tier { led },
+                reason: WinReason::Tier { led },
                 ..
             } => by_tier.push((game.round(), home, away, led)),
             GameResult::Won {
-                by: WonBy::Score, ..
+                reason: WinReason::Score, ..
             } => others[0] += 1,
-            GameResult::Drawn(DrawnBy::BothNonDeployable) => others[1] += 1,
+            GameResult::Drawn(DrawReason::BothNonDeployable) => others[1] += 1,
             other => panic!("{home} against {away}: {other:?}"),
         }
     }
@@ -88,9 +88,9 @@ fn nineteen_of_the_papers_games_were_decided_by_tier_and_nine_of_these_winners_d
 }
 
 #[test]
-fn the_why_of_a_game_is_in_its_json_and_in_words() {
+fn result_reason_is_in_json_and_in_words() {
     let games = games(&golden());
-    let of = |home: &str, away: &str| {
+    let reason_of = |home: &str, away: &str| {
         let game = games
             .iter()
             .find(|game| game.teams().map(|team| team.as_str()) == [home, away])
@@ -121,12 +121,12 @@ fn the_why_of_a_game_is_in_its_json_and_in_words() {
             "both are non-deployable",
         ),
     ] {
-        assert_eq!(of(teams[0], teams[1]), (fields, words.to_owned()));
+        assert_eq!(reason_of(teams[0], teams[1]), (fields, words.to_owned()));
     }
 }
 
 #[test]
-fn the_standings_are_those_of_the_paper() {
+fn standings_are_those_of_the_paper() {
     let golden = golden();
     let tournament = score_tournament(&games(&golden));
     let (points, aggregate) = (rows(&golden, "points"), rows(&golden, "aggregate"));
@@ -134,33 +134,33 @@ fn the_standings_are_those_of_the_paper() {
         (tournament.standings.len(), points.len(), aggregate.len()),
         (7, 7, 7)
     );
-    for (place, standing) in tournament.standings.iter().enumerate() {
-        let mut expected = json!({"rank": place + 1});
-        for table in [&points[place], &aggregate[place]] {
+    for (index, row) in tournament.standings.iter().enumerate() {
+        let mut expected = json!({"rank": index + 1});
+        for table in [&points[index], &aggregate[index]] {
             expected
                 .as_object_mut()
                 .unwrap()
                 .extend(table.as_object().unwrap().clone());
         }
-        assert_eq!(serde_json::to_value(standing).unwrap(), expected);
+        assert_eq!(serde_json::to_value(row).unwrap(), expected);
     }
 }
 
 #[test]
-fn one_round_alone_gives_its_points() {
+fn single_round_gives_its_points() {
     let golden = golden();
     let second: Vec<_> = games(&golden)
         .into_iter()
         .filter(|game| game.round() == 2)
         .collect();
-    for standing in score_tournament(&second).standings {
+    for row in score_tournament(&second).standings {
         let expected = rows(&golden, "points")
             .iter()
-            .find(|row| row["team"] == standing.team.as_str())
+            .find(|expected| expected["team"] == row.team.as_str())
             .unwrap();
-        assert_eq!(standing.points_per_round[0], 0);
+        assert_eq!(row.points_per_round[0], 0);
         assert_eq!(
-            json!(standing.points_per_round[1]),
+            json!(row.points_per_round[1]),
             expected["points_per_round"][1]
         );
     }

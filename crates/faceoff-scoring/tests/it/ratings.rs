@@ -1,4 +1,4 @@
-//! Ratings of made games: what is kept apart, what has no interval, what is refused.
+//! Ratings of synthetic games: pools, missing intervals and refused input.
 
 use crate::support::read;
 use faceoff_scoring::tournament::{
@@ -26,7 +26,7 @@ fn rated(games: &[PlayedGame]) -> [Vec<Pool>; 2] {
     [ratings.results, ratings.goals]
 }
 
-/// A round robin with one upset, so that nobody is unbeaten.
+/// A round robin with one upset, so that no team is unbeaten.
 fn round_robin() -> Vec<Value> {
     vec![
         game("A", "B", [4, 1]),
@@ -40,14 +40,14 @@ fn round_robin() -> Vec<Value> {
 }
 
 #[test]
-fn the_same_games_in_any_order_give_the_same_bits() {
+fn ratings_do_not_depend_on_order_of_games() {
     let mut all = round_robin();
     let expected = rated(&games(&all));
     all.reverse();
     assert_eq!(rated(&games(&all)), expected);
     all.rotate_left(3);
     assert_eq!(rated(&games(&all)), expected);
-    // pinned: published numbers must not change with the machine or the compiler
+    // Pinned: published numbers must not change with the machine or the compiler.
     let pool = &expected[0][0];
     let best = &pool.ratings[0];
     assert_eq!(
@@ -61,17 +61,17 @@ fn the_same_games_in_any_order_give_the_same_bits() {
 }
 
 #[test]
-fn a_draw_is_half_a_win_for_each() {
+fn draw_is_half_a_win_for_each_side() {
     let [results, _] = rated(&games(&[game("A", "B", [1, 1]), game("B", "A", [2, 2])]));
-    let row = |place: usize| {
+    let row = |index: usize| {
         (
-            results[0].ratings[place].rating,
-            results[0].ratings[place].ci95,
+            results[0].ratings[index].rating,
+            results[0].ratings[index].ci95,
         )
     };
     assert_eq!(row(0), (1500.0, [Some(1500.0), Some(1500.0)]));
     assert_eq!(row(1), row(0));
-    // A win and a loss come to the same estimate, and are less sure.
+    // A win and a loss give the same estimate with wider intervals.
     let [results, _] = rated(&games(&[game("A", "B", [1, 0]), game("B", "A", [1, 0])]));
     let row = &results[0].ratings[0];
     assert!((row.rating - 1500.0).abs() < 1e-6);
@@ -82,7 +82,7 @@ fn a_draw_is_half_a_win_for_each() {
 }
 
 #[test]
-fn who_lost_nothing_has_no_upper_end_and_who_won_nothing_no_lower_one() {
+fn unbeaten_has_no_upper_bound_and_winless_no_lower() {
     let [results, goals] = rated(&games(&[
         game("A", "B", [1, 0]),
         game("A", "C", [2, 1]),
@@ -90,8 +90,8 @@ fn who_lost_nothing_has_no_upper_end_and_who_won_nothing_no_lower_one() {
         game("B", "A", [0, 1]),
         game("C", "B", [0, 1]),
     ]));
-    let ends = |pool: &Pool| -> Vec<(String, bool, bool)> {
-        let mut ends: Vec<_> = pool
+    let bounds = |pool: &Pool| -> Vec<(String, bool, bool)> {
+        let mut bounds: Vec<_> = pool
             .ratings
             .iter()
             .map(|row| {
@@ -102,12 +102,12 @@ fn who_lost_nothing_has_no_upper_end_and_who_won_nothing_no_lower_one() {
                 )
             })
             .collect();
-        ends.sort();
-        ends
+        bounds.sort();
+        bounds
     };
     let named = |name: &str, low, high| (name.to_owned(), low, high);
     assert_eq!(
-        ends(&results[0]),
+        bounds(&results[0]),
         [
             named("A", true, false),
             named("B", true, true),
@@ -115,7 +115,7 @@ fn who_lost_nothing_has_no_upper_end_and_who_won_nothing_no_lower_one() {
         ]
     );
     assert_eq!(
-        ends(&goals[0]),
+        bounds(&goals[0]),
         [
             named("A", true, true),
             named("B", true, true),
@@ -127,7 +127,7 @@ fn who_lost_nothing_has_no_upper_end_and_who_won_nothing_no_lower_one() {
 }
 
 #[test]
-fn a_single_game_gives_a_rating_and_no_interval() {
+fn single_game_gives_rating_without_interval() {
     let [results, goals] = rated(&games(&[game("A", "B", [3, 1])]));
     assert_eq!((results[0].units, results[0].usable_samples), (1, 0));
     for pool in [&results[0], &goals[0]] {
@@ -139,9 +139,9 @@ fn a_single_game_gives_a_rating_and_no_interval() {
 }
 
 #[test]
-fn samples_that_fall_apart_are_not_used_and_too_few_give_no_interval() {
-    // A chain: without any one game somebody has no connection. A sample of four that misses none of four
-    // games comes about with probability 4!/4⁴ = 9 %.
+fn disconnected_samples_are_not_used_for_intervals() {
+    // A chain: each game is needed to connect the pool. A sample of four contains all four games with probability
+    // 4!/4⁴ = 9 %.
     let chain = [
         game("A", "B", [1, 0]),
         game("B", "C", [1, 0]),
@@ -160,9 +160,9 @@ fn samples_that_fall_apart_are_not_used_and_too_few_give_no_interval() {
             .iter()
             .all(|row| row.ci95 == [None, None])
     );
-    // Played ten times each, hardly a sample misses one.
-    let often: Vec<_> = chain.iter().cycle().take(40).cloned().collect();
-    let [results, _] = rated(&games(&often));
+    // With ten copies of each game, almost all samples contain all of them.
+    let repeated: Vec<_> = chain.iter().cycle().take(40).cloned().collect();
+    let [results, _] = rated(&games(&repeated));
     assert!(
         results[0].usable_samples > RESAMPLES * 99 / 100,
         "{}",
@@ -172,7 +172,7 @@ fn samples_that_fall_apart_are_not_used_and_too_few_give_no_interval() {
 }
 
 #[test]
-fn submissions_that_never_met_are_in_pools_of_their_own() {
+fn unconnected_submissions_are_in_different_pools() {
     let labelled = |home, away, labels: [&str; 2], goals| {
         with(game(home, away, goals), "submissions", json!(labels))
     };
@@ -184,7 +184,7 @@ fn submissions_that_never_met_are_in_pools_of_their_own() {
     assert_eq!(
         (results.len(), goals.len()),
         (2, 1),
-        "no goal, nothing said"
+        "without goals there are no ratings from goals"
     );
     let mean = |pool: &Pool| {
         pool.ratings.iter().map(|row| row.rating).sum::<f64>() / pool.ratings.len() as f64
@@ -202,16 +202,16 @@ fn submissions_that_never_met_are_in_pools_of_their_own() {
 }
 
 #[test]
-fn a_forfeit_is_a_result_and_no_goal() {
+fn forfeit_counts_as_result_without_goals() {
     let forfeited = with(game("A", "B", [0, 3]), "forfeit", json!([null, "time"]));
     let [results, goals] = rated(&games(&[forfeited]));
     assert_eq!(results[0].ratings[0].rated.team.as_str(), "A");
     assert_eq!(goals, []);
 }
 
-/// Halves of a mirrored pair that agree are one piece of evidence, not two.
+/// Equal halves of a mirrored pair are one observation, not two.
 #[test]
-fn a_mirrored_pair_is_drawn_as_a_whole() {
+fn mirrored_pair_is_drawn_as_a_whole() {
     let mut single = Vec::new();
     let mut paired = Vec::new();
     for number in 0..12 {
@@ -225,20 +225,20 @@ fn a_mirrored_pair_is_drawn_as_a_whole() {
         let [low, high] = pool.ratings[0].ci95.map(Option::unwrap);
         high - low
     };
-    let [of_games, _] = rated(&games(&single));
-    let [of_pairs, _] = rated(&games(&paired));
-    assert_eq!((of_games[0].units, of_pairs[0].units), (24, 12));
-    assert!((of_games[0].ratings[0].rating - of_pairs[0].ratings[0].rating).abs() < 1e-6);
-    // Half as many units: √2 wider, but for what the prior holds.
-    let wider = width(&of_pairs[0]) / width(&of_games[0]);
+    let [rated_games, _] = rated(&games(&single));
+    let [rated_pairs, _] = rated(&games(&paired));
+    assert_eq!((rated_games[0].units, rated_pairs[0].units), (24, 12));
+    assert!((rated_games[0].ratings[0].rating - rated_pairs[0].ratings[0].rating).abs() < 1e-6);
+    // Half as many units: wider by √2, apart from the effect of the prior.
+    let wider = width(&rated_pairs[0]) / width(&rated_games[0]);
     assert!((1.25..1.6).contains(&wider), "{wider}");
-    // One half may be missing: its other one was ours to break.
+    // One half may be missing after a platform fault.
     paired.pop();
     assert_eq!(rated(&games(&paired))[0][0].units, 12);
 }
 
 #[test]
-fn what_is_no_mirrored_pair_is_refused() {
+fn invalid_mirrored_pair_is_refused() {
     let half = |home, away| with(game(home, away, [1, 0]), "pair", json!(3));
     for (all, words) in [
         (vec![half("A", "B"), half("A", "B")], "with sides swapped"),
@@ -259,7 +259,7 @@ fn what_is_no_mirrored_pair_is_refused() {
 }
 
 #[test]
-fn a_pool_that_would_take_for_ever_is_refused() {
+fn pool_with_too_many_submissions_is_refused() {
     let chain: Vec<_> = (0..200)
         .map(|n| game(&format!("T{n}"), &format!("T{}", n + 1), [1, 0]))
         .collect();

@@ -1,12 +1,12 @@
-//! What schedules promise, for any number of teams, any seed and any results.
+//! Properties of schedules for any number of teams, any seed and any results.
 
 use crate::{
     most_pairs::most_pairs,
     support::{read, team},
 };
 use faceoff_scoring::tournament::{
-    Departure, Departures, LeftAs, POINTS_BYE, PlayedGame, RoundNumber,
-    schedule::{Entrants, Format, Progress, Round, Schedule, ScheduleError, TableOf},
+    Departure, Departures, DepartureKind, POINTS_BYE, PlayedGame, RoundNumber,
+    schedule::{Entrants, Format, Progress, Round, Schedule, ScheduleError, TableScope},
     score_tournament_with,
 };
 use faceoff_types::{Seed, TeamName};
@@ -22,8 +22,8 @@ fn number(number: u32) -> RoundNumber {
     number.try_into().unwrap()
 }
 
-/// A tournament that is played to its end, or as far as wanted.
-struct Played {
+/// A simulated tournament.
+struct SimulatedTournament {
     format: Format,
     seed: Seed,
     entrants: Entrants,
@@ -32,7 +32,7 @@ struct Played {
     games: Vec<PlayedGame>,
 }
 
-impl Played {
+impl SimulatedTournament {
     fn new(format: Format, teams: Vec<TeamName>, seed: u64) -> Self {
         Self {
             format,
@@ -61,7 +61,7 @@ impl Played {
         }))
     }
 
-    /// Every open game of the last round gets the goals that `goals` says.
+    /// Adds results to all games of the last round, with the goals from `goals`.
     fn play(&mut self, mut goals: impl FnMut(&TeamName, &TeamName) -> [u32; 2]) {
         let round = self.rounds.last().unwrap();
         for pairing in round.pairings() {
@@ -74,8 +74,8 @@ impl Played {
     }
 }
 
-/// How often each two teams, by name, meet in the rounds.
-fn meetings<'a>(rounds: impl IntoIterator<Item = &'a Round>) -> BTreeMap<[&'a TeamName; 2], usize> {
+/// Number of games of each two teams, sorted by name.
+fn game_counts<'a>(rounds: impl IntoIterator<Item = &'a Round>) -> BTreeMap<[&'a TeamName; 2], usize> {
     let mut all = BTreeMap::new();
     for pairing in rounds.into_iter().flat_map(Round::pairings) {
         let mut teams = pairing.teams();
@@ -85,16 +85,16 @@ fn meetings<'a>(rounds: impl IntoIterator<Item = &'a Round>) -> BTreeMap<[&'a Te
     all
 }
 
-fn home_balance(rounds: &[Round], of: &TeamName) -> i64 {
+fn home_balance(rounds: &[Round], team: &TeamName) -> i64 {
     rounds
         .iter()
         .flat_map(Round::pairings)
-        .map(|pairing| i64::from(pairing.home == *of) - i64::from(pairing.away == *of))
+        .map(|pairing| i64::from(pairing.home == *team) - i64::from(pairing.away == *team))
         .sum()
 }
 
 #[track_caller]
-fn nobody_plays_twice_a_day(round: &Round) {
+fn assert_one_game_per_team_and_day(round: &Round) {
     for day in &round.matchdays {
         let playing = day.pairings.iter().flat_map(|pairing| pairing.teams());
         let all: Vec<_> = playing.chain(&day.byes).collect();
@@ -107,35 +107,35 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 
     #[test]
-    fn in_a_round_robin_everybody_meets_everybody_once_a_round(
+    fn round_robin_pairs_all_teams_once_per_round(
         count in 2usize..24,
         rounds in 1u32..5,
         seed in any::<u64>(),
     ) {
         let format = Format::RoundRobin { rounds: number(rounds) };
-        let mut played = Played::new(format, names(count), seed);
-        while let Some(round) = played.draw().unwrap() {
-            nobody_plays_twice_a_day(round);
-            let met = meetings([round]);
-            prop_assert_eq!(met.len(), count * (count - 1) / 2);
-            prop_assert!(met.values().all(|times| *times == 1));
+        let mut tournament = SimulatedTournament::new(format, names(count), seed);
+        while let Some(round) = tournament.draw().unwrap() {
+            assert_one_game_per_team_and_day(round);
+            let counts = game_counts([round]);
+            prop_assert_eq!(counts.len(), count * (count - 1) / 2);
+            prop_assert!(counts.values().all(|times| *times == 1));
             let byes: BTreeSet<_> = round.byes().collect();
             let (days, expected) = if count % 2 == 0 { (count - 1, 0) } else { (count, count) };
             prop_assert_eq!((round.byes().count(), byes.len()), (expected, expected));
-            prop_assert_eq!(round.matchdays.len(), days, "as many as it takes, and no more");
-            played.play(|_, _| [1, 0]);
-            // Home and away: apart by one at most, and even after each second round.
-            let so_far = played.rounds.len();
-            for of in played.entrants.iter() {
-                let most = i64::from(so_far % 2 == 1 && count % 2 == 0);
-                prop_assert!(home_balance(&played.rounds, of).abs() <= most);
+            prop_assert_eq!(round.matchdays.len(), days, "the minimum number of days");
+            tournament.play(|_, _| [1, 0]);
+            // Home and away games differ by at most one, and are equal after each second round.
+            let round_count = tournament.rounds.len();
+            for team in tournament.entrants.iter() {
+                let max = i64::from(round_count % 2 == 1 && count % 2 == 0);
+                prop_assert!(home_balance(&tournament.rounds, team).abs() <= max);
             }
         }
-        prop_assert_eq!(played.rounds.len(), rounds as usize);
+        prop_assert_eq!(tournament.rounds.len(), rounds as usize);
     }
 
     #[test]
-    fn the_same_seed_gives_the_same_schedule_in_whatever_order_teams_enter(
+    fn schedule_does_not_depend_on_order_of_entrants(
         teams in Just(names(9)).prop_shuffle(),
         seed in any::<u64>(),
     ) {
@@ -149,37 +149,37 @@ proptest! {
                 (names(9), seed),
                 (names(9), seed.wrapping_add(1)),
             ].map(|(teams, seed)| {
-                let mut played = Played::new(format, teams, seed);
-                while played.draw().unwrap().is_some() {
-                    played.play(|home, away| if home < away { [2, 1] } else { [0, 3] });
+                let mut tournament = SimulatedTournament::new(format, teams, seed);
+                while tournament.draw().unwrap().is_some() {
+                    tournament.play(|home, away| if home < away { [2, 1] } else { [0, 3] });
                 }
-                played.rounds
+                tournament.rounds
             });
             prop_assert_eq!(&entered, &sorted);
-            prop_assert_ne!(&entered, &other, "nine teams can be drawn in many ways");
+            prop_assert_ne!(&entered, &other, "another seed gives another draw of nine teams");
         }
     }
 
     #[test]
-    fn swiss_repeats_no_pairing_that_can_be_avoided_and_shares_byes_out(
+    fn swiss_avoids_repeats_and_distributes_byes(
         count in 2usize..10,
         rounds in 1u32..12,
         seed in any::<u64>(),
         goals in proptest::collection::vec([0u32..4, 0u32..4], 100),
     ) {
         let format = Format::Swiss { rounds: number(rounds) };
-        let mut played = Played::new(format, names(count), seed);
+        let mut tournament = SimulatedTournament::new(format, names(count), seed);
         let mut goals = goals.into_iter().cycle();
-        while played.draw().unwrap().is_some() {
-            let (round, earlier) = played.rounds.split_last().unwrap();
-            nobody_plays_twice_a_day(round);
+        while tournament.draw().unwrap().is_some() {
+            let (round, earlier) = tournament.rounds.split_last().unwrap();
+            assert_one_game_per_team_and_day(round);
             prop_assert_eq!(round.pairings().count(), count / 2);
             prop_assert_eq!(round.byes().count(), count % 2);
 
-            // Repeats: as few as any pairing of those who play has.
-            let met = meetings(earlier);
+            // Repeats: the minimum over all pairings of these teams.
+            let counts = game_counts(earlier);
             let have_not_met = |a: &TeamName, b: &TeamName| {
-                !met.contains_key(&[a.min(b), a.max(b)])
+                !counts.contains_key(&[a.min(b), a.max(b)])
             };
             let playing: Vec<_> = round.pairings().flat_map(|pairing| pairing.teams()).collect();
             let new = round
@@ -188,59 +188,59 @@ proptest! {
                 .count();
             prop_assert_eq!(new, most_pairs(&playing, &have_not_met));
             if earlier.len() < count / 2 {
-                prop_assert_eq!(new, count / 2, "so early there is always a pairing without repeats");
+                prop_assert_eq!(new, count / 2, "in early rounds there is always a pairing without repeats");
             }
 
-            // Home is who was so less often.
+            // The home team has at most as many home games.
             for pairing in round.pairings() {
                 let [home, away] = pairing.teams().map(|team| home_balance(earlier, team));
                 prop_assert!(home <= away);
             }
 
-            // Byes: nobody has two before all had one, and the lowest of those gets it.
-            let had = |team: &TeamName| {
+            // Byes: no team has a second one before all had one; the lowest of the teams with the fewest gets it.
+            let bye_count = |team: &TeamName| {
                 earlier.iter().flat_map(Round::byes).filter(|other| *other == team).count()
             };
             if let Some(bye) = round.byes().next() {
-                let fewest = played.entrants.iter().map(had).min().unwrap();
-                prop_assert_eq!(had(bye), fewest);
+                let fewest = tournament.entrants.iter().map(bye_count).min().unwrap();
+                prop_assert_eq!(bye_count(bye), fewest);
                 if !earlier.is_empty() {
-                    let byes = played.format.byes(earlier);
-                    let table = score_tournament_with(&played.games, &Departures::default(), &byes);
-                    let lowest = table.standings.iter().rfind(|row| had(&row.team) == fewest);
+                    let byes = tournament.format.byes(earlier);
+                    let table = score_tournament_with(&tournament.games, &Departures::default(), &byes);
+                    let lowest = table.standings.iter().rfind(|row| bye_count(&row.team) == fewest);
                     prop_assert_eq!(&lowest.unwrap().team, bye);
                 }
             }
-            played.play(|_, _| goals.next().unwrap());
+            tournament.play(|_, _| goals.next().unwrap());
         }
-        prop_assert_eq!(played.rounds.len(), rounds as usize);
+        prop_assert_eq!(tournament.rounds.len(), rounds as usize);
     }
 
     #[test]
-    fn groups_are_even_and_their_best_reach_the_final(
+    fn groups_are_balanced_and_winners_reach_final(
         count in 4usize..20,
         groups in 1u32..5,
         seed in any::<u64>(),
     ) {
         prop_assume!(count / groups as usize >= 2);
         let advance = if groups == 1 { 2 } else { 1 };
-        let mut played = Played::new(Format::Groups { groups, advance }, names(count), seed);
-        let first = played.draw().unwrap().unwrap().clone();
-        nobody_plays_twice_a_day(&first);
+        let mut tournament = SimulatedTournament::new(Format::Groups { groups, advance }, names(count), seed);
+        let first = tournament.draw().unwrap().unwrap().clone();
+        assert_one_game_per_team_and_day(&first);
         let sizes: Vec<_> = first.groups.iter().map(Vec::len).collect();
         prop_assert_eq!(sizes.len(), groups as usize);
         prop_assert!(sizes.iter().max().unwrap() - sizes.iter().min().unwrap() <= 1);
         let expected: usize = sizes.iter().map(|size| size * (size - 1) / 2).sum();
-        prop_assert_eq!(meetings([&first]).len(), expected);
+        prop_assert_eq!(game_counts([&first]).len(), expected);
         for pairing in first.pairings() {
             let together = |group: &&Vec<TeamName>| {
                 pairing.teams().into_iter().all(|team| group.contains(team))
             };
             prop_assert_eq!(first.groups.iter().filter(together).count(), 1);
         }
-        // The earlier name wins, so that the first of each group is known.
-        played.play(|home, away| if home < away { [1, 0] } else { [0, 1] });
-        let last = played.draw().unwrap().unwrap().clone();
+        // The team with the earlier name wins, so that the first of each group is known.
+        tournament.play(|home, away| if home < away { [1, 0] } else { [0, 1] });
+        let last = tournament.draw().unwrap().unwrap().clone();
         let mut expected: Vec<TeamName> = first
             .groups
             .iter()
@@ -254,21 +254,21 @@ proptest! {
         expected.sort();
         let finalists: BTreeSet<_> = last.pairings().flat_map(|pairing| pairing.teams()).collect();
         prop_assert!(finalists.into_iter().eq(&expected));
-        prop_assert_eq!(meetings([&last]).len(), expected.len() * (expected.len() - 1) / 2);
-        played.play(|home, away| if home < away { [1, 0] } else { [0, 1] });
-        prop_assert_eq!(played.draw().unwrap(), None);
-        let tables = played.format.tables(&played.progress());
+        prop_assert_eq!(game_counts([&last]).len(), expected.len() * (expected.len() - 1) / 2);
+        tournament.play(|home, away| if home < away { [1, 0] } else { [0, 1] });
+        prop_assert_eq!(tournament.draw().unwrap(), None);
+        let tables = tournament.format.tables(&tournament.progress());
         prop_assert_eq!(tables.len(), 1 + groups as usize);
-        prop_assert_eq!(tables[0].of, TableOf::Final);
+        prop_assert_eq!(tables[0].scope, TableScope::Final);
         prop_assert_eq!(&tables[0].standings[0].team, &expected[0]);
-        prop_assert_eq!(tables[1].of, TableOf::Group(1));
+        prop_assert_eq!(tables[1].scope, TableScope::Group(1));
         prop_assert_eq!(tables[1].standings.len(), first.groups[0].len());
     }
 }
 
 #[test]
-fn two_groups_and_one_to_advance_make_a_final_of_one_game() {
-    let mut played = Played::new(
+fn final_of_two_groups_with_one_finalist_is_one_game() {
+    let mut tournament = SimulatedTournament::new(
         Format::Groups {
             groups: 2,
             advance: 1,
@@ -276,29 +276,29 @@ fn two_groups_and_one_to_advance_make_a_final_of_one_game() {
         names(6),
         1,
     );
-    played.draw().unwrap();
-    played.play(|_, _| [1, 0]);
-    assert_eq!(played.draw().unwrap().unwrap().pairings().count(), 1);
+    tournament.draw().unwrap();
+    tournament.play(|_, _| [1, 0]);
+    assert_eq!(tournament.draw().unwrap().unwrap().pairings().count(), 1);
 }
 
-/// The paper's tournament: six teams, then a seventh in the second round.
+/// As in the paper's tournament: six teams, and a seventh from the second round.
 #[test]
-fn a_team_may_enter_between_two_rounds() {
+fn team_may_enter_between_two_rounds() {
     let format = Format::RoundRobin { rounds: number(2) };
-    let mut played = Played::new(format, names(6), 3);
-    played.draw().unwrap();
-    played.play(|_, _| [1, 0]);
-    played.entrants = Entrants::new(names(7)).unwrap();
-    played.draw().unwrap();
+    let mut tournament = SimulatedTournament::new(format, names(6), 3);
+    tournament.draw().unwrap();
+    tournament.play(|_, _| [1, 0]);
+    tournament.entrants = Entrants::new(names(7)).unwrap();
+    tournament.draw().unwrap();
     assert_eq!(
-        played
+        tournament
             .rounds
             .iter()
             .map(|round| round.pairings().count())
             .collect::<Vec<_>>(),
         [15, 21]
     );
-    for [a, b] in meetings(&played.rounds[..1]).into_keys() {
+    for [a, b] in game_counts(&tournament.rounds[..1]).into_keys() {
         let home = |round: &Round| {
             round
                 .pairings()
@@ -308,56 +308,56 @@ fn a_team_may_enter_between_two_rounds() {
                 .clone()
         };
         assert_ne!(
-            home(&played.rounds[0]),
-            home(&played.rounds[1]),
+            home(&tournament.rounds[0]),
+            home(&tournament.rounds[1]),
             "sides are swapped"
         );
     }
 }
 
 #[test]
-fn who_left_is_paired_no_more_and_its_open_games_hold_nothing_up() {
+fn departure_excludes_team_and_its_open_games() {
     let format = Format::RoundRobin { rounds: number(3) };
-    let mut played = Played::new(format, names(4), 5);
-    played.draw().unwrap();
-    assert_eq!(played.progress().round_under_way(), Some(number(1)));
-    played.play(|_, _| [1, 0]);
+    let mut tournament = SimulatedTournament::new(format, names(4), 5);
+    tournament.draw().unwrap();
+    assert_eq!(tournament.progress().current_round(), Some(number(1)));
+    tournament.play(|_, _| [1, 0]);
     assert_eq!(
-        played.progress().round_under_way(),
+        tournament.progress().current_round(),
         Some(number(2)),
         "between two rounds"
     );
-    played.draw().unwrap();
-    played.play(|_, _| [1, 0]);
-    // Of the second round, the games of T00 and one other are still open.
+    tournament.draw().unwrap();
+    tournament.play(|_, _| [1, 0]);
+    // In the second round, the games of T00 and one other game are still open.
     let involves = |game: &PlayedGame, name: &str| game.teams().contains(&&team(name));
     let between = |game: &PlayedGame| involves(game, "T01") && involves(game, "T02");
-    let (open, done) = std::mem::take(&mut played.games)
+    let (open, done) = std::mem::take(&mut tournament.games)
         .into_iter()
         .partition::<Vec<_>, _>(|game| {
             game.round() == 2 && (involves(game, "T00") || between(game))
         });
-    played.games = done;
+    tournament.games = done;
     assert_eq!(open.len(), 4);
-    let from_round = played.progress().round_under_way().unwrap();
+    let from_round = tournament.progress().current_round().unwrap();
     assert_eq!(from_round, number(2));
-    played.departures = Departures::new([Departure {
+    tournament.departures = Departures::new([Departure {
         team: team("T00"),
-        left_as: LeftAs::Withdrawn,
+        kind: DepartureKind::Withdrawn,
         from_round,
     }])
     .unwrap();
-    let error = played.draw().unwrap_err().to_string();
+    let error = tournament.draw().unwrap_err().to_string();
     assert!(
         error.starts_with("round 2 is under way: 1 of its games have no result, ")
             && error.contains("T01")
             && error.contains("T02"),
         "{error}"
     );
-    played.games.extend(open.into_iter().filter(between));
-    let third = played.draw().unwrap().unwrap();
+    tournament.games.extend(open.into_iter().filter(between));
+    let third = tournament.draw().unwrap().unwrap();
     assert_eq!(third.number, number(3));
-    assert_eq!(meetings([third]).len(), 3);
+    assert_eq!(game_counts([third]).len(), 3);
     assert!(
         third
             .pairings()
@@ -366,83 +366,83 @@ fn who_left_is_paired_no_more_and_its_open_games_hold_nothing_up() {
 }
 
 #[test]
-fn a_swiss_bye_gives_the_points_of_a_win() {
-    let mut played = Played::new(Format::Swiss { rounds: number(2) }, names(3), 8);
-    played.draw().unwrap();
-    played.play(|_, _| [0, 0]);
-    let bye = played.rounds[0].byes().next().unwrap().clone();
-    let tables = played.format.tables(&played.progress());
-    assert_eq!(tables[0].of, TableOf::Tournament);
+fn swiss_bye_gives_points_of_a_win() {
+    let mut tournament = SimulatedTournament::new(Format::Swiss { rounds: number(2) }, names(3), 8);
+    tournament.draw().unwrap();
+    tournament.play(|_, _| [0, 0]);
+    let bye = tournament.rounds[0].byes().next().unwrap().clone();
+    let tables = tournament.format.tables(&tournament.progress());
+    assert_eq!(tables[0].scope, TableScope::Tournament);
     let first = &tables[0].standings[0];
     assert_eq!(
         (&first.team, first.points, first.byes),
         (&bye, POINTS_BYE, 1)
     );
     let round_robin = Format::RoundRobin { rounds: number(1) };
-    assert_eq!(round_robin.byes(&played.rounds), []);
+    assert_eq!(round_robin.byes(&tournament.rounds), []);
 }
 
 #[test]
-fn what_cannot_be_scheduled_is_refused_in_words() {
-    let entered = |teams: &[&str]| Entrants::new(teams.iter().map(|name| team(name)));
-    let words = |result: Result<Entrants, ScheduleError>| result.unwrap_err().to_string();
+fn impossible_schedule_is_refused_with_reason() {
+    let entrants = |teams: &[&str]| Entrants::new(teams.iter().map(|name| team(name)));
+    let message = |result: Result<Entrants, ScheduleError>| result.unwrap_err().to_string();
     assert_eq!(
-        words(entered(&["A"])),
+        message(entrants(&["A"])),
         "a tournament needs at least two teams, there are 1; enter more"
     );
     assert_eq!(
-        words(entered(&["A", "B", "A"])),
+        message(entrants(&["A", "B", "A"])),
         "A is entered twice; enter each team once"
     );
     assert_eq!(
-        words(Entrants::new(names(257))),
+        message(Entrants::new(names(257))),
         "a tournament has at most 256 teams, there are 257; divide them"
     );
 
     let round_robin = Format::RoundRobin { rounds: number(2) };
-    let refused = |change: &dyn Fn(&mut Played)| {
-        let mut played = Played::new(round_robin, names(3), 1);
-        played.draw().unwrap();
-        played.play(|_, _| [1, 0]);
-        change(&mut played);
-        played.draw().unwrap_err().to_string()
+    let refused = |change: &dyn Fn(&mut SimulatedTournament)| {
+        let mut tournament = SimulatedTournament::new(round_robin, names(3), 1);
+        tournament.draw().unwrap();
+        tournament.play(|_, _| [1, 0]);
+        change(&mut tournament);
+        tournament.draw().unwrap_err().to_string()
     };
     let game = |round: u32, home: &str, away: &str| -> PlayedGame {
         let entry = json!({"round": round, "home": home, "away": away, "goals": [0, 0],
                            "fouls": [0, 0], "penalty_points": [0, 0]});
         read(&entry.to_string()).unwrap()
     };
-    let leave = |names: &[&str]| {
+    let departures = |names: &[&str]| {
         Departures::new(names.iter().map(|name| Departure {
             team: team(name),
-            left_as: LeftAs::Withdrawn,
+            kind: DepartureKind::Withdrawn,
             from_round: number(1),
         }))
         .unwrap()
     };
     assert_eq!(
-        refused(&|played| played.games.push(game(1, "T00", "Zed"))),
-        "Zed is in a game of round 1, but was never entered; enter it or take it out there"
+        refused(&|tournament| tournament.games.push(game(1, "T00", "Zed"))),
+        "Zed is in a game of round 1, but is not entered; enter the team or remove it there"
     );
     assert_eq!(
-        refused(&|played| played.games.push(game(2, "T00", "T01"))),
-        "T00 against T01 is no game of round 2; take its result out"
+        refused(&|tournament| tournament.games.push(game(2, "T00", "T01"))),
+        "T00 against T01 is no game of round 2; remove its result"
     );
     assert_eq!(
-        refused(&|played| played.departures = leave(&["Zed"])),
-        "Zed is said to have left, but was never entered; enter it or take it out there"
+        refused(&|tournament| tournament.departures = departures(&["Zed"])),
+        "Zed is in the list of departures, but is not entered; enter the team or remove it there"
     );
     assert_eq!(
-        refused(&|played| played.departures = leave(&["T00", "T02"])),
+        refused(&|tournament| tournament.departures = departures(&["T00", "T02"])),
         "a tournament needs at least two teams, there are 1; enter more"
     );
     assert_eq!(
-        refused(&|played| played.rounds[0].number = number(2)),
+        refused(&|tournament| tournament.rounds[0].number = number(2)),
         "expected round 1, got 2; give all earlier rounds in order"
     );
     assert_eq!(
-        refused(&|played| played.entrants = Entrants::new(names(2)).unwrap()),
-        "T02 is in round 1, but was never entered; enter it or take it out there"
+        refused(&|tournament| tournament.entrants = Entrants::new(names(2)).unwrap()),
+        "T02 is in round 1, but is not entered; enter the team or remove it there"
     );
     for (groups, advance, words) in [
         (
@@ -466,13 +466,13 @@ fn what_cannot_be_scheduled_is_refused_in_words() {
             "advance: expected 2 to 5, the size of the smallest group, got 1",
         ),
     ] {
-        let mut played = Played::new(Format::Groups { groups, advance }, names(5), 1);
-        assert_eq!(played.draw().unwrap_err().to_string(), words);
+        let mut tournament = SimulatedTournament::new(Format::Groups { groups, advance }, names(5), 1);
+        assert_eq!(tournament.draw().unwrap_err().to_string(), words);
     }
 }
 
 #[test]
-fn a_format_and_a_round_are_kept_as_json() {
+fn format_and_round_round_trip_as_json() {
     let format = Format::Groups {
         groups: 2,
         advance: 1,
@@ -483,8 +483,8 @@ fn a_format_and_a_round_are_kept_as_json() {
         json!({"kind": "groups", "groups": 2, "advance": 1})
     );
     assert_eq!(serde_json::from_value::<Format>(written).unwrap(), format);
-    let mut played = Played::new(format, names(5), 1);
-    let round = played.draw().unwrap().unwrap();
+    let mut tournament = SimulatedTournament::new(format, names(5), 1);
+    let round = tournament.draw().unwrap().unwrap();
     let written = serde_json::to_string(round).unwrap();
     assert_eq!(&read::<Round>(&written).unwrap(), round);
     assert!(

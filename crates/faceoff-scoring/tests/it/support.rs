@@ -8,7 +8,7 @@ pub fn team(name: &str) -> TeamName {
     name.parse().unwrap()
 }
 
-/// Reads a file as the command line does, so that errors name the place.
+/// Parses JSON like the command line, with paths in errors.
 pub fn read<T: serde::de::DeserializeOwned>(json: &str) -> Result<T, String> {
     let mut json = serde_json::Deserializer::from_str(json);
     serde_path_to_error::deserialize(&mut json).map_err(|error| error.to_string())
@@ -18,7 +18,7 @@ pub fn rows<'a>(golden: &'a Value, table: &str) -> &'a [Value] {
     golden[table].as_array().unwrap()
 }
 
-/// A blameless failed episode.
+/// A failed episode without violations.
 pub fn episode(task: Task, episode: u32) -> EpisodeOutcome {
     EpisodeOutcome {
         task,

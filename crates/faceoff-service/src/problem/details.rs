@@ -11,7 +11,7 @@ use serde_json::{Map, Value};
 use std::fmt::Display;
 use utoipa::ToSchema;
 
-/// One problem, ready to be sent.
+/// A problem, ready to be sent.
 #[derive(Debug, Clone)]
 pub struct Problem {
     kind: ProblemKind,
@@ -52,20 +52,20 @@ impl Problem {
         }
     }
 
-    /// With an extension member, for programs.
+    /// Adds an extension member, for API clients.
     #[must_use]
     pub fn with(mut self, name: &str, value: impl Into<Value>) -> Self {
         self.members.insert(name.to_owned(), value.into());
         self
     }
 
-    /// With a header of the answer.
+    /// Adds a header of the response.
     pub fn with_header(mut self, name: HeaderName, value: HeaderValue) -> Self {
         self.headers.push((name, value));
         self
     }
 
-    /// To be tried again after so many seconds.
+    /// Sets `Retry-After`, in seconds.
     pub fn retry_after(mut self, seconds: u64) -> Self {
         let value = (header::RETRY_AFTER, HeaderValue::from(seconds));
         self.headers
@@ -74,7 +74,7 @@ impl Problem {
         self
     }
 
-    /// Decides status, title and `type`.
+    /// The kind; it determines status, title and `type`.
     #[must_use]
     pub const fn kind(&self) -> ProblemKind {
         self.kind
@@ -86,8 +86,7 @@ impl Problem {
         &self.detail
     }
 
-    /// A `field` of the request whose value cannot be used; `detail` says what was expected and what
-    /// came.
+    /// A `field` of the request with an invalid value; `detail` says what was expected and what came.
     pub fn invalid(field: &str, detail: impl Display) -> Self {
         Self::invalid_text(field, &detail)
     }
@@ -96,23 +95,23 @@ impl Problem {
         Self::new(ProblemKind::InvalidContent, format!("{field}: {detail}")).with("field", field)
     }
 
-    /// Refuses what is not `confirmed` by the name of what it is about, and says what it would do.
-    pub fn check_confirmed(confirmed: Option<&str>, name: &str, what: &str) -> Result<(), Self> {
+    /// Refuses a request that is not confirmed with the `name` of the affected resource, and describes its `effect`.
+    pub fn check_confirmed(confirmed: Option<&str>, name: &str, effect: &str) -> Result<(), Self> {
         if confirmed == Some(name) {
             return Ok(());
         }
-        let detail = format!("nothing is done yet: {what}. To do it, send “confirm” with {name:?}");
+        let detail = format!("nothing is done yet: {effect}. To do it, send “confirm” with {name:?}");
         Err(Self::new(ProblemKind::NotConfirmed, detail).with("confirm", name))
     }
 
-    /// A file that is kept no more.
+    /// A file that was removed.
     pub fn removed(what: &str, removed: &Ruling) -> Self {
         let at = removed.at.strftime("%Y-%m-%d at %H:%M:%S UTC");
         let detail = format!("{what} was removed on {at} {}", removed.reason);
         Self::new(ProblemKind::Removed, detail).with("removed_at", removed.at.to_string())
     }
 
-    /// What would change the season of an archive.
+    /// A request that would change an archived season.
     pub fn archived(made_at: Timestamp, imported_at: Option<Timestamp>) -> Self {
         let shown = |at: Timestamp| at.strftime("%Y-%m-%d %H:%M UTC").to_string();
         let imported = imported_at.map_or_else(String::new, |at| {
@@ -121,8 +120,8 @@ impl Problem {
         Self::new(
             ProblemKind::ReadOnly,
             format!(
-                "this server shows the archive of a season as it was at {}{imported}: everything can be read, and nothing \
-                 changes any more",
+                "this server shows the archive of a season as of {}{imported}: everything can be read, but nothing can be \
+                 changed",
                 shown(made_at)
             ),
         )
@@ -130,7 +129,7 @@ impl Problem {
         .with("imported_at", imported_at.map(|at| at.to_string()))
     }
 
-    /// Our fault: `cause` goes to the log only.
+    /// A platform fault; `cause` is only logged.
     pub fn internal(cause: impl Display) -> Self {
         Self::logged(&cause)
     }
@@ -139,20 +138,20 @@ impl Problem {
         tracing::error!(%cause, "request failed");
         Self::new(
             ProblemKind::Internal,
-            "the server could not complete the request; nothing is wrong with what you sent. Try again; \
-             if it stays, send the organiser the x-request-id header of this answer",
+            "the server could not complete the request; your request is fine. Try again; if the error persists, send the \
+             header x-request-id of this response to an organiser",
         )
     }
 
-    /// No such `what` (or not the caller's: the two must look alike).
+    /// The resource does not exist, or is not the caller's: the two must be indistinguishable. `what` names its kind.
     pub fn not_found(what: &str) -> Self {
         Self::new(
             ProblemKind::NotFound,
-            format!("there is no such {what} of yours; check the id and the token's team"),
+            format!("you have no such {what}; check the id and the token's team"),
         )
     }
 
-    /// The headers of the answer.
+    /// Additional headers of the response.
     pub fn headers(&self) -> &[(HeaderName, HeaderValue)] {
         &self.headers
     }
@@ -162,7 +161,7 @@ impl Problem {
 #[derive(Serialize, ToSchema)]
 #[schema(as = Problem)]
 pub struct ProblemBody<'a> {
-    /// Kind of the problem, explained at that place of the server.
+    /// The kind of the problem; the server's page `/problems` explains it.
     #[schema(example = "/problems#day-has-cut")]
     r#type: String,
     /// The kind in a few words.
@@ -187,10 +186,10 @@ impl Problem {
         }
     }
 
-    /// The whole answer in bytes, for a connection that is closed before it has asked anything.
+    /// The complete HTTP/1.1 response in bytes, for a connection that is closed before its first request.
     pub fn as_http1(&self) -> Vec<u8> {
         let body = serde_json::to_string(&self.body()).unwrap_or_default();
-        let mut answer = format!(
+        let mut bytes = format!(
             "HTTP/1.1 {}\r\ncontent-type: {}\r\ncontent-length: {}\r\nconnection: close\r\n",
             self.kind.status(),
             Self::MEDIA_TYPE,
@@ -198,14 +197,14 @@ impl Problem {
         )
         .into_bytes();
         for (name, value) in &self.headers {
-            answer.extend_from_slice(name.as_str().as_bytes());
-            answer.extend_from_slice(b": ");
-            answer.extend_from_slice(value.as_bytes());
-            answer.extend_from_slice(b"\r\n");
+            bytes.extend_from_slice(name.as_str().as_bytes());
+            bytes.extend_from_slice(b": ");
+            bytes.extend_from_slice(value.as_bytes());
+            bytes.extend_from_slice(b"\r\n");
         }
-        answer.extend_from_slice(b"\r\n");
-        answer.extend_from_slice(body.as_bytes());
-        answer
+        bytes.extend_from_slice(b"\r\n");
+        bytes.extend_from_slice(body.as_bytes());
+        bytes
     }
 }
 

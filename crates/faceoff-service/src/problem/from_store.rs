@@ -12,8 +12,8 @@ impl From<StoreError> for Problem {
             StoreError::TeamNameTaken(name) => Self::new(
                 ProblemKind::TeamNameTaken,
                 format!(
-                    "a team named {name:?} exists already; choose another name, or make a new token \
-                     for it with POST /api/v1/teams/ID/token"
+                    "a team named {name:?} exists already; choose another name, or create a new token \
+                     for the team with POST /api/v1/teams/ID/token"
                 ),
             ),
             StoreError::StageNameTaken(name) => Self::new(
@@ -24,11 +24,11 @@ impl From<StoreError> for Problem {
                 ProblemKind::TournamentNameTaken,
                 format!("a tournament named {name:?} exists already; choose another name"),
             ),
-            StoreError::FreeGamesSpent { limit, used } => Self::new(
-                ProblemKind::FreeGamesSpent,
+            StoreError::GameQuotaExceeded { limit, used } => Self::new(
+                ProblemKind::DailyGameQuotaExceeded,
                 format!(
-                    "a team asks for at most {limit} games that do not count on a UTC day; yours has asked for {used} \
-                     today. Ask again after midnight UTC"
+                    "a team can request at most {limit} test and friendly games per UTC day; yours has requested {used} \
+                     today. Try again after midnight UTC"
                 ),
             )
             .with("limit", limit)
@@ -40,7 +40,7 @@ impl From<StoreError> for Problem {
             } => {
                 let shown = |at: Timestamp| at.strftime("%Y-%m-%d %H:%M:%S UTC").to_string();
                 let when = match closed_at {
-                    Some(at) => format!("closed at {}; no day of it starts any more", shown(at)),
+                    Some(at) => format!("closed at {}; no further day of it starts", shown(at)),
                     None => format!("opens at {}; no day of it starts before", shown(opens_at)),
                 };
                 Self::new(ProblemKind::StageNotOpen, format!("the stage {name:?} {when}"))
@@ -50,7 +50,7 @@ impl From<StoreError> for Problem {
             StoreError::Disqualified { at, reason } => Self::new(
                 ProblemKind::Disqualified,
                 format!(
-                    "the team was disqualified on {}: {reason}. It neither uploads nor plays; the organiser can \
+                    "the team was disqualified on {}: {reason}. It can neither upload nor be evaluated; an organiser can \
                      reinstate it",
                     at.strftime("%Y-%m-%d at %H:%M UTC")
                 ),
@@ -58,70 +58,70 @@ impl From<StoreError> for Problem {
             StoreError::Retired { at } => Self::new(
                 ProblemKind::Retired,
                 format!(
-                    "the team retired on {} and neither uploads nor plays; POST /api/v1/teams/ID/return lets it play \
-                     again",
+                    "the team retired on {} and can neither upload nor be evaluated; POST /api/v1/teams/ID/return undoes \
+                     this",
                     at.strftime("%Y-%m-%d at %H:%M UTC")
                 ),
             ),
-            StoreError::TermsOwed { version } => Self::new(
-                ProblemKind::TermsOwed,
+            StoreError::TermsNotAccepted { version } => Self::new(
+                ProblemKind::TermsNotAccepted,
                 format!(
-                    "nobody of the team has accepted version {version} of the terms (GET /api/v1/terms); a member does \
-                     so with POST /api/v1/terms/{version}/accept"
+                    "no member of the team has accepted version {version} of the terms (GET /api/v1/terms); a member accepts \
+                     it with POST /api/v1/terms/{version}/accept"
                 ),
             )
             .with("version", version),
-            error @ StoreError::Cleared { .. } => Self::new(ProblemKind::Gone, error.to_string()),
-            StoreError::PersonNameTaken(name) => Self::new(
-                ProblemKind::PersonNameTaken,
-                format!("a person named {name:?} exists already; choose another name"),
+            error @ StoreError::OutcomesRemoved { .. } => Self::new(ProblemKind::Gone, error.to_string()),
+            StoreError::UserNameTaken(name) => Self::new(
+                ProblemKind::UserNameTaken,
+                format!("a user named {name:?} exists already; choose another name"),
             ),
-            error @ StoreError::InvitationSpent(_) => {
-                Self::new(ProblemKind::InvitationSpent, error.to_string())
+            error @ StoreError::InvitationInvalid(_) => {
+                Self::new(ProblemKind::InvitationInvalid, error.to_string())
             }
-            error @ StoreError::DayHasCut { .. } => {
-                Self::new(ProblemKind::DayHasCut, error.to_string())
+            error @ StoreError::CutoffPassed { .. } => {
+                Self::new(ProblemKind::CutoffPassed, error.to_string())
             }
             StoreError::SeasonClosed { closed_at } => Self::new(
                 ProblemKind::SeasonClosed,
                 format!(
-                    "the season was closed on {} and its secret is public, so nothing more is uploaded \
-                     or evaluated; results and datasets stay",
+                    "the season was closed on {} and its secret is public, so nothing can be uploaded or evaluated any \
+                     more; results and datasets stay",
                     closed_at.strftime("%Y-%m-%d at %H:%M UTC")
                 ),
             )
             .with("closed_at", closed_at.to_string()),
-            error @ StoreError::FullDisk(_) => {
+            error @ StoreError::DiskFull(_) => {
                 tracing::warn!(%error, "the disk is full");
                 Self::new(
                     ProblemKind::StorageFull,
-                    "the server's disk is full, so that this could not be stored; nothing is wrong with what \
-                     you sent. Look whether it was done after all, and try again later",
+                    "the server's disk is full, so this could not be stored; your request is fine. Check whether it took \
+                     effect, and try again later",
                 )
             }
-            StoreError::DayQuotaSpent {
+            StoreError::DailyQuotaExceeded {
                 limit_bytes,
                 used_bytes,
                 bundle_bytes,
             } => Self::new(
-                ProblemKind::DayQuotaSpent,
+                ProblemKind::DailyUploadQuotaExceeded,
                 format!(
-                    "a team uploads at most {limit_bytes} bytes on a UTC day; yours has uploaded \
-                     {used_bytes} today, and this bundle has {bundle_bytes} or more. Send it after \
-                     midnight UTC, or leave out what the agent does not need to run"
+                    "a team can upload at most {limit_bytes} bytes per UTC day; yours has uploaded {used_bytes} today, and \
+                     this bundle has {bundle_bytes} or more. Upload it after midnight UTC, or leave out what the agent does \
+                     not need to run"
                 ),
             )
             .with("limit_bytes", limit_bytes)
             .with("used_bytes", used_bytes),
-            StoreError::StoredQuotaSpent {
+            StoreError::StorageQuotaExceeded {
                 limit_bytes,
                 used_bytes,
                 bundle_bytes,
             } => Self::new(
-                ProblemKind::StoredQuotaSpent,
+                ProblemKind::StorageQuotaExceeded,
                 format!(
-                    "at most {limit_bytes} bytes of bundles are kept for a team; {used_bytes} are kept of \
-                     yours, and this one has {bundle_bytes} or more. Ask the organiser for more room \
+                    "a team can store at most {limit_bytes} bytes of bundles; yours has stored {used_bytes}, and this bundle \
+                     has {bundle_bytes} or more. Delete old submissions, or ask an organiser for a higher quota \
                      (uploads.stored_bytes in the server's configuration)"
                 ),
             )
@@ -145,7 +145,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_cause_that_is_ours_stays_inside() {
+    fn internal_cause_is_not_disclosed() {
         let problem = Problem::from(StoreError::Artifacts("disk /dev/secret is full".into()));
         assert_eq!(problem.kind(), ProblemKind::Internal);
         assert!(!problem.detail().contains("secret"));

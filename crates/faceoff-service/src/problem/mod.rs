@@ -1,7 +1,7 @@
-//! Errors as the outside sees them: problem details (RFC 9457).
+//! Error responses: problem details (RFC 9457).
 //!
-//! Every problem says in `detail` what was expected, what came and what to do. Causes that are ours
-//! (database, disk) stay in the log; the outside gets the request's id to quote.
+//! `detail` says what was expected, what came and what to do. Internal causes (database, disk) stay in the log; the
+//! response contains the request's id for a report.
 
 mod details;
 mod from_store;

@@ -3,11 +3,11 @@ use faceoff_store::StoreError;
 use jiff::{Timestamp, tz::TimeZone};
 
 impl Problem {
-    /// Of what was asked for within a day's quota: if that is spent, it says when it begins anew, at midnight UTC.
-    pub fn of_day(error: StoreError, now: Timestamp) -> Self {
+    /// The problem of a store error. If a day's quota is used up, `Retry-After` is the time to midnight UTC.
+    pub fn with_quota_reset(error: StoreError, now: Timestamp) -> Self {
         let is_spent = matches!(
             error,
-            StoreError::DayQuotaSpent { .. } | StoreError::FreeGamesSpent { .. }
+            StoreError::DailyQuotaExceeded { .. } | StoreError::GameQuotaExceeded { .. }
         );
         let problem = Self::from(error);
         let tomorrow = now

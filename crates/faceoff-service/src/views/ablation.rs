@@ -1,4 +1,4 @@
-//! What each perturbation costs an agent.
+//! Ablations: what each perturbation costs an agent.
 
 use crate::{app::AppState, boxed, problem::Problem};
 use faceoff_api::views::{
@@ -10,21 +10,21 @@ use faceoff_store::{Ablation, AblationState};
 use faceoff_types::{Profile, RunId, SubmissionId, Task};
 use std::collections::BTreeMap;
 
-/// The newest ablation of a submission, if there was one.
+/// The newest ablation of a submission, if it has one.
 #[boxed]
 pub async fn newest(
     app: &AppState,
     submission: SubmissionId,
 ) -> Result<Option<AblationView>, Problem> {
     match app.store.newest_ablation(submission).await? {
-        Some(ablation) => of(app, ablation).await.map(Some),
+        Some(ablation) => build(app, ablation).await.map(Some),
         None => Ok(None),
     }
 }
 
-/// With its progress, or its effects.
+/// An ablation with its progress, or its effects.
 #[boxed]
-pub async fn of(app: &AppState, ablation: Ablation) -> Result<AblationView, Problem> {
+pub async fn build(app: &AppState, ablation: Ablation) -> Result<AblationView, Problem> {
     let status = match ablation.state {
         AblationState::Open {
             episodes_done,
@@ -55,19 +55,19 @@ pub async fn of(app: &AppState, ablation: Ablation) -> Result<AblationView, Prob
     })
 }
 
-/// Has the submission an ablation, whatever became of it?
+/// Whether the submission has an ablation, in any state.
 #[boxed]
 pub async fn exists(app: &AppState, submission: SubmissionId) -> Result<bool, Problem> {
     Ok(app.store.newest_ablation(submission).await?.is_some())
 }
 
-/// From the summaries of the profiles' runs.
+/// The effects of the profiles, from the summaries of their runs.
 async fn effects(
     app: &AppState,
     runs: BTreeMap<Profile, RunId>,
 ) -> Result<BTreeMap<Task, Vec<ProfileEffect>>, Problem> {
     let ids: Vec<_> = runs.values().copied().collect();
-    let summaries = app.summaries.of(&ids).await?;
+    let summaries = app.summaries.load(&ids).await?;
     let profiles: BTreeMap<_, _> = runs
         .into_iter()
         .filter_map(|(profile, run)| Some((profile, summaries.get(&run)?.as_ref())))

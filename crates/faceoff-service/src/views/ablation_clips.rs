@@ -1,4 +1,4 @@
-//! What replays of an ablation's episodes are drawn from: of those that do not end as in the ideal simulator.
+//! Clips of an ablation: of the episodes whose outcome differs from the ideal simulator's.
 
 use crate::{
     app::AppState,
@@ -12,37 +12,37 @@ use faceoff_store::Artifacts;
 use faceoff_types::{AblationId, Profile, SubmissionId, Task};
 use std::collections::BTreeMap;
 
-/// The clips that are kept of a submission's newest ablation.
+/// The stored clips of a submission's newest ablation.
 #[derive(Debug)]
 pub struct AblationClips {
-    /// `None` without one.
+    /// `None` if the submission has no ablation.
     ablation: Option<AblationId>,
-    /// Does the viewer see what was observed, commanded and timed, and the agent's faults?
-    pub sees_observed: bool,
+    /// Whether the viewer may see observations, actions, computation times and faults.
+    pub can_see_observations: bool,
 }
 
-/// An episode that ends otherwise with a perturbation than without any.
+/// An episode whose outcome under a perturbation differs from the ideal one.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Differing {
-    /// In the ideal simulator.
+pub struct DifferingEpisode {
+    /// The outcome in the ideal simulator.
     pub ideal: EpisodeLine,
     pub perturbed: EpisodeLine,
 }
 
-impl Differing {
-    /// The ideal one first.
+impl DifferingEpisode {
+    /// Both outcomes, the ideal one first.
     pub fn both(&self) -> [&EpisodeLine; 2] {
         [&self.ideal, &self.perturbed]
     }
 }
 
 impl AblationClips {
-    /// Of a submission, whether anything is kept or not.
+    /// The clips of a submission; it may have none.
     ///
     /// # Errors
     /// `NotFound` if there is no such submission.
     #[boxed]
-    pub async fn of(
+    pub async fn load(
         app: &AppState,
         viewer: Viewer,
         submission: SubmissionId,
@@ -51,56 +51,56 @@ impl AblationClips {
         let newest = app.store.newest_ablation(submission).await?;
         Ok(Self {
             ablation: newest.map(|ablation| ablation.id),
-            sees_observed: match viewer {
+            can_see_observations: match viewer {
                 Viewer::Organiser => true,
                 Viewer::Team(own) => own == team,
-                Viewer::Anybody => false,
+                Viewer::Visitor => false,
             },
         })
     }
 
-    /// `None` of a profile in which all episodes end as in the ideal one.
+    /// The clip file of a profile; `None` if all of its episodes end as in the ideal simulator.
     async fn find(&self, app: &AppState, profile: Profile) -> Result<Option<ClipFile>, Problem> {
         match self.ablation {
-            Some(id) => ClipFile::find(app, Artifacts::ablation_clips(id, profile)).await,
+            Some(id) => ClipFile::find(app, Artifacts::ablation_clips_key(id, profile)).await,
             None => Ok(None),
         }
     }
 
-    /// Those of a profile.
+    /// The clip file of a profile.
     ///
     /// # Errors
-    /// `NotFound` if none are kept of it.
+    /// `NotFound` if there is none.
     #[boxed]
-    pub async fn of_profile(&self, app: &AppState, profile: Profile) -> Result<ClipFile, Problem> {
+    pub async fn profile(&self, app: &AppState, profile: Profile) -> Result<ClipFile, Problem> {
         let file = self.find(app, profile).await?;
         file.ok_or_else(|| Problem::not_found("episode"))
     }
 
-    /// By profile, in order of task and number.
+    /// The differing episodes by profile, in order of task and number.
     ///
     /// # Errors
     /// An internal problem, if a file cannot be read.
     #[boxed]
-    pub async fn differing(
+    pub async fn differing_episodes(
         &self,
         app: &AppState,
-    ) -> Result<BTreeMap<Profile, Vec<Differing>>, Problem> {
+    ) -> Result<BTreeMap<Profile, Vec<DifferingEpisode>>, Problem> {
         let Some(ideal) = self.find(app, Profile::Ideal).await? else {
             return Ok(BTreeMap::new());
         };
-        let ideal = ideal.read(Pack::sheet).await?;
+        let ideal = ideal.read(Pack::clip_index).await?;
         let mut differing = BTreeMap::new();
         let all = Profile::ABLATION.into_iter();
         for profile in all.filter(|profile| *profile != Profile::Ideal) {
             let Some(file) = self.find(app, profile).await? else {
                 continue;
             };
-            let perturbed = file.read(Pack::sheet).await?.episodes;
+            let perturbed = file.read(Pack::clip_index).await?.episodes;
             let pairs = perturbed.into_iter().filter_map(|perturbed| {
                 let ideal = ideal.line(perturbed.task, perturbed.episode)?.clone();
-                let mut pair = Differing { ideal, perturbed };
-                if !self.sees_observed {
+                let mut pair = DifferingEpisode { ideal, perturbed };
+                if !self.can_see_observations {
                     pair.ideal.make_public();
                     pair.perturbed.make_public();
                 }
@@ -111,10 +111,10 @@ impl AblationClips {
         Ok(differing)
     }
 
-    /// An episode, read.
+    /// An episode with its decoded clips.
     ///
     /// # Errors
-    /// `NotFound` if it is not kept.
+    /// `NotFound` if it is not stored.
     #[boxed]
     pub async fn episode(
         &self,
@@ -123,7 +123,7 @@ impl AblationClips {
         task: Task,
         episode: u32,
     ) -> Result<Episode, Problem> {
-        let file = self.of_profile(app, profile).await?;
-        file.episode(task, episode, self.sees_observed).await
+        let file = self.profile(app, profile).await?;
+        file.episode(task, episode, self.can_see_observations).await
     }
 }

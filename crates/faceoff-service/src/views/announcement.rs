@@ -3,7 +3,7 @@
 use faceoff_api::views::announcement::{AnnouncementView, QuestionView, TermsView};
 use faceoff_store::{Announcement, Question, Terms};
 
-pub fn of(announcement: Announcement) -> AnnouncementView {
+pub fn view(announcement: Announcement) -> AnnouncementView {
     AnnouncementView {
         id: announcement.id,
         at: announcement.at,
@@ -12,11 +12,11 @@ pub fn of(announcement: Announcement) -> AnnouncementView {
     }
 }
 
-/// For somebody who may know who asks, or may not.
-pub fn question(question: Question, tells_team: bool) -> QuestionView {
+/// A question; `shows_team` if the viewer may know the asking team.
+pub fn question(question: Question, shows_team: bool) -> QuestionView {
     QuestionView {
         id: question.id,
-        team: question.team.filter(|_| tells_team),
+        team: question.team.filter(|_| shows_team),
         at: question.at,
         text: question.text,
         answered_at: question.answer.as_ref().map(|answer| answer.at),
@@ -28,7 +28,6 @@ pub fn question(question: Question, tells_team: bool) -> QuestionView {
     }
 }
 
-/// The terms.
 pub fn terms(terms: Terms) -> TermsView {
     TermsView {
         version: terms.version,

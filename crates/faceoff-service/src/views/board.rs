@@ -1,60 +1,61 @@
-//! Who stands where, and how sure that is.
+//! Boards: ranks of the teams, and their statistical uncertainty.
 
 use crate::{
     app::AppState,
     boxed,
     problem::{Problem, ProblemKind},
-    standing::Standing,
+    aggregated_rows::AggregatedRow,
     summaries::RunSummaries,
-    views::{division, finalised, ruling, sight::Sight, stage, standings, team},
+    views::{division, sign_off, ruling, visibility::Visibility, stage, board_rows, team},
 };
 use faceoff_api::{
     requests::{BoardBy, BoardQuery},
     views::{
         baseline::BaselineRow,
         board::{BoardRow, BoardView},
-        shown,
+        printable,
         task::TaskView,
     },
 };
 use faceoff_scoring::{
-    EpisodeSummary, Played, RankedEntry, SIGNIFICANCE, TIER_CHANGE_RESAMPLES, joined_summary,
+    EpisodeSummary, ComparedEvaluation, RankedEntry, SIGNIFICANCE, TIER_CHANGE_RESAMPLES, joined_summary,
     rank_groups,
 };
 use faceoff_store::{BoardRecord, BoardScope, Stage};
-use faceoff_types::{DivisionName, PerturbationSettings, Seed, StageId, Standings, Task};
+use faceoff_types::{DivisionName, PerturbationSettings, Seed, StageId, CountingResult, Task};
 use jiff::civil::Date;
 use std::sync::Arc;
 
-/// What a board ranks, whom, and by which of their results.
+/// What a board ranks: which task, teams and evaluations.
 #[derive(Debug, Clone, Default)]
-pub struct Whose {
-    /// One task; `None`: all of them together.
+pub struct BoardSelection {
+    /// `None`: all tasks together.
     pub task: Option<Task>,
-    /// The teams of one division; `None`: all teams.
+    /// `None`: the teams of all divisions.
     pub division: Option<DivisionName>,
-    /// In place of what the stage's standings say.
-    pub by: Option<Standings>,
+    /// Overrides the stage's `standings`.
+    pub by: Option<CountingResult>,
 }
 
-impl Whose {
+impl BoardSelection {
+    /// Whether the board ranks teams of this division.
     fn is_ranked(&self, division: Option<&DivisionName>) -> bool {
         self.division.is_none() || self.division.as_ref() == division
     }
 }
 
-/// Whose board a request asks for.
+/// The stage of a requested board.
 ///
 /// # Errors
-/// `Unauthenticated` or `Forbidden` if the viewer may not see the live one of a frozen stage.
+/// `Unauthenticated` or `Forbidden` if the viewer may not see the live board of a frozen stage.
 #[boxed]
-pub async fn stage_asked(
+pub async fn requested_stage(
     app: &AppState,
-    sight: &Sight,
+    visibility: &Visibility,
     (stage, live): (Option<StageId>, bool),
 ) -> Result<Stage, Problem> {
     if live {
-        sight.check_organiser("the board beyond the freeze")?;
+        visibility.check_organiser("the board beyond the freeze")?;
     }
     match stage {
         Some(id) => Ok(app.store.stage(id).await?),
@@ -62,16 +63,16 @@ pub async fn stage_asked(
     }
 }
 
-/// The board that a request asks for: the overall one, or that of one task.
+/// The requested board: the overall one, or that of one task.
 #[boxed]
-pub async fn asked(
+pub async fn query(
     app: &AppState,
-    sight: &Sight,
+    visibility: &Visibility,
     query: BoardQuery,
     task: Option<Task>,
 ) -> Result<BoardView, Problem> {
-    let stage = stage_asked(app, sight, (query.stage, query.live)).await?;
-    let frozen = sight.frozen(stage.id).cloned();
+    let stage = requested_stage(app, visibility, (query.stage, query.live)).await?;
+    let frozen = visibility.frozen(stage.id).cloned();
     let scope = BoardScope {
         until: frozen
             .as_ref()
@@ -85,7 +86,7 @@ pub async fn asked(
         None => app.store.board_revision_within(&stage, &scope).await?,
     };
     if let Some(day) = query.day
-        && !sight.is_hidden(stage.id)
+        && !visibility.is_hidden(stage.id)
     {
         let days = app.store.board_days(stage.id, revision, &scope).await?;
         check_has_results(day, &days)?;
@@ -94,48 +95,48 @@ pub async fn asked(
         Some(name) => Some(division::find(app, &name).await?),
         None => None,
     };
-    let whose = Whose {
+    let selection = BoardSelection {
         task,
         division,
-        by: query.by.map(BoardBy::standings),
+        by: query.by.map(BoardBy::counting_result),
     };
-    let board = of(app, sight, &stage, revision, whose, (&scope, Vec::new())).await?;
+    let board = build(app, visibility, &stage, revision, selection, (&scope, Vec::new())).await?;
     Ok(BoardView {
-        frozen: frozen.map(ruling::of),
+        frozen: frozen.map(ruling::view),
         ..board
     })
 }
 
-/// The board of a stage by one revision of its rules within a scope, with results that are taken as if they counted
-/// beside it. A constant number of reads, however many teams there are.
+/// The board of a stage under one revision of its rules, from the results within `scope` and from `extra` results that
+/// are treated as if they counted. The number of database reads does not depend on the number of teams.
 #[boxed]
-pub async fn of(
+pub async fn build(
     app: &AppState,
-    sight: &Sight,
+    visibility: &Visibility,
     stage: &Stage,
     number: u32,
-    whose: Whose,
-    (scope, beside): (&BoardScope, Vec<BoardRecord>),
+    selection: BoardSelection,
+    (scope, extra): (&BoardScope, Vec<BoardRecord>),
 ) -> Result<BoardView, Problem> {
     let mut revisions = app.store.stage_revisions(stage.id).await?.into_iter();
     let Some(revision) = revisions.find(|revision| revision.number == number) else {
         return Err(Problem::not_found("revision of the stage's rules"));
     };
     let mut disqualified = team::all(app).await?;
-    match &stage.finalised {
+    match &stage.sign_off {
         None => disqualified.retain(|team| team.disqualified.is_some()),
         Some(finalised) => disqualified.retain(|team| finalised.without.contains(&team.id)),
     }
-    disqualified.retain(|team| whose.is_ranked(team.division.as_ref()));
+    disqualified.retain(|team| selection.is_ranked(team.division.as_ref()));
     let variation = revision.rules.variation;
-    let rows_by = match whose.by {
+    let rows_by = match selection.by {
         Some(by) => by,
-        None => standings::within(app, stage, scope).await?,
+        None => board_rows::counting_result(app, stage, scope).await?,
     };
-    let (rows, baselines) = if sight.is_hidden(stage.id) {
+    let (rows, baselines) = if visibility.is_hidden(stage.id) {
         Default::default()
     } else {
-        ranked_rows(app, stage, number, (scope, beside), rows_by, &whose).await?
+        ranked_rows(app, stage, number, (scope, extra), rows_by, &selection).await?
     };
     Ok(BoardView {
         stage: stage.id,
@@ -151,10 +152,10 @@ pub async fn of(
         rows_by,
         day: scope.until_day,
         blind: stage.settings.blind,
-        provisional: stage.finalised.is_none(),
-        finalised: stage.finalised.clone().map(finalised::of),
-        task: whose.task,
-        division: whose.division,
+        provisional: stage.sign_off.is_none(),
+        finalised: stage.sign_off.clone().map(sign_off::view),
+        task: selection.task,
+        division: selection.division,
         significance: SIGNIFICANCE,
         tier_change_resamples: TIER_CHANGE_RESAMPLES,
         frozen: None,
@@ -164,84 +165,87 @@ pub async fn of(
     })
 }
 
-/// Refuses a day without a result, of days with one, the last of which is no later than it.
+/// Refuses a day without results. `days` are the days with results up to this one.
 fn check_has_results(day: Date, days: &[Date]) -> Result<(), Problem> {
     let why = match days.last() {
         Some(last) if *last == day => return Ok(()),
-        Some(last) => format!("the one before it that has some is {last}"),
-        None => "none before it has one either".to_owned(),
+        Some(last) => format!("the last earlier day with results is {last}"),
+        None => "no earlier day has results".to_owned(),
     };
     Err(Problem::new(
         ProblemKind::NotFound,
         format!(
-            "{day} has no result on this board, and {why}; GET /api/v1/board/history lists all days that have results"
+            "{day} has no results on this board; {why}; GET /api/v1/board/history lists all days with results"
         ),
     ))
 }
 
-/// The rows of a board in their order, with what tells them apart, and the baselines.
+/// The rows of a board in board order with their rank groups, and the baselines.
 async fn ranked_rows(
     app: &AppState,
     stage: &Stage,
     revision: u32,
     results: (&BoardScope, Vec<BoardRecord>),
-    rows_by: Standings,
-    whose: &Whose,
+    rows_by: CountingResult,
+    selection: &BoardSelection,
 ) -> Result<(Vec<BoardRow>, Vec<BaselineRow>), Problem> {
-    let task = whose.task;
-    let mut rows = standings::rows(app, stage, revision, results, rows_by, task).await?;
+    let task = selection.task;
+    let mut rows = board_rows::rows(app, stage, revision, results, rows_by, task).await?;
     rows.retain(|row| {
         let team = &row.record.team;
-        team.is_baseline || whose.is_ranked(team.profile.division.as_ref())
+        team.is_baseline || selection.is_ranked(team.profile.division.as_ref())
     });
     let runs: Vec<_> = rows.iter().flat_map(|row| row.runs.clone()).collect();
-    let summaries = app.summaries.of(&runs).await?;
+    let summaries = app.summaries.load(&runs).await?;
     let mismatch_seed = app.store.season().await?.secret.model_mismatch();
     let rows: Vec<Row> = rows
         .into_iter()
-        .map(|standing| Row::of(standing, &summaries))
+        .map(|aggregated| Row::new(aggregated, &summaries))
         .collect::<Result<_, _>>()?;
-    let all = standings::ranked(rows, task, |row| &row.standing.record);
+    let all = board_rows::rank(rows, task, |row| &row.aggregated.record);
     let (ranked, baselines) =
-        standings::apart(all, |row: &Row| row.standing.record.team.is_baseline);
+        board_rows::split_baselines(all, |row: &Row| row.aggregated.record.team.is_baseline);
     let groups = rank_groups(&ranked, |leader, row| {
-        let [leader, row] = [leader, row].map(|row| row.played(mismatch_seed));
-        Ok::<_, Problem>(leader.told_apart(&row, task))
+        let [leader, row] = [leader, row].map(|row| row.to_compared(mismatch_seed));
+        Ok::<_, Problem>(leader.differs_significantly(&row, task))
     })?;
     let rows = ranked.into_iter().zip(groups);
     let rows = rows.map(|(ranked, rank_group)| row(ranked, rank_group, task));
-    // They are in no group.
+    // Baselines have no rank group.
     let baselines = baselines.into_iter().map(|ranked| row(ranked, 0, task));
     Ok((rows.collect(), baselines.map(baseline).collect()))
 }
 
-/// A row with its episodes.
+/// A row with the summary of its episodes.
 struct Row {
-    standing: Standing,
+    aggregated: AggregatedRow,
     summary: Arc<EpisodeSummary>,
 }
 
 impl Row {
-    fn of(standing: Standing, summaries: &RunSummaries) -> Result<Self, Problem> {
-        let days = standing.runs.iter().map(|run| {
+    fn new(aggregated: AggregatedRow, summaries: &RunSummaries) -> Result<Self, Problem> {
+        let days = aggregated.runs.iter().map(|run| {
             let summary = summaries.get(run);
             summary.ok_or_else(|| Problem::internal(format_args!("run {run} has no summary")))
         });
         let days: Vec<&Arc<EpisodeSummary>> = days.collect::<Result<_, _>>()?;
         let summary = match days[..] {
-            [one] => Arc::clone(one),
+            [day] => Arc::clone(day),
             _ => {
                 let days: Vec<&EpisodeSummary> = days.iter().map(|day| &***day).collect();
                 Arc::new(joined_summary(&days))
             }
         };
-        Ok(Self { standing, summary })
+        Ok(Self {
+            aggregated,
+            summary,
+        })
     }
 
-    /// As comparisons need it.
-    fn played(&self, mismatch_seed: Seed) -> Played<'_> {
-        let result = &self.standing.record.result;
-        Played {
+    /// The row as comparisons need it.
+    fn to_compared(&self, mismatch_seed: Seed) -> ComparedEvaluation<'_> {
+        let result = &self.aggregated.record.result;
+        ComparedEvaluation {
             ruleset: &result.ruleset,
             profile: result.profile,
             variation: &result.variation,
@@ -255,11 +259,11 @@ impl Row {
 fn row(ranked: RankedEntry<Row>, rank_group: u32, task: Option<Task>) -> BoardRow {
     let RankedEntry { rank, tier, entry } = ranked;
     let (row, result) = (entry.key, entry.result);
-    let Standing {
+    let AggregatedRow {
         record,
         evaluations,
         ..
-    } = row.standing;
+    } = row.aggregated;
     let released = record.released_at.is_some();
     let is_mean = evaluations.len() > 1;
     BoardRow {
@@ -270,7 +274,7 @@ fn row(ranked: RankedEntry<Row>, rank_group: u32, task: Option<Task>) -> BoardRo
         team: record.team.name,
         team_id: record.team.id,
         division: record.team.profile.division,
-        agent: record.agent_name.map(shown),
+        agent: record.agent_name.map(printable),
         evaluation: record.evaluation,
         evaluations,
         day: record.day,
@@ -290,7 +294,7 @@ fn row(ranked: RankedEntry<Row>, rank_group: u32, task: Option<Task>) -> BoardRo
     }
 }
 
-/// Of a row whose rank is the one that it would take.
+/// The row of a baseline; `row.rank` is the rank that it would have.
 fn baseline(row: BoardRow) -> BaselineRow {
     BaselineRow {
         would_rank: row.rank,

@@ -1,12 +1,12 @@
-//! Whether a day fits: what its teams play against the slots and the time that there are.
+//! Capacity forecast: whether the evaluations of a day fit into the slots and the time available.
 
 use crate::{app::AppState, boxed, config::Capacity, problem::Problem};
 use faceoff_api::views::capacity::{CapacityView, DayLoad, Fit};
-use faceoff_store::{Measured, OpenWork, Stage, Store, StoreError};
+use faceoff_store::{JobDurations, EvaluationBacklog, Stage, Store, StoreError};
 use faceoff_types::{StageId, TeamId};
 use jiff::{Timestamp, civil::Date};
 
-/// What there is to play, whoever plays it.
+/// Remaining work of a day, independent of the number of slots.
 struct Load {
     day: Date,
     is_under_way: bool,
@@ -14,7 +14,7 @@ struct Load {
     episodes: u32,
     expected_ms: Option<f64>,
     longest_s: f64,
-    /// With the hours until then.
+    /// The deadline, and the hours until then.
     deadline: Option<(Timestamp, f64)>,
 }
 
@@ -46,13 +46,18 @@ fn day_load(load: &Load, slots: u32) -> DayLoad {
         fit,
         summary: String::new(),
     };
-    view.summary = in_words(&view);
+    view.summary = summary(&view);
     view
 }
 
-fn in_words(day: &DayLoad) -> String {
-    let whose = match (day.is_under_way, day.teams) {
-        (true, 0) => return format!("{}: all is played, scores are computed.", day.day),
+fn summary(day: &DayLoad) -> String {
+    let teams = match (day.is_under_way, day.teams) {
+        (true, 0) => {
+            return format!(
+                "{}: all episodes are done, scores are being computed.",
+                day.day
+            );
+        }
         (false, 0) => return format!("{}: no team has a valid submission yet.", day.day),
         (true, 1) => "1 team has".to_owned(),
         (true, teams) => format!("{teams} teams have"),
@@ -60,32 +65,28 @@ fn in_words(day: &DayLoad) -> String {
         (false, teams) => format!("{teams} teams would have"),
     };
     let expected = match day.expected_hours {
-        Some(hours) => format!("{hours:.1} hours expected, by what such episodes took of late"),
-        None => {
-            "nobody can tell how long it takes, since nothing was measured in the last seven days"
-                .to_owned()
-        }
+        Some(hours) => format!("{hours:.1} hours expected, as measured in the last seven days"),
+        None => "duration unknown (nothing measured in the last seven days)".to_owned(),
     };
     let load = format!(
-        "{}: {whose} {} episodes to play: {expected}; {:.1} hours if every agent uses up its time",
+        "{}: {teams} {} episodes to run: {expected}; at most {:.1} hours, if every agent uses up its time",
         day.day, day.episodes, day.worst_case_hours
     );
     let Some(available) = day.hours_until_deadline else {
-        return format!("{load}. The day has no deadline: however long it takes.");
+        return format!("{load}. No deadline.");
     };
     let advice = "more slots, fewer episodes or a later deadline (day_deadline) would help";
     match day.fit {
         Fit::Surely => format!("{load}. The day has {available:.1} hours: it fits."),
         Fit::Probably => format!(
-            "{load}. The day has {available:.1} hours: it probably fits, but agents that use up their time \
-             could keep it from that."
+            "{load}. The day has {available:.1} hours: it probably fits, unless agents use up their time."
         ),
         Fit::Unknown => format!(
-            "{load}. The day has {available:.1} hours: slow agents may not be played to their end; {advice}."
+            "{load}. The day has {available:.1} hours: evaluations of slow agents may not finish; {advice}."
         ),
         Fit::Not => format!(
-            "{load}. The day has {available:.1} hours: it does not fit, and what is left at the deadline is ended \
-             as not played; {advice}."
+            "{load}. The day has {available:.1} hours: it does not fit, and evaluations that are not finished at the \
+             deadline do not count; {advice}."
         ),
     }
 }
@@ -95,7 +96,7 @@ fn next_load(
     day: Date,
     cut_at: Timestamp,
     teams: &[TeamId],
-    measured: &Measured,
+    measured: &JobDurations,
     capacity: &Capacity,
 ) -> Load {
     let plan = stage.plan();
@@ -109,7 +110,7 @@ fn next_load(
     let expected = teams
         .iter()
         .map(|team| Some(measured.episode_ms_of(*team)? * f64::from(episodes)));
-    let each_s = capacity.time.longest_s(episodes, shards, plan.max_faults);
+    let each_s = capacity.time.max_slot_time_s(episodes, shards, plan.max_faults);
     Load {
         day,
         is_under_way: false,
@@ -125,39 +126,39 @@ fn next_load(
 
 fn open_load(
     day: &faceoff_store::Day,
-    work: &[OpenWork],
+    work: &[EvaluationBacklog],
     capacity: &Capacity,
     now: Timestamp,
 ) -> Load {
-    let of_day = || {
+    let day_backlog = || {
         work.iter()
-            .filter(|work| work.of == day.of && work.episodes > 0)
+            .filter(|work| work.stage_day == day.stage_day && work.episodes > 0)
     };
-    let longest_s = |work: &OpenWork| {
+    let longest_s = |work: &EvaluationBacklog| {
         capacity
             .time
-            .longest_s(work.episodes, work.shards, work.max_faults)
+            .max_slot_time_s(work.episodes, work.shards, work.max_faults)
     };
     Load {
-        day: day.of.date,
+        day: day.stage_day.date,
         is_under_way: true,
-        teams: u32::try_from(of_day().count()).unwrap_or(u32::MAX),
-        episodes: of_day().map(|work| work.episodes).sum(),
-        expected_ms: of_day().map(|work| work.expected_ms).sum(),
-        longest_s: of_day().map(longest_s).sum(),
+        teams: u32::try_from(day_backlog().count()).unwrap_or(u32::MAX),
+        episodes: day_backlog().map(|work| work.episodes).sum(),
+        expected_ms: day_backlog().map(|work| work.expected_ms).sum(),
+        longest_s: day_backlog().map(longest_s).sum(),
         deadline: day.deadline_at.map(|at| (at, hours(now, at).max(0.0))),
     }
 }
 
-/// As things are now.
+/// The forecast at the current time.
 #[boxed]
-pub async fn of(app: &AppState, id: StageId) -> Result<CapacityView, Problem> {
+pub async fn build(app: &AppState, id: StageId) -> Result<CapacityView, Problem> {
     let now = app.config.clock.now();
     let forecast = forecast(&app.store, &app.config.capacity, id, now);
     Ok(forecast.await?)
 }
 
-/// As things are at `now`.
+/// The forecast at `now`.
 #[boxed]
 pub async fn forecast(
     store: &Store,
@@ -166,29 +167,29 @@ pub async fn forecast(
     now: Timestamp,
 ) -> Result<CapacityView, StoreError> {
     let stage = store.stage(id).await?;
-    let (work, measured) = store.open_work(now).await?;
-    let under_way = store.days_under_way(id).await?;
+    let (work, measured) = store.evaluation_backlog(now).await?;
+    let under_way = store.unreleased_days(id).await?;
     let mut loads: Vec<Load> = under_way
         .iter()
         .map(|day| open_load(day, &work, capacity, now))
         .collect();
     let newest = store.newest_day(id).await?;
     let season_is_open = store.season().await?.closed_at.is_none();
-    let next = stage.next_cut(newest.map(|day| day.of.date), now);
+    let next = stage.next_cutoff(newest.map(|day| day.stage_day.date), now);
     if let Some((day, at)) = next.filter(|_| season_is_open) {
         let mut active = store.active_submissions().await?;
-        active.retain(|submission| stage.check_takes(submission).is_ok());
+        active.retain(|submission| stage.check_accepts(submission).is_ok());
         let teams: Vec<TeamId> = active.iter().map(|submission| submission.team).collect();
-        let cut_at = at.unwrap_or(now).max(now);
-        loads.push(next_load(&stage, day, cut_at, &teams, &measured, capacity));
+        let cutoff_at = at.unwrap_or(now).max(now);
+        loads.push(next_load(&stage, day, cutoff_at, &teams, &measured, capacity));
     }
-    let slots = capacity.slots + store.workers().slots(now);
-    let of_load = |load: &Load| day_load(load, slots);
+    let slots = capacity.slots + store.workers().available_slots(now);
+    let to_day_load = |load: &Load| day_load(load, slots);
     Ok(CapacityView {
         stage: stage.id,
         stage_name: stage.name.clone(),
         slots,
-        days: loads.iter().map(of_load).collect(),
+        days: loads.iter().map(to_day_load).collect(),
     })
 }
 
@@ -211,7 +212,7 @@ mod tests {
     }
 
     #[test]
-    fn a_day_fits_surely_probably_or_not_and_says_so() {
+    fn fit_and_summary_follow_from_hours() {
         for (expected, worst, available, fit, words) in [
             (Some(10.0), 20.0, Some(24.0), Fit::Surely, "it fits"),
             (None, 20.0, Some(24.0), Fit::Surely, "it fits"),
@@ -223,8 +224,14 @@ mod tests {
                 "probably fits",
             ),
             (Some(30.0), 400.0, Some(24.0), Fit::Not, "does not fit"),
-            (None, 400.0, Some(24.0), Fit::Unknown, "nobody can tell"),
-            (Some(30.0), 400.0, None, Fit::Surely, "no deadline"),
+            (
+                None,
+                400.0,
+                Some(24.0),
+                Fit::Unknown,
+                "duration unknown",
+            ),
+            (Some(30.0), 400.0, None, Fit::Surely, "No deadline"),
         ] {
             let load = load(expected, worst, available);
             assert_eq!(load.fit, fit, "{}", load.summary);

@@ -1,50 +1,50 @@
-//! A file of clips among the artifacts.
+//! Clip files: recorded motion and observations, stored as artifacts.
 
 use crate::{app::AppState, boxed, problem::Problem};
 use faceoff_replay::{Clip, EpisodeLine, Key, Pack, ReplayError};
 use faceoff_types::Task;
 use std::path::PathBuf;
 
-/// All that is shown of an episode.
+/// An episode, as far as the viewer may see it.
 pub struct Episode {
-    /// What it came to.
+    /// Its outcome.
     pub line: EpisodeLine,
-    /// Are there the episodes of the task before and after it?
+    /// Whether the task has an episode before it.
     pub has_before: bool,
-    /// Is there one after it?
+    /// Whether the task has an episode after it.
     pub has_after: bool,
     pub motion: Clip,
-    /// For whoever gets the dataset.
+    /// Observations and actions; `None` without access to the dataset.
     pub observed: Option<Clip>,
 }
 
-/// A file of clips among the artifacts.
+/// A clip file.
 #[derive(Debug)]
 pub struct ClipFile {
-    /// Its name among the artifacts, which is never another's.
+    /// Its artifact key; never reused for another file.
     pub key: String,
     path: PathBuf,
 }
 
 impl ClipFile {
-    /// `None` if it is not kept.
+    /// The clip file with this key; `None` if there is none.
     ///
     /// # Errors
-    /// An internal problem, if nobody can tell.
+    /// `Internal` if the artifacts cannot be read.
     #[boxed]
     pub async fn find(app: &AppState, key: String) -> Result<Option<Self>, Problem> {
         let artifacts = app.store.artifacts();
-        if artifacts.bytes_of(&key).await?.is_none() {
+        if artifacts.size_bytes(&key).await?.is_none() {
             return Ok(None);
         }
-        let path = artifacts.path_of(&key).map_err(Problem::internal)?;
+        let path = artifacts.local_path(&key).map_err(Problem::internal)?;
         Ok(Some(Self { key, path }))
     }
 
-    /// Opens it beside the handlers of other requests.
+    /// Reads the file on a blocking thread.
     ///
     /// # Errors
-    /// An internal problem, if it cannot be read.
+    /// `Internal` if it cannot be read.
     pub async fn read<T: Send + 'static>(
         &self,
         read: impl FnOnce(&Pack) -> Result<T, ReplayError> + Send + 'static,
@@ -66,7 +66,7 @@ impl ClipFile {
         clip.ok_or_else(|| Problem::not_found("episode"))
     }
 
-    /// An episode, read, as somebody sees it who gets the dataset, or everybody.
+    /// An episode with its decoded clips; observations and faults only if `can_see_observations`.
     ///
     /// # Errors
     /// `NotFound` if there is no such episode.
@@ -75,30 +75,30 @@ impl ClipFile {
         &self,
         task: Task,
         episode: u32,
-        sees_observed: bool,
+        can_see_observations: bool,
     ) -> Result<Episode, Problem> {
         let read = move |pack: &Pack| {
-            let sheet = pack.sheet()?;
+            let index = pack.clip_index()?;
             let clip = |key| -> Result<Option<Clip>, ReplayError> {
                 let bytes = pack.clip(key)?;
                 bytes.map(|bytes| Clip::read(&bytes)).transpose()
             };
-            let line = sheet.line(task, episode);
+            let line = index.line(task, episode);
             let Some((line, motion)) = line.zip(clip(Key::motion(task, episode))?) else {
                 return Ok(None);
             };
-            let has =
-                |other: Option<u32>| other.is_some_and(|other| sheet.line(task, other).is_some());
+            let exists =
+                |other: Option<u32>| other.is_some_and(|other| index.line(task, other).is_some());
             let mut line = line.clone();
-            if !sees_observed {
+            if !can_see_observations {
                 line.make_public();
             }
             Ok(Some(Episode {
                 line,
-                has_before: has(episode.checked_sub(1)),
-                has_after: has(episode.checked_add(1)),
+                has_before: exists(episode.checked_sub(1)),
+                has_after: exists(episode.checked_add(1)),
                 motion,
-                observed: match sees_observed {
+                observed: match can_see_observations {
                     true => clip(Key::observed(task, episode))?,
                     false => None,
                 },

@@ -1,18 +1,18 @@
-//! What replays of an evaluation's episodes are drawn from. The motion, and how each episode went, are there for everybody once the
-//! day is released; what the agent was told and commanded, its times and its faults for whoever gets the dataset.
+//! Clips of an evaluation. Motion and outcomes are public once the day is released. Observations, actions, computation
+//! times and faults need access to the dataset.
 
 use crate::{
     app::AppState,
-    archived, boxed,
+    archive_contents, boxed,
     problem::{Problem, ProblemKind},
     release::check_released,
     views::{
         clip_file::{ClipFile, Episode},
-        sight::Sight,
+        visibility::Visibility,
     },
 };
 use faceoff_api::views::clips::{EpisodesView, TimeBinView};
-use faceoff_replay::{EpisodeLine, Key, Pack, Sheet};
+use faceoff_replay::{EpisodeLine, Key, Pack, ClipIndex};
 use faceoff_store::{Artifacts, Evaluation, EvaluationState};
 use faceoff_types::{EvaluationId, Task};
 use std::collections::BTreeMap;
@@ -21,48 +21,48 @@ use std::collections::BTreeMap;
 #[derive(Debug)]
 pub struct Clips {
     pub evaluation: Evaluation,
-    /// Does the viewer see what was observed, commanded and timed, and the agent's faults?
-    pub sees_observed: bool,
+    /// Whether the viewer may see observations, actions, computation times and faults.
+    pub can_see_observations: bool,
     pub file: ClipFile,
 }
 
 impl Clips {
-    /// Of an evaluation, if the viewer may see it now.
+    /// The clips of an evaluation, if the viewer may see them now.
     ///
     /// # Errors
-    /// `NotFound`, `NotYet`, `Blind`; `Gone` once the dataset was removed; `Conflict` for one without a result, or one that an
-    /// older version of the server has played.
+    /// `NotFound`, `NotYet`, `Blind`; `Removed` once the dataset was removed; `Conflict` without a result, and for
+    /// evaluations by an older version of the server.
     #[boxed]
-    pub async fn of(app: &AppState, sight: &Sight, id: EvaluationId) -> Result<Self, Problem> {
+    pub async fn find(app: &AppState, visibility: &Visibility, id: EvaluationId) -> Result<Self, Problem> {
         let evaluation = app.store.evaluation(id).await?;
-        sight.check_shown(evaluation.of.stage)?;
+        visibility.check_not_blind(evaluation.stage_day.stage)?;
         let EvaluationState::Finished { dataset, .. } = &evaluation.state else {
             return Err(Problem::new(
                 ProblemKind::Conflict,
-                "the evaluation has no result, and its episodes are shown with it",
+                "the evaluation has no result yet; its episodes become visible with the result",
             ));
         };
         check_released(app, &evaluation).await?;
-        if !sight.is_own(&evaluation) {
-            sight.check_not_frozen(&evaluation, "shown")?;
+        if !visibility.is_own(&evaluation) {
+            visibility.check_not_frozen(&evaluation, "shown")?;
         }
         if let Some(removed) = &evaluation.dataset_removed {
             return Err(Problem::removed(
-                "the recording, with the replays that are drawn from it,",
+                "the recording and its replays",
                 removed,
             ));
         }
-        archived::check_kept(app, dataset, "recording").await?;
-        let key = Artifacts::clips_of(dataset);
+        archive_contents::check_included(app, dataset, "recording").await?;
+        let key = Artifacts::clips_key(dataset);
         let file = ClipFile::find(app, key).await?.ok_or_else(|| {
             Problem::new(
                 ProblemKind::Conflict,
-                "there are no replays of this evaluation: the version of the server that played it made none. Its \
-                 dataset has the episodes, and `faceoff replay` draws them",
+                "there are no replays of this evaluation: the server version that ran it did not record any. Download its \
+                 dataset; `faceoff replay` shows the episodes",
             )
         })?;
         Ok(Self {
-            sees_observed: sight.is_own(&evaluation) || sight.is_public(&evaluation),
+            can_see_observations: visibility.is_own(&evaluation) || visibility.is_public(&evaluation),
             file,
             evaluation,
         })
@@ -77,39 +77,39 @@ impl Clips {
         self.file.clip(key).await
     }
 
-    /// An episode, read.
+    /// An episode with its decoded clips.
     ///
     /// # Errors
     /// `NotFound` if there is no such episode.
     #[boxed]
     pub async fn episode(&self, task: Task, episode: u32) -> Result<Episode, Problem> {
-        self.file.episode(task, episode, self.sees_observed).await
+        self.file.episode(task, episode, self.can_see_observations).await
     }
 
-    /// By task how many control steps were answered in which time; empty for whom that is not.
+    /// Histogram of computation times by task; empty without access to the dataset.
     ///
     /// # Errors
-    /// An internal problem, if the file cannot be read.
+    /// `Internal` if the file cannot be read.
     #[boxed]
     pub async fn computation_times(&self) -> Result<BTreeMap<Task, Vec<TimeBinView>>, Problem> {
-        match self.sees_observed {
+        match self.can_see_observations {
             true => Ok(self.episodes().await?.computation_times),
             false => Ok(BTreeMap::new()),
         }
     }
 
-    /// How the episodes went.
+    /// The outcomes of all episodes.
     ///
     /// # Errors
-    /// An internal problem, if the file cannot be read.
+    /// `Internal` if the file cannot be read.
     #[boxed]
     pub async fn episodes(&self) -> Result<EpisodesView, Problem> {
-        let Sheet {
+        let ClipIndex {
             mut episodes,
             times,
             ..
-        } = self.file.read(Pack::sheet).await?;
-        if !self.sees_observed {
+        } = self.file.read(Pack::clip_index).await?;
+        if !self.can_see_observations {
             episodes.iter_mut().for_each(EpisodeLine::make_public);
         }
         let bins = |(task, times): (Task, faceoff_replay::TimeBins)| {
@@ -125,7 +125,7 @@ impl Clips {
         };
         Ok(EpisodesView {
             episodes,
-            computation_times: match self.sees_observed {
+            computation_times: match self.can_see_observations {
                 true => times.into_iter().map(bins).collect(),
                 false => BTreeMap::new(),
             },

@@ -1,22 +1,22 @@
-//! Whether one of two agents is better, by the episodes that both played.
+//! Paired comparison of two evaluations on the same episodes.
 
 use crate::{
     app::AppState,
     boxed,
     problem::{Problem, ProblemKind},
     release::check_released,
-    views::sight::Sight,
+    views::visibility::Visibility,
 };
 use faceoff_api::{
     requests::ComparisonQuery,
     views::comparison::{ComparedView, ComparisonView},
 };
-use faceoff_scoring::{Comparison, EpisodeSummary, NotPaired, Played};
+use faceoff_scoring::{Comparison, EpisodeSummary, NotComparable, ComparedEvaluation};
 use faceoff_store::{Evaluation, EvaluationState, StoreError};
 use faceoff_types::{EvaluationId, EvaluationResult, Seed};
 use std::sync::Arc;
 
-/// A finished evaluation with what a comparison needs.
+/// A finished evaluation with the data for a comparison.
 struct Side {
     evaluation: Evaluation,
     result: Box<EvaluationResult>,
@@ -24,7 +24,7 @@ struct Side {
 }
 
 impl Side {
-    async fn load(app: &AppState, sight: &Sight, id: EvaluationId) -> Result<Self, Problem> {
+    async fn load(app: &AppState, visibility: &Visibility, id: EvaluationId) -> Result<Self, Problem> {
         let evaluation = app
             .store
             .evaluation(id)
@@ -36,26 +36,25 @@ impl Side {
                 ),
                 error => error.into(),
             })?;
-        sight.check_shown(evaluation.of.stage)?;
+        visibility.check_not_blind(evaluation.stage_day.stage)?;
         let EvaluationState::Finished { result, .. } = &evaluation.state else {
             return Err(Problem::new(
                 ProblemKind::Conflict,
                 format!(
-                    "evaluation {id} has no result, so there is nothing to compare; only finished \
-                     evaluations are compared"
+                    "evaluation {id} has no result; only finished evaluations can be compared"
                 ),
             ));
         };
         let result = result.clone();
         Ok(Self {
-            summary: app.summaries.of_run(evaluation.run).await?,
+            summary: app.summaries.load_run(evaluation.run).await?,
             evaluation,
             result,
         })
     }
 
-    fn played(&self, mismatch_seed: Seed) -> Played<'_> {
-        Played {
+    fn to_compared(&self, mismatch_seed: Seed) -> ComparedEvaluation<'_> {
+        ComparedEvaluation {
             ruleset: &self.result.ruleset,
             profile: self.result.profile,
             variation: &self.result.variation,
@@ -76,34 +75,34 @@ impl Side {
 /// Compares two finished evaluations.
 ///
 /// # Errors
-/// `NotFound`, `Conflict` while one has no result, `Blind` and `NotYet` before their stage is opened and their day released,
-/// `NotPaired` when they did not play the same episodes.
+/// `NotFound`; `Conflict` while one has no result; `Blind` until their stage is revealed; `NotYet` until their day is
+/// released; `NotComparable` if their episodes differ.
 #[boxed]
-pub async fn of(
+pub async fn compare(
     app: &AppState,
-    sight: &Sight,
+    visibility: &Visibility,
     [a, b]: [EvaluationId; 2],
     query: ComparisonQuery,
 ) -> Result<ComparisonView, Problem> {
     let (a, b) = (
-        Side::load(app, sight, a).await?,
-        Side::load(app, sight, b).await?,
+        Side::load(app, visibility, a).await?,
+        Side::load(app, visibility, b).await?,
     );
     let not_paired = |field: &str, detail: String| {
         Problem::new(
             ProblemKind::NotPaired,
-            format!("{detail}; only evaluations that played the same episodes are compared"),
+            format!("{detail}; only evaluations on the same episodes can be compared"),
         )
         .with("field", field)
     };
-    let (stage_a, stage_b) = (a.evaluation.of.stage, b.evaluation.of.stage);
+    let (stage_a, stage_b) = (a.evaluation.stage_day.stage, b.evaluation.stage_day.stage);
     if stage_a != stage_b {
         return Err(not_paired(
             "stage",
             format!("stage: the first evaluation is of {stage_a}, the second of {stage_b}"),
         ));
     }
-    let (day_a, day_b) = (a.evaluation.of.date, b.evaluation.of.date);
+    let (day_a, day_b) = (a.evaluation.stage_day.date, b.evaluation.stage_day.date);
     if day_a != day_b {
         return Err(not_paired(
             "day",
@@ -112,15 +111,15 @@ pub async fn of(
     }
     check_released(app, &a.evaluation).await?;
     for side in [&a, &b] {
-        sight.check_not_frozen(&side.evaluation, "compared")?;
+        visibility.check_not_frozen(&side.evaluation, "compared")?;
     }
-    // that of the season, which both share
+    // The season's, which both share.
     let mismatch_seed = app.store.season().await?.secret.model_mismatch();
-    let (played_a, played_b) = (a.played(mismatch_seed), b.played(mismatch_seed));
-    let differs = |error: NotPaired| not_paired(error.field(), error.to_string());
-    let Comparison { tasks, overall } = played_a.compare(&played_b).map_err(differs)?;
+    let (compared_a, compared_b) = (a.to_compared(mismatch_seed), b.to_compared(mismatch_seed));
+    let differs = |error: NotComparable| not_paired(error.field(), error.to_string());
+    let Comparison { tasks, overall } = compared_a.compare(&compared_b).map_err(differs)?;
     let episodes = match query.episodes {
-        true => Some(played_a.who_solved(&played_b).map_err(differs)?),
+        true => Some(compared_a.solved_episodes(&compared_b).map_err(differs)?),
         false => None,
     };
     Ok(ComparisonView {

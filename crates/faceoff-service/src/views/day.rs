@@ -1,47 +1,47 @@
-//! The day's cut: what it brought about, and when the next one is.
+//! An evaluation day after its cutoff, and the next cutoff.
 
 use crate::{
     app::AppState,
     boxed,
     problem::Problem,
-    views::{evaluation, not_taken, sight::Sight, team},
+    views::{evaluation, exclusions, visibility::Visibility, team},
 };
-use faceoff_api::views::day::{DayView, NextCut};
+use faceoff_api::views::day::{DayView, NextCutoff};
 use faceoff_store::Stage;
 use faceoff_types::{StageDay, TeamId};
 use jiff::Timestamp;
 use std::collections::BTreeSet;
 
-/// What has become of a day.
+/// An evaluation day with its evaluations, for organisers.
 #[boxed]
-pub async fn of(app: &AppState, of: StageDay) -> Result<DayView, Problem> {
-    let sight = Sight::of_organiser(app).await?;
-    let mut created = evaluation::of_day(app, &sight, of).await?;
-    evaluation::place(app, &mut created).await?;
+pub async fn build(app: &AppState, stage_day: StageDay) -> Result<DayView, Problem> {
+    let visibility = Visibility::for_organiser(app).await?;
+    let mut created = evaluation::day_evaluations(app, &visibility, stage_day).await?;
+    evaluation::add_queue_positions(app, &mut created).await?;
     let evaluated: BTreeSet<TeamId> = created.iter().map(|created| created.team).collect();
     let mut without_submission = team::all(app).await?;
-    let mut not_taken = not_taken::by(app, &app.store.stage(of.stage).await?).await?;
-    not_taken.retain(|left_out| !evaluated.contains(&left_out.team));
-    let is_left_out = |id| not_taken.iter().any(|left_out| left_out.team == id);
-    without_submission.retain(|team| !evaluated.contains(&team.id) && !is_left_out(team.id));
+    let mut excluded_teams = exclusions::excluded_teams(app, &app.store.stage(stage_day.stage).await?).await?;
+    excluded_teams.retain(|excluded| !evaluated.contains(&excluded.team));
+    let is_excluded = |id| excluded_teams.iter().any(|excluded| excluded.team == id);
+    without_submission.retain(|team| !evaluated.contains(&team.id) && !is_excluded(team.id));
     Ok(DayView {
-        stage: of.stage,
-        day: of.date,
+        stage: stage_day.stage,
+        day: stage_day.date,
         created,
         without_submission,
-        not_taken,
+        not_taken: excluded_teams,
     })
 }
 
-/// Of a stage; `None` if it has no other day, or the season is closed.
+/// The next cutoff of a stage; `None` if it has no further day, or the season is closed.
 #[boxed]
-pub async fn next_cut(app: &AppState, stage: &Stage) -> Result<Option<NextCut>, Problem> {
+pub async fn next_cutoff(app: &AppState, stage: &Stage) -> Result<Option<NextCutoff>, Problem> {
     if app.store.season().await?.closed_at.is_some() {
         return Ok(None);
     }
     let newest = app.store.newest_day(stage.id).await?;
-    let next = stage.next_cut(newest.map(|day| day.of.date), app.config.clock.now());
-    Ok(next.map(|(day, at)| NextCut {
+    let next = stage.next_cutoff(newest.map(|day| day.stage_day.date), app.config.clock.now());
+    Ok(next.map(|(day, at)| NextCutoff {
         stage: stage.id,
         stage_name: stage.name.clone(),
         day,
@@ -50,11 +50,11 @@ pub async fn next_cut(app: &AppState, stage: &Stage) -> Result<Option<NextCut>, 
     }))
 }
 
-/// The first of all stages; `None` if none has another day, or the season is closed.
-pub(crate) async fn first_cut(app: &AppState) -> Result<Option<NextCut>, Problem> {
-    let mut first: Option<(Timestamp, NextCut)> = None;
+/// The next cutoff of all stages; `None` if no stage has a further day, or the season is closed.
+pub(crate) async fn first_cutoff(app: &AppState) -> Result<Option<NextCutoff>, Problem> {
+    let mut first: Option<(Timestamp, NextCutoff)> = None;
     for stage in app.store.stages().await? {
-        let Some(next) = next_cut(app, &stage).await? else {
+        let Some(next) = next_cutoff(app, &stage).await? else {
             continue;
         };
         let begins = next.day.to_zoned(stage.zone.time_zone());

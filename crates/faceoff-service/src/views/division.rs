@@ -1,4 +1,4 @@
-//! The season's divisions, as a request names them.
+//! Look-up of the season's divisions.
 
 use crate::{
     app::AppState,
@@ -7,17 +7,17 @@ use crate::{
 };
 use faceoff_types::DivisionName;
 
-/// The division of this name, whatever the case of its letters, as the organisers wrote it.
+/// The division with this name, ignoring case, as the organisers spelled it.
 ///
 /// # Errors
-/// `NotFound`, which names those that there are.
+/// `NotFound`, with the names of all divisions.
 #[boxed]
 pub async fn find(app: &AppState, name: &DivisionName) -> Result<DivisionName, Problem> {
     let all = app.store.divisions().await?;
-    let wanted = name.as_str().to_lowercase();
+    let lowercase = name.as_str().to_lowercase();
     let found = all
         .iter()
-        .find(|division| division.as_str().to_lowercase() == wanted);
+        .find(|division| division.as_str().to_lowercase() == lowercase);
     found.cloned().ok_or_else(|| unknown(name, &all))
 }
 
@@ -25,10 +25,10 @@ fn unknown(name: &DivisionName, all: &[DivisionName]) -> Problem {
     let names: Vec<String> = all.iter().map(ToString::to_string).collect();
     let quoted: Vec<String> = names.iter().map(|name| format!("“{name}”")).collect();
     let detail = if names.is_empty() {
-        format!("division: this season has no divisions, so leave out “{name}”")
+        format!("division: expected none, as this season has no divisions, got “{name}”; leave it out")
     } else {
         format!(
-            "division: expected {}, got “{name}”; without it the board is that of all teams",
+            "division: expected {}, got “{name}”; leave it out for all teams",
             quoted.join(" or ")
         )
     };

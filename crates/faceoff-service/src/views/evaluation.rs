@@ -1,16 +1,16 @@
-//! An evaluation on its way to a score or a failure.
+//! Evaluations and their progress.
 
 use crate::{
     app::AppState,
     boxed,
     problem::Problem,
-    views::{queue, ruling, sight::Sight},
+    views::{queue, ruling, visibility::Visibility},
 };
 use faceoff_api::{
     paths,
     views::{
         evaluation::{EvaluationStatus, EvaluationView, FaultView, Progress, ResultView},
-        shown,
+        printable,
     },
 };
 use faceoff_scoring::EpisodeSummary;
@@ -18,71 +18,71 @@ use faceoff_store::{Evaluation, EvaluationState};
 use faceoff_types::{EvaluationId, StageDay, TeamId, TeamName};
 use std::{collections::BTreeMap, sync::Arc};
 
-/// What happens next to a finished evaluation of a released day without its dataset.
-const DATASET_GONE: &str = "Nothing more: its result stays, its dataset was removed.";
+/// What happens next to a finished evaluation whose dataset was removed.
+const DATASET_REMOVED: &str = "Done. The result stays; the dataset was removed.";
 
-/// One, with its faults where the viewer sees them.
+/// An evaluation, with its faults if the viewer may see them.
 #[boxed]
 pub async fn find(
     app: &AppState,
-    sight: &Sight,
+    visibility: &Visibility,
     id: EvaluationId,
 ) -> Result<EvaluationView, Problem> {
-    of(app, sight, app.store.evaluation(id).await?).await
+    build(app, visibility, app.store.evaluation(id).await?).await
 }
 
-/// With its place in the queue while it is under way; with faults and log, if it failed by them, its day is
-/// released, and the viewer may see them.
+/// An evaluation with its position in the queue. If it failed by agent faults and its day is released, a viewer who may
+/// see them also gets faults and log.
 #[boxed]
-pub async fn of(
+pub async fn build(
     app: &AppState,
-    sight: &Sight,
+    visibility: &Visibility,
     evaluation: Evaluation,
 ) -> Result<EvaluationView, Problem> {
     let team = app.store.team(evaluation.team).await?;
     let run = evaluation.run;
-    let tells_faults = sight.is_own(&evaluation) && !sight.is_hidden(evaluation.of.stage);
-    let mut view = view(sight, evaluation, team.name);
+    let shows_faults = visibility.is_own(&evaluation) && !visibility.is_hidden(evaluation.stage_day.stage);
+    let mut view = view(visibility, evaluation, team.name);
     if let EvaluationStatus::AgentFailed { faults, log, .. } = &mut view.status
         && view.released_at.is_some()
-        && tells_faults
+        && shows_faults
     {
-        let of_run = app.store.run_faults(run).await?;
-        *faults = Some(of_run.faults.into_iter().map(FaultView::from).collect());
-        *log = Some(shown(of_run.log));
+        let run_faults = app.store.run_faults(run).await?;
+        *faults = Some(run_faults.faults.into_iter().map(FaultView::from).collect());
+        *log = Some(printable(run_faults.log));
     }
-    place(app, std::slice::from_mut(&mut view)).await?;
+    add_queue_positions(app, std::slice::from_mut(&mut view)).await?;
     Ok(view)
 }
 
-/// Tells of those that are under way where they stand. If all are over, nothing is read.
+/// Adds positions in the queue to unfinished evaluations. Without any, the database is not read.
 #[boxed]
-pub async fn place(app: &AppState, views: &mut [EvaluationView]) -> Result<(), Problem> {
+pub async fn add_queue_positions(app: &AppState, views: &mut [EvaluationView]) -> Result<(), Problem> {
     if views.iter().all(|view| view.status.is_final()) {
         return Ok(());
     }
-    let outlook = queue::outlook(app).await?;
+    let forecast = queue::forecast(app).await?;
     for view in views {
-        view.queue = outlook.evaluations.get(&view.id).copied().map(queue::of);
+        view.queue = forecast.evaluations.get(&view.id).copied().map(queue::view);
     }
     Ok(())
 }
 
-/// Those of a stage's day.
+/// The evaluations of a day.
 #[boxed]
-pub async fn of_day(
+pub async fn day_evaluations(
     app: &AppState,
-    sight: &Sight,
-    of: StageDay,
+    visibility: &Visibility,
+    stage_day: StageDay,
 ) -> Result<Vec<EvaluationView>, Problem> {
-    all(app, sight, app.store.evaluations_of_day(of).await?).await
+    all(app, visibility, app.store.evaluations_of_day(stage_day).await?).await
 }
 
-/// Those of `today`, after what began the day before and is still going.
+/// Unfinished evaluations of the day before, then those of `today`.
 #[boxed]
 pub async fn current(
     app: &AppState,
-    sight: &Sight,
+    visibility: &Visibility,
     today: StageDay,
 ) -> Result<Vec<EvaluationView>, Problem> {
     let mut evaluations = match today.date.yesterday() {
@@ -94,14 +94,14 @@ pub async fn current(
     };
     evaluations.retain(|evaluation| !evaluation.state.is_over());
     evaluations.extend(app.store.evaluations_of_day(today).await?);
-    all(app, sight, evaluations).await
+    all(app, visibility, evaluations).await
 }
 
-/// These, in their order; without faults and logs, which are long, as in all lists.
+/// Views of these evaluations, in order; without faults and logs, which are long.
 #[boxed]
 pub async fn all(
     app: &AppState,
-    sight: &Sight,
+    visibility: &Visibility,
     evaluations: Vec<Evaluation>,
 ) -> Result<Vec<EvaluationView>, Problem> {
     let teams = app.store.teams().await?;
@@ -110,7 +110,7 @@ pub async fn all(
     evaluations
         .into_iter()
         .map(|evaluation| match names.get(&evaluation.team) {
-            Some(name) => Ok(view(sight, evaluation, name.clone())),
+            Some(name) => Ok(view(visibility, evaluation, name.clone())),
             None => Err(Problem::internal(format_args!(
                 "evaluation {} has no team",
                 evaluation.id
@@ -119,12 +119,12 @@ pub async fn all(
         .collect()
 }
 
-fn view(sight: &Sight, evaluation: Evaluation, team_name: TeamName) -> EvaluationView {
+fn view(visibility: &Visibility, evaluation: Evaluation, team_name: TeamName) -> EvaluationView {
     let released = evaluation.released_at.is_some();
     let has_dataset = evaluation.dataset_removed.is_none();
     let (hidden, public) = (
-        sight.is_hidden(evaluation.of.stage),
-        sight.is_public(&evaluation),
+        visibility.is_hidden(evaluation.stage_day.stage),
+        visibility.is_public(&evaluation),
     );
     let episodes_total = evaluation.plan.episodes_total();
     let episodes_done = match &evaluation.state {
@@ -162,7 +162,7 @@ fn view(sight: &Sight, evaluation: Evaluation, team_name: TeamName) -> Evaluatio
             reason,
         } => EvaluationStatus::PlatformFailed {
             finished_at,
-            reason: shown(reason),
+            reason: printable(reason),
         },
         EvaluationState::NotPlayed {
             finished_at,
@@ -185,17 +185,17 @@ fn view(sight: &Sight, evaluation: Evaluation, team_name: TeamName) -> Evaluatio
         submission: evaluation.submission,
         team: evaluation.team,
         team_name,
-        stage: evaluation.of.stage,
+        stage: evaluation.stage_day.stage,
         revision: evaluation.revision,
-        day: evaluation.of.date,
+        day: evaluation.stage_day.date,
         released_at: evaluation.released_at,
         deadline_at: evaluation.deadline_at,
         rerun_of: evaluation.rerun_of,
         extra_turn: evaluation.extra_for,
-        voided: evaluation.voided.map(ruling::of),
+        voided: evaluation.voided.map(ruling::view),
         blind: hidden,
         public,
-        dataset_removed: evaluation.dataset_removed.map(ruling::of),
+        dataset_removed: evaluation.dataset_removed.map(ruling::view),
         profile: evaluation.plan.profile,
         tasks: evaluation.plan.tasks,
         episodes_per_task: evaluation.plan.episodes_per_task,
@@ -206,7 +206,7 @@ fn view(sight: &Sight, evaluation: Evaluation, team_name: TeamName) -> Evaluatio
         },
         queue: None,
         next: match status.next(released, voided) {
-            EvaluationStatus::DONE if !has_dataset => DATASET_GONE,
+            EvaluationStatus::DONE if !has_dataset => DATASET_REMOVED,
             next => next,
         }
         .to_owned(),
@@ -214,12 +214,12 @@ fn view(sight: &Sight, evaluation: Evaluation, team_name: TeamName) -> Evaluatio
     }
 }
 
-/// Of a finished evaluation: which episodes were solved, and how sure its tiers are.
+/// Episode summary of a finished evaluation: solved episodes and certainty of its tiers.
 #[boxed]
 pub async fn summary(
     view: &EvaluationView,
     app: &AppState,
 ) -> Result<Arc<EpisodeSummary>, Problem> {
     let run = app.store.evaluation(view.id).await?.run;
-    app.summaries.of_run(run).await
+    app.summaries.load_run(run).await
 }

@@ -1,4 +1,4 @@
-//! What happened, as the organiser reads it.
+//! The event log, as organisers read it.
 
 use crate::{app::AppState, boxed, problem::Problem};
 use faceoff_api::{
@@ -9,17 +9,17 @@ use faceoff_store::{Actor, Event, EventFilter, EventRecord, Subject};
 use serde_json::{Map, Value};
 use std::collections::BTreeMap;
 
-/// Events of a page, unless another number is asked for.
-const PAGE: u32 = 100;
+/// Default number of events per page.
+const DEFAULT_LIMIT: u32 = 100;
 
-const LONGEST_PAGE: u32 = 1000;
+const MAX_LIMIT: u32 = 1000;
 
-/// The events that a query asks for.
+/// The page of events that a query selects.
 #[boxed]
 pub async fn page(app: &AppState, query: EventsQuery) -> Result<EventsView, Problem> {
-    let limit = query.limit.unwrap_or(PAGE);
-    if !(1..=LONGEST_PAGE).contains(&limit) {
-        let detail = format!("expected 1 to {LONGEST_PAGE}, got {limit}");
+    let limit = query.limit.unwrap_or(DEFAULT_LIMIT);
+    if !(1..=MAX_LIMIT).contains(&limit) {
+        let detail = format!("expected 1 to {MAX_LIMIT}, got {limit}");
         return Err(Problem::invalid("limit", detail));
     }
     let subject = query.subject.map(|text| subject(&text)).transpose()?;
@@ -33,14 +33,14 @@ pub async fn page(app: &AppState, query: EventsQuery) -> Result<EventsView, Prob
         subject,
         kind: query.kind,
     };
-    // One more tells whether there is another page.
+    // One event more shows whether there is another page.
     let mut found = app.store.newest_events(&filter, limit + 1).await?;
     let is_last = found.len() <= limit as usize;
     found.truncate(limit as usize);
     let next_before = found.last().filter(|_| !is_last).map(|event| event.id);
-    let names = names(app).await?;
+    let names = actor_names(app).await?;
     let named = |record: EventRecord| {
-        let mut view = of(record);
+        let mut view = view(record);
         view.actor_name = names.get(&view.actor).cloned();
         view
     };
@@ -50,19 +50,19 @@ pub async fn page(app: &AppState, query: EventsQuery) -> Result<EventsView, Prob
     })
 }
 
-/// Of everybody who may have changed something, by how the log calls them.
+/// Names of all users and teams, by their notation in the log.
 #[boxed]
-pub async fn names(app: &AppState) -> Result<BTreeMap<String, String>, Problem> {
-    let people = app.store.people().await?.into_iter();
+pub async fn actor_names(app: &AppState) -> Result<BTreeMap<String, String>, Problem> {
+    let users = app.store.users().await?.into_iter();
     let teams = app.store.teams().await?.into_iter();
-    let people = people.map(|person| {
+    let users = users.map(|user| {
         (
-            Actor::Person(person.id).to_string(),
-            person.name.to_string(),
+            Actor::User(user.id).to_string(),
+            user.name.to_string(),
         )
     });
     let teams = teams.map(|team| (Actor::Team(team.id).to_string(), team.name.to_string()));
-    Ok(people.chain(teams).collect())
+    Ok(users.chain(teams).collect())
 }
 
 fn subject(text: &str) -> Result<Subject, Problem> {
@@ -82,8 +82,8 @@ fn check_actor(text: &str) -> Result<(), Problem> {
     Err(Problem::invalid("actor", detail))
 }
 
-/// Without its actor's name.
-pub fn of(record: EventRecord) -> EventView {
+/// An event, without its actor's name.
+pub fn view(record: EventRecord) -> EventView {
     let mut details = match serde_json::to_value(&record.event) {
         Ok(Value::Object(details)) => details,
         _ => Map::new(),

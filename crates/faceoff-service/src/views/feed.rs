@@ -1,4 +1,4 @@
-//! News of the season: what was announced, opened, released and closed, for everybody.
+//! News feed of the season: announcements, openings, releases and closings.
 
 use crate::{app::AppState, boxed, problem::Problem};
 use faceoff_api::paths;
@@ -6,105 +6,105 @@ use faceoff_store::Stage;
 use jiff::Timestamp;
 use uuid::Uuid;
 
-/// The newest so many are told.
-const SHOWN: usize = 100;
+/// Longest feed.
+const MAX_ITEMS: usize = 100;
 
-/// Of announcements, as many are read.
-const ANNOUNCEMENTS: u32 = 100;
+/// Newest announcements that are read.
+const MAX_ANNOUNCEMENTS: u32 = 100;
 
-/// Rounds are read of the newest so many tournaments.
-const TOURNAMENTS: usize = 10;
+/// Newest tournaments whose rounds are read.
+const MAX_TOURNAMENTS: usize = 10;
 
-/// A thing that happened.
+/// An item of the feed.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct NewsItem {
-    /// Stays, however often the feed is made.
+    /// The same in every version of the feed.
     pub id: Uuid,
     pub at: Timestamp,
     pub title: String,
-    /// What more there is to say; plain text.
+    /// The full text; plain text.
     pub text: Option<String>,
-    /// Where more can be read, without the server's address.
+    /// Path of the page with details.
     pub path: String,
 }
 
-/// Names the same thing by the same id, on every server that knows it: its own ids are drawn.
-fn id_of(what: &str) -> Uuid {
+/// Id of an item, the same on every server that shows the season: derived from `key`, not random.
+fn item_id(key: &str) -> Uuid {
     let mut hash = blake3::Hasher::new_derive_key("Faceoff: ids of news");
-    hash.update(what.as_bytes());
+    hash.update(key.as_bytes());
     let mut bytes = [0; 16];
     bytes.copy_from_slice(&hash.finalize().as_bytes()[..16]);
     uuid::Builder::from_custom_bytes(bytes).into_uuid()
 }
 
-/// What XML can hold of a text: no control characters, whoever wrote it.
-fn told(text: &str) -> String {
-    let is_held = |c: &char| {
+/// Removes characters that XML does not allow.
+fn xml_safe(text: &str) -> String {
+    let is_allowed = |c: &char| {
         matches!(c, '\n' | '\t' | ' '..='\u{d7ff}' | '\u{e000}'..='\u{fffd}' | '\u{10000}'..)
             && !('\u{7f}'..='\u{9f}').contains(c)
     };
-    text.chars().filter(is_held).collect()
+    text.chars().filter(is_allowed).collect()
 }
 
-fn item(what: &str, at: Timestamp, title: String, path: String) -> NewsItem {
+fn item(key: &str, at: Timestamp, title: String, path: String) -> NewsItem {
     NewsItem {
-        id: id_of(what),
+        id: item_id(key),
         at,
-        title: told(&title),
+        title: xml_safe(&title),
         text: None,
         path,
     }
 }
 
-/// The id of a feed, which is its season's.
+/// The id of the feed, derived from the season's commitment.
 pub fn feed_id(commitment: &str) -> Uuid {
-    id_of(&format!("season {commitment}"))
+    item_id(&format!("season {commitment}"))
 }
 
-/// The newest first.
+/// The newest items, newest first.
 #[boxed]
 pub async fn newest(app: &AppState) -> Result<Vec<NewsItem>, Problem> {
     let now = app.config.clock.now();
-    let mut news = announcements(app).await?;
+    let mut items = announcements(app).await?;
     let stages = app.store.stages().await?;
     for stage in &stages {
-        news.extend(of_stage(stage));
+        items.extend(stage_items(stage));
     }
     for (day, _) in app.store.days().await? {
         let Some(at) = day.released_at else {
             continue;
         };
-        let stage = stages.iter().find(|stage| stage.id == day.of.stage);
+        let stage = stages.iter().find(|stage| stage.id == day.stage_day.stage);
         let stage = stage.map_or("a stage", |stage| stage.name.as_str());
-        let title = format!("{stage}: the day {} is released", day.of.date);
-        let what = format!("day {} released", day.of);
-        news.push(item(&what, at, title, "/season".to_owned()));
+        let title = format!("{stage}: the day {} is released", day.stage_day.date);
+        let key = format!("day {} released", day.stage_day);
+        items.push(item(&key, at, title, "/season".to_owned()));
     }
-    news.extend(of_tournaments(app).await?);
-    // What is to come is no news yet.
-    news.retain(|item| item.at <= now);
-    news.sort_by_key(|item| (std::cmp::Reverse(item.at), item.id));
-    news.truncate(SHOWN);
-    Ok(news)
+    items.extend(tournament_items(app).await?);
+    // Items of the future are not shown yet.
+    items.retain(|item| item.at <= now);
+    items.sort_by_key(|item| (std::cmp::Reverse(item.at), item.id));
+    items.truncate(MAX_ITEMS);
+    Ok(items)
 }
 
 async fn announcements(app: &AppState) -> Result<Vec<NewsItem>, Problem> {
-    let announcements = app.store.announcements(ANNOUNCEMENTS).await?.into_iter();
-    let news = announcements.map(|announcement| NewsItem {
+    let announcements = app.store.announcements(MAX_ANNOUNCEMENTS).await?.into_iter();
+    let items = announcements.map(|announcement| NewsItem {
         id: announcement.id.as_uuid(),
         at: announcement.at,
-        title: told(&announcement.title),
-        text: Some(told(&announcement.text)),
+        title: xml_safe(&announcement.title),
+        text: Some(xml_safe(&announcement.text)),
         path: "/announcements".to_owned(),
     });
-    Ok(news.collect())
+    Ok(items.collect())
 }
 
-/// Opening and closing follow from the clock, and are in no log.
-fn of_stage(stage: &Stage) -> Vec<NewsItem> {
+/// A stage opens and closes by the clock, without an event in the log.
+fn stage_items(stage: &Stage) -> Vec<NewsItem> {
     let (id, name) = (stage.id, &stage.name);
     let path = format!("/?stage={id}");
-    let mut news = vec![item(
+    let mut items = vec![item(
         &format!("stage {id} opens"),
         stage.opens_at,
         format!("{name} is open"),
@@ -112,26 +112,26 @@ fn of_stage(stage: &Stage) -> Vec<NewsItem> {
     )];
     if let Some(at) = stage.closes_at {
         let title = format!("{name} is closed");
-        let what = format!("stage {id} closes");
-        news.push(item(&what, at, title, path.clone()));
+        let key = format!("stage {id} closes");
+        items.push(item(&key, at, title, path.clone()));
     }
-    if let Some(finalised) = &stage.finalised {
+    if let Some(sign_off) = &stage.sign_off {
         let title = format!("{name}: the result is signed off");
-        let what = format!("stage {id} signed off");
-        news.push(item(&what, finalised.at, title, path));
+        let key = format!("stage {id} signed off");
+        items.push(item(&key, sign_off.at, title, path));
     }
-    news
+    items
 }
 
-async fn of_tournaments(app: &AppState) -> Result<Vec<NewsItem>, Problem> {
-    let mut news = Vec::new();
+async fn tournament_items(app: &AppState) -> Result<Vec<NewsItem>, Problem> {
+    let mut items = Vec::new();
     let tournaments = app.store.tournaments().await?;
-    for tournament in tournaments.into_iter().rev().take(TOURNAMENTS) {
+    for tournament in tournaments.into_iter().rev().take(MAX_TOURNAMENTS) {
         let (id, name) = (tournament.id, &tournament.name);
         let path = paths::tournament(id);
-        let mut add = |what: &str, at: Timestamp, title: String| {
-            news.push(item(
-                &format!("tournament {id} {what}"),
+        let mut add = |event: &str, at: Timestamp, title: String| {
+            items.push(item(
+                &format!("tournament {id} {event}"),
                 at,
                 title,
                 path.clone(),
@@ -152,7 +152,7 @@ async fn of_tournaments(app: &AppState) -> Result<Vec<NewsItem>, Problem> {
             }
         }
     }
-    Ok(news)
+    Ok(items)
 }
 
 #[cfg(test)]
@@ -160,15 +160,15 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_xml_cannot_hold_is_left_out() {
+    fn invalid_xml_characters_are_removed() {
         let text = "a\u{0}b\u{8}c\u{b}\td\n\u{1b}[31m\u{85}e\u{fffe}\u{ffff}<&>🙂";
-        assert_eq!(told(text), "abc\td\n[31me<&>🙂");
+        assert_eq!(xml_safe(text), "abc\td\n[31me<&>🙂");
     }
 
     #[test]
-    fn the_same_thing_has_the_same_id_and_another_another() {
-        assert_eq!(id_of("a"), id_of("a"));
-        assert_ne!(id_of("a"), id_of("b"));
-        assert_eq!(id_of("a").get_version_num(), 8);
+    fn item_id_depends_only_on_key() {
+        assert_eq!(item_id("a"), item_id("a"));
+        assert_ne!(item_id("a"), item_id("b"));
+        assert_eq!(item_id("a").get_version_num(), 8);
     }
 }

@@ -1,116 +1,115 @@
-//! A game between two submissions: what it is for, how it stands, what it came to.
+//! Games between two submissions: purpose, state and result.
 
 use crate::{
     app::AppState,
     boxed,
     problem::{Problem, ProblemKind},
     viewer::Viewer,
-    views::{sight::GameSight, tournament_sheet::TournamentSheet},
+    views::{visibility::GameVisibility, tournament_state::TournamentState},
 };
 use faceoff_api::views::{
     game::{GameResultView, GameSideView, GameStatus, GameView, PurposeView, RecordingView},
-    shown,
+    printable,
 };
 use faceoff_scoring::tournament::{GameScore, PlayedGame, Side as TableSide};
-use faceoff_store::{Game, GamePurpose, GameRecording, GameState, GamesOf, Meeting, StoreError};
+use faceoff_store::{Game, GamePurpose, GameRecording, GameState, GameFilter, ScheduleEntry, StoreError};
 use faceoff_types::{GameId, RoundNumber, Side, TournamentId};
 
-/// A game that the viewer may know of, with its tournament, whose other games are not read. One that they may not know
-/// of looks like none.
+/// A game that the viewer may see, with the state of its tournament, which is not scored.
 ///
 /// # Errors
-/// `NotFound`.
+/// `NotFound`, also for a game that the viewer may not see.
 #[boxed]
-pub async fn known(
+pub async fn find_visible(
     app: &AppState,
     viewer: Viewer,
     id: GameId,
-) -> Result<(TournamentSheet, Game), Problem> {
+) -> Result<(TournamentState, Game), Problem> {
     let none = || Problem::new(ProblemKind::NotFound, NO_GAME);
     let game = match app.store.game(id).await {
         Err(StoreError::NotFound(_)) => return Err(none()),
         found => found?,
     };
-    let sheet = TournamentSheet::unscored(app, game.tournament).await?;
-    if sheet.sight(viewer).shows(&game) {
-        Ok((sheet, game))
+    let state = TournamentState::unscored(app, game.tournament).await?;
+    if state.visibility(viewer).is_visible(&game) {
+        Ok((state, game))
     } else {
         Err(none())
     }
 }
 
-const NO_GAME: &str = "there is no such game that you could see; check the id, and the token if it does not count: such \
-                       games are their two teams' alone";
+const NO_GAME: &str = "there is no such game, or you may not see it; check the id. Test and friendly games are visible only \
+                       to their two teams: check the token";
 
-/// One that the viewer knows of.
+/// A game that the viewer may see.
 #[boxed]
 pub async fn find(app: &AppState, viewer: Viewer, id: GameId) -> Result<GameView, Problem> {
-    let (sheet, game) = known(app, viewer, id).await?;
-    of(&sheet, viewer, &game)
+    let (state, game) = find_visible(app, viewer, id).await?;
+    view(&state, viewer, &game)
 }
 
-/// Those of a tournament's rounds, or of one round, in the order of play.
-pub fn of_rounds(
-    sheet: &TournamentSheet,
+/// The games of all rounds, or of one, in the order in which they are played.
+pub fn round_games(
+    state: &TournamentState,
     viewer: Viewer,
     round: Option<RoundNumber>,
 ) -> Result<Vec<GameView>, Problem> {
-    let is_asked = |game: &&Game| {
-        round.is_none() || game.purpose.meeting().map(|meeting| meeting.round) == round
+    let is_selected = |game: &&Game| {
+        round.is_none() || game.purpose.schedule_entry().map(|meeting| meeting.round) == round
     };
-    let games = sheet.games.iter().filter(is_asked);
-    games.map(|game| of(sheet, viewer, game)).collect()
+    let games = state.games.iter().filter(is_selected);
+    games.map(|game| view(state, viewer, game)).collect()
 }
 
-/// Those of a tournament that do not count, as far as they are the viewer's, the newest first.
+/// The test and friendly games of a tournament that the viewer may see, newest first.
 #[boxed]
-pub async fn free(
+pub async fn test_and_friendly_games(
     app: &AppState,
     viewer: Viewer,
     id: TournamentId,
 ) -> Result<Vec<GameView>, Problem> {
-    let sheet = TournamentSheet::unscored(app, id).await?;
-    let whose = match viewer {
+    let state = TournamentState::unscored(app, id).await?;
+    let team = match viewer {
         Viewer::Team(team) => Some(team),
-        Viewer::Organiser | Viewer::Anybody => None,
+        Viewer::Organiser | Viewer::Visitor => None,
     };
-    let games = app.store.games(id, GamesOf::Free(whose)).await?;
-    let seen = games.iter().filter(|game| sheet.sight(viewer).shows(game));
-    seen.map(|game| of(&sheet, viewer, game)).collect()
+    let games = app.store.games(id, GameFilter::TestAndFriendly(team)).await?;
+    let visible = games.iter().filter(|game| state.visibility(viewer).is_visible(game));
+    visible.map(|game| view(&state, viewer, game)).collect()
 }
 
-/// One, as the viewer sees it.
-pub fn of(sheet: &TournamentSheet, viewer: Viewer, game: &Game) -> Result<GameView, Problem> {
+/// A game, as the viewer may see it.
+pub fn view(state: &TournamentState, viewer: Viewer, game: &Game) -> Result<GameView, Problem> {
     let side = |side: Side| {
         let team = game.teams[side.index()];
         Ok::<_, Problem>(GameSideView {
             team,
-            team_name: sheet.name(team)?,
+            team_name: state.name(team)?,
             submission: game.submissions[side.index()],
         })
     };
-    let tournament = &sheet.tournament;
-    let taken_out_by = sheet.taken_out_by(game)?;
+    let tournament = &state.tournament;
+    let excluded_by = state.excluded_by(game)?;
     Ok(GameView {
         id: game.id,
         tournament: tournament.id,
         tournament_name: tournament.name.clone(),
-        purpose: purpose(sheet, game)?,
+        purpose: purpose(state, game)?,
         sides: [side(Side::First)?, side(Side::Second)?],
         seed_label: game.seed.to_string(),
         created_at: game.created_at,
-        next: next(sheet, game).to_owned(),
-        taken_out_by,
-        status: status(sheet, viewer, game)?,
+        next: next(state, game).to_owned(),
+        taken_out_by: excluded_by,
+        status: status(state, viewer, game)?,
     })
 }
 
-fn purpose(sheet: &TournamentSheet, game: &Game) -> Result<PurposeView, Problem> {
+fn purpose(state: &TournamentState, game: &Game) -> Result<PurposeView, Problem> {
     Ok(match game.purpose {
-        GamePurpose::Round(Meeting {
+        GamePurpose::Round(ScheduleEntry {
             round,
             matchday,
-            meeting,
+            pairing: meeting,
             second_half,
         }) => PurposeView::Round {
             round,
@@ -118,23 +117,23 @@ fn purpose(sheet: &TournamentSheet, game: &Game) -> Result<PurposeView, Problem>
             meeting,
             second_half,
         },
-        GamePurpose::Replay { replay, of } => PurposeView::Replay {
+        GamePurpose::Replay { replay, original } => PurposeView::Replay {
             replay,
-            round: of.round,
-            matchday: of.matchday,
-            meeting: of.meeting,
-            second_half: of.second_half,
+            round: original.round,
+            matchday: original.matchday,
+            meeting: original.pairing,
+            second_half: original.second_half,
         },
         GamePurpose::Test { asked_by } => PurposeView::Test {
-            asked_by: asked_by.map(|team| sheet.name(team)).transpose()?,
+            asked_by: asked_by.map(|team| state.name(team)).transpose()?,
         },
         GamePurpose::Friendly { asked_by } => PurposeView::Friendly {
-            asked_by: sheet.name(asked_by)?,
+            asked_by: state.name(asked_by)?,
         },
     })
 }
 
-fn status(sheet: &TournamentSheet, viewer: Viewer, game: &Game) -> Result<GameStatus, Problem> {
+fn status(state: &TournamentState, viewer: Viewer, game: &Game) -> Result<GameStatus, Problem> {
     Ok(match &game.state {
         GameState::Queued => GameStatus::Queued,
         GameState::Running { attempt, since } => GameStatus::Running {
@@ -142,48 +141,48 @@ fn status(sheet: &TournamentSheet, viewer: Viewer, game: &Game) -> Result<GameSt
             since: *since,
         },
         GameState::Played(row) => {
-            let (score, played) = sheet.result(game)?.ok_or_else(|| {
+            let (score, played) = state.result(game)?.ok_or_else(|| {
                 Problem::internal(format_args!("game {} is played without a result", game.id))
             })?;
             let recording = row.recording.as_ref();
             let recording =
-                recording.map(|files| recording_view(sheet.sight(viewer), game, &score, files));
+                recording.map(|files| recording_view(state.visibility(viewer), game, &score, files));
             GameStatus::Played {
                 attempt: row.attempt,
                 finished_at: row.at,
-                result: Box::new(result_of(&score, &played, recording)),
+                result: Box::new(result_view(&score, &played, recording)),
             }
         }
-        GameState::Broken { at, reason } => GameStatus::Broken {
+        GameState::PlatformFailed { at, reason } => GameStatus::Broken {
             at: *at,
-            reason: shown(reason.clone()),
+            reason: printable(reason.clone()),
         },
         GameState::Void { at, reason } => GameStatus::Void {
             at: *at,
-            reason: shown(reason.clone()),
+            reason: printable(reason.clone()),
         },
         GameState::Cancelled { at, reason } => GameStatus::Cancelled {
             at: *at,
-            reason: shown(reason.clone()),
+            reason: printable(reason.clone()),
         },
     })
 }
 
 fn recording_view(
-    sight: GameSight<'_>,
+    visibility: GameVisibility<'_>,
     game: &Game,
     score: &GameScore,
     files: &GameRecording,
 ) -> RecordingView {
     RecordingView {
-        public: sight.is_public(game),
-        seed: sight.sees_both_sides(game).then_some(score.seed),
+        public: visibility.is_public(game),
+        seed: visibility.can_see_both_sides(game).then_some(score.seed),
         game_blake3: files.game_blake3.clone(),
         side_blake3: files.side_blake3.clone(),
     }
 }
 
-fn result_of(
+fn result_view(
     score: &GameScore,
     played: &PlayedGame,
     recording: Option<RecordingView>,
@@ -211,25 +210,25 @@ fn result_of(
     }
 }
 
-/// What happens next to a game, whoever asks.
-fn next(sheet: &TournamentSheet, game: &Game) -> &'static str {
+/// What happens next to a game, in words.
+fn next(state: &TournamentState, game: &Game) -> &'static str {
     let counts = matches!(game.purpose, GamePurpose::Round(_));
     match &game.state {
-        GameState::Queued if sheet.tournament.paused.is_some() => {
-            "It waits until the tournament goes on, which is paused."
+        GameState::Queued if state.tournament.paused.is_some() => {
+            "It waits until the paused tournament is resumed."
         }
         GameState::Queued => {
-            "It is played as soon as a slot is free; games of rounds come first, in the order of matchdays."
+            "It starts as soon as a slot is free; games of rounds come first, in the order of matchdays."
         }
-        GameState::Running { .. } => "It is played to its end; then its result is told at once.",
-        GameState::Played(_) => "Nothing more: its result stays.",
-        GameState::Broken { .. } if counts => {
-            "It counts for nobody; the organiser has it played again, on the same seed, before the tournament goes on."
+        GameState::Running { .. } => "It is running; its result is published at once when it ends.",
+        GameState::Played(_) => "Done. Its result stays.",
+        GameState::PlatformFailed { .. } if counts => {
+            "It does not count. An organiser has to rerun it, with the same seed, before the tournament continues."
         }
-        GameState::Broken { .. } => "Nothing more, unless the organiser has it played again.",
+        GameState::PlatformFailed { .. } => "Failed. An organiser can rerun it.",
         GameState::Void { .. } => {
-            "Its result counts no more; the organiser has it played again, on the same seed, before the tournament goes on."
+            "Its result no longer counts. An organiser has to rerun it, with the same seed, before the tournament continues."
         }
-        GameState::Cancelled { .. } => "Nothing more: it is not played.",
+        GameState::Cancelled { .. } => "It is not played.",
     }
 }

@@ -1,4 +1,4 @@
-//! Is the server up, and is it fit for work?
+//! Readiness of the server.
 
 use crate::{
     app::AppState,
@@ -9,78 +9,78 @@ use crate::{
 use faceoff_api::views::health::HealthView;
 use faceoff_store::QueueHealth;
 
-/// What there is to say if nothing is missing: the database can be written (it is tried, once a second at most), the
-/// queue moves, and the disks have room.
+/// Checks that the database is writable (by a test write, at most once a second), the queue makes progress, and the
+/// disks have free space.
 ///
 /// # Errors
-/// [`ProblemKind::NotReady`], whose `database`, `queue` and `room` say what is missing.
+/// [`ProblemKind::NotReady`]; its `database`, `queue` and `room` say what is wrong.
 #[boxed]
-pub async fn now(app: &AppState) -> Result<HealthView, Problem> {
-    let room = app.store.room();
-    let short = room.is_short();
+pub async fn check(app: &AppState) -> Result<HealthView, Problem> {
+    let free_space = app.store.free_space();
+    let is_short = free_space.is_short();
     let health = app.store.health(app.config.clock.now()).await;
-    let without_room = match health.queue {
-        QueueHealth::Moving { without_room, .. } => without_room,
+    let out_of_space_jobs = match health.queue {
+        QueueHealth::Running { out_of_space, .. } => out_of_space,
         _ => 0,
     };
     let (running, waiting, queue) = match health.queue {
-        QueueHealth::Moving {
+        QueueHealth::Running {
             running, waiting, ..
         } => (running, waiting, "moving"),
-        QueueHealth::Held {
+        QueueHealth::Paused {
             running, waiting, ..
         } => (running, waiting, "held"),
-        QueueHealth::Paused { waiting } => (0, waiting, "paused"),
+        QueueHealth::DiskFull { waiting } => (0, waiting, "paused"),
         QueueHealth::Stuck { waiting, .. } => (0, waiting, "stuck"),
         QueueHealth::Unknown => (0, 0, "unknown"),
     };
-    let mut missing = Vec::new();
+    let mut problems = Vec::new();
     if !health.database_writable {
-        missing.push("the database cannot be written".to_owned());
+        problems.push("the database cannot be written".to_owned());
     }
-    if short {
-        missing.push(format!(
+    if is_short {
+        problems.push(format!(
             "less than {} bytes are free on the disk, so the queue pauses and uploads are refused",
-            room.min_free_bytes()
+            free_space.min_free_bytes()
         ));
     }
-    if without_room > 0 {
-        missing.push(format!(
-            "{without_room} units of work found no room again and again although the disk has what is to be kept \
-             free: they need more than that; they are tried on"
+    if out_of_space_jobs > 0 {
+        problems.push(format!(
+            "{out_of_space_jobs} jobs repeatedly lacked disk space although the configured minimum is free: they need more; \
+             the server keeps trying"
         ));
     }
     match &health.queue {
         QueueHealth::Stuck { waiting, since } => {
-            missing.push(format!(
-                "{waiting} units of work wait, the first since {since}, and nobody works"
+            problems.push(format!(
+                "{waiting} jobs are pending, the first since {since}, and none is running"
             ));
         }
-        QueueHealth::Unknown => missing.push("the queue cannot be read".to_owned()),
-        QueueHealth::Moving { .. } | QueueHealth::Held { .. } | QueueHealth::Paused { .. } => {}
+        QueueHealth::Unknown => problems.push("the queue cannot be read".to_owned()),
+        QueueHealth::Running { .. } | QueueHealth::Paused { .. } | QueueHealth::DiskFull { .. } => {}
     }
-    for slot in app.config.metrics.slots().standing_still() {
-        missing.push(format!(
-            "{slot} stands still: something on this host holds it although its agent was ended; restart the server"
+    for slot in app.config.metrics.slots().stuck() {
+        problems.push(format!(
+            "{slot} is stuck: a process on this host blocks it although its agent was killed; restart the server"
         ));
     }
     if app.config.capacity.slots == 0 {
-        missing.extend(elsewhere(app, waiting));
+        problems.extend(remote_problems(app, waiting));
     }
-    if missing.is_empty() {
+    if problems.is_empty() {
         return Ok(HealthView {
             status: "ok".to_owned(),
             version: env!("CARGO_PKG_VERSION").to_owned(),
             running,
             waiting,
             paused: match health.queue {
-                QueueHealth::Held { ruling, .. } => Some(ruling::of(ruling)),
+                QueueHealth::Paused { ruling, .. } => Some(ruling::view(ruling)),
                 _ => None,
             },
         });
     }
-    // How much is free exactly would tell every team how large the others' uploads are.
-    Err(Problem::new(ProblemKind::NotReady, missing.join("; "))
+    // The exact free space would reveal to every team how large the others' uploads are.
+    Err(Problem::new(ProblemKind::NotReady, problems.join("; "))
         .with(
             "database",
             if health.database_writable {
@@ -92,24 +92,24 @@ pub async fn now(app: &AppState) -> Result<HealthView, Problem> {
         .with("queue", queue)
         .with(
             "room",
-            match (short, without_room > 0) {
+            match (is_short, out_of_space_jobs > 0) {
                 (true, _) => "short",
                 (false, true) => "too little for some work",
                 (false, false) => "enough",
             },
         )
-        .with("min_free_bytes", room.min_free_bytes())
+        .with("min_free_bytes", free_space.min_free_bytes())
         .with("waiting", waiting))
 }
 
-/// What is missing where others play.
-fn elsewhere(app: &AppState, waiting: u32) -> Vec<String> {
-    let workers = workers::now(app);
-    let mut missing = workers.troubles;
+/// Problems of a server whose jobs run on remote workers only.
+fn remote_problems(app: &AppState, waiting: u32) -> Vec<String> {
+    let workers = workers::current(app);
+    let mut problems = workers.troubles;
     if workers.remote_slots == 0 && waiting > 0 {
-        missing.push(format!(
-            "{waiting} units of work wait, the server's own slots do not play, and no worker elsewhere can be given any"
+        problems.push(format!(
+            "{waiting} jobs are pending, the server has no slots of its own, and no remote worker can lease them"
         ));
     }
-    missing
+    problems
 }

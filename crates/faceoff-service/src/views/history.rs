@@ -1,14 +1,14 @@
-//! What each team came to on each day of a stage, and where it stood by then.
+//! Board history: results and ranks of all teams, day by day.
 
 use crate::{
     app::AppState,
     boxed,
     problem::Problem,
-    standing::Standing,
+    aggregated_rows::AggregatedRow,
     views::{
         board, division, ruling,
-        sight::Sight,
-        standings::{self, Counts},
+        visibility::Visibility,
+        board_rows::{self, CountingRule},
     },
 };
 use faceoff_api::{
@@ -20,19 +20,19 @@ use faceoff_api::{
 };
 use faceoff_scoring::RankedEntry;
 use faceoff_store::{BoardDays, BoardRecord, BoardScope, Stage};
-use faceoff_types::{Standings, Task, TeamId};
+use faceoff_types::{CountingResult, Task, TeamId};
 use jiff::civil::Date;
 use std::collections::BTreeMap;
 
-/// What a request asks for.
+/// The requested history.
 #[boxed]
-pub async fn asked(
+pub async fn query(
     app: &AppState,
-    sight: &Sight,
+    visibility: &Visibility,
     query: HistoryQuery,
 ) -> Result<HistoryView, Problem> {
-    let stage = board::stage_asked(app, sight, (query.stage, query.live)).await?;
-    let frozen = sight.frozen(stage.id).cloned();
+    let stage = board::requested_stage(app, visibility, (query.stage, query.live)).await?;
+    let frozen = visibility.frozen(stage.id).cloned();
     let scope = BoardScope {
         until: frozen
             .as_ref()
@@ -45,15 +45,15 @@ pub async fn asked(
         None => app.store.board_revision_within(&stage, &scope).await?,
     };
     let revisions = app.store.stage_revisions(stage.id).await?;
-    if !revisions.iter().any(|of| of.number == revision) {
+    if !revisions.iter().any(|known| known.number == revision) {
         return Err(Problem::not_found("revision of the stage's rules"));
     }
     let division = match query.division {
         Some(name) => Some(division::find(app, &name).await?),
         None => None,
     };
-    let by = query.by.map(BoardBy::standings);
-    let mut records = if sight.is_hidden(stage.id) {
+    let by = query.by.map(BoardBy::counting_result);
+    let mut records = if visibility.is_hidden(stage.id) {
         Vec::new()
     } else {
         let all = BoardDays::All;
@@ -61,14 +61,14 @@ pub async fn asked(
         board.await?
     };
     records.retain(|record| {
-        let of_team = &record.team.profile.division;
-        record.team.is_baseline || division.is_none() || *of_team == division
+        let team_division = &record.team.profile.division;
+        record.team.is_baseline || division.is_none() || *team_division == division
     });
-    let final_cut = app.store.final_cut(stage.id).await?;
-    let final_day = final_cut.map(|at| stage.day(at).date);
+    let final_cutoff = app.store.final_cutoff(stage.id).await?;
+    let final_day = final_cutoff.map(|at| stage.day(at).date);
     let rows_by = |day: Date| match (by, stage.settings.standings) {
         (Some(by), _) => by,
-        (None, Standings::Final) if final_day.is_none_or(|last| day < last) => Standings::Latest,
+        (None, CountingResult::Final) if final_day.is_none_or(|last| day < last) => CountingResult::Latest,
         (None, standings) => standings,
     };
     let rows = rows(records, rows_by, final_day, query.task)?;
@@ -79,7 +79,7 @@ pub async fn asked(
         by,
         task: query.task,
         division,
-        frozen: frozen.map(ruling::of),
+        frozen: frozen.map(ruling::view),
         days,
         rows,
         ..without_rows(stage)
@@ -94,7 +94,7 @@ fn without_rows(stage: Stage) -> HistoryView {
         standings: stage.settings.standings,
         by: None,
         blind: stage.settings.blind,
-        provisional: stage.finalised.is_none(),
+        provisional: stage.sign_off.is_none(),
         task: None,
         division: None,
         frozen: None,
@@ -103,57 +103,57 @@ fn without_rows(stage: Stage) -> HistoryView {
     }
 }
 
-/// Of records that stand team by team, the rows of each day with the ranks of the board as it stood by then.
+/// The rows of each day with the ranks of that day's board. `records` are grouped by team.
 fn rows(
     records: Vec<BoardRecord>,
-    rows_by: impl Fn(Date) -> Standings,
+    rows_by: impl Fn(Date) -> CountingResult,
     final_day: Option<Date>,
     task: Option<Task>,
 ) -> Result<Vec<HistoryRow>, Problem> {
-    // Teams in the order of the records.
-    let mut order = BTreeMap::new();
+    // Index of each team, in the order of the records.
+    let mut team_index = BTreeMap::new();
     let mut by_day: BTreeMap<Date, Vec<BoardRecord>> = BTreeMap::new();
     for record in records {
-        let next = order.len();
-        order.entry(record.team.id).or_insert(next);
+        let next = team_index.len();
+        team_index.entry(record.team.id).or_insert(next);
         by_day.entry(record.day).or_default().push(record);
     }
-    // Of each team the results that can still count.
-    let mut counting = vec![Vec::new(); order.len()];
+    // By team, the results that can still count.
+    let mut counting = vec![Vec::new(); team_index.len()];
     let mut rows = Vec::new();
-    for (day, of_day) in by_day {
-        let counts = Counts {
-            standings: rows_by(day),
+    for (day, day_records) in by_day {
+        let rule = CountingRule {
+            counting_result: rows_by(day),
             final_day,
             task,
         };
-        for record in &of_day {
-            let of_team: &mut Vec<BoardRecord> = &mut counting[order[&record.team.id]];
-            of_team.push(record.clone());
-            standings::forget(of_team, counts);
+        for record in &day_records {
+            let team_records: &mut Vec<BoardRecord> = &mut counting[team_index[&record.team.id]];
+            team_records.push(record.clone());
+            board_rows::drop_superseded(team_records, rule);
         }
-        let standing = standings::of_records(counting.concat(), counts)?;
-        let all = standings::ranked(standing, task, |row| &row.record);
-        let (ranked, baselines) = standings::apart(all, |row| row.record.team.is_baseline);
-        let mut of_day: Vec<HistoryRow> = of_day
+        let aggregated = board_rows::aggregate(counting.concat(), rule)?;
+        let all = board_rows::rank(aggregated, task, |row| &row.record);
+        let (ranked, baselines) = board_rows::split_baselines(all, |row| row.record.team.is_baseline);
+        let mut day_rows: Vec<HistoryRow> = day_records
             .iter()
             .filter_map(|record| {
                 let team = record.team.id;
                 row(record, task, rank(&ranked, team), rank(&baselines, team))
             })
             .collect();
-        of_day.sort_by_key(|row| (row.baseline, row.rank.or(row.would_rank)));
-        rows.extend(of_day);
+        day_rows.sort_by_key(|row| (row.baseline, row.rank.or(row.would_rank)));
+        rows.extend(day_rows);
     }
     Ok(rows)
 }
 
-fn rank(of: &[RankedEntry<Standing>], team: TeamId) -> Option<u32> {
-    let found = of.iter().find(|row| row.entry.key.record.team.id == team);
+fn rank(rows: &[RankedEntry<AggregatedRow>], team: TeamId) -> Option<u32> {
+    let found = rows.iter().find(|row| row.entry.key.record.team.id == team);
     found.map(|row| row.rank)
 }
 
-/// A day's own result; `None` if the task was not played.
+/// A day's result; `None` if the task was not evaluated.
 fn row(
     record: &BoardRecord,
     task: Option<Task>,

@@ -4,16 +4,16 @@ use faceoff_api::{
     requests::InvitedRole,
     views::invitation::{InvitationView, RegistrationView},
 };
-use faceoff_store::{Invitation, InvitationState, InvitedAs, Registration, RegistrationState};
+use faceoff_store::{Invitation, InvitationState, InvitationRole, Registration, RegistrationState};
 use jiff::Timestamp;
 
-/// An invitation, as it is at `now`.
-pub fn of(invitation: Invitation, now: Timestamp) -> InvitationView {
-    let (role, team, person) = match invitation.invited_as {
-        InvitedAs::Organiser => (InvitedRole::Organiser, None, None),
-        InvitedAs::Member(team) => (InvitedRole::Member, Some(team), None),
-        InvitedAs::Founder => (InvitedRole::Founder, None, None),
-        InvitedAs::Return(person) => (InvitedRole::Return, None, Some(person)),
+/// The invitation's state at `now`.
+pub fn view(invitation: Invitation, now: Timestamp) -> InvitationView {
+    let (role, team, person) = match invitation.role {
+        InvitationRole::Organiser => (InvitedRole::Organiser, None, None),
+        InvitationRole::Member(team) => (InvitedRole::Member, Some(team), None),
+        InvitationRole::Founder => (InvitedRole::Founder, None, None),
+        InvitationRole::PasswordReset(person) => (InvitedRole::Return, None, Some(person)),
     };
     let (state, accepted_by) = match invitation.state {
         InvitationState::Accepted { by, .. } => ("accepted", Some(by)),
@@ -36,7 +36,7 @@ pub fn of(invitation: Invitation, now: Timestamp) -> InvitationView {
 
 pub fn registration(registration: Registration) -> RegistrationView {
     let (state, decided_at, reason, team) = match registration.state {
-        RegistrationState::Waiting => ("waiting", None, None, None),
+        RegistrationState::Pending => ("waiting", None, None, None),
         RegistrationState::Approved { at, team } => ("approved", Some(at), None, Some(team)),
         RegistrationState::Refused { at, reason } => ("refused", Some(at), Some(reason), None),
     };

@@ -1,24 +1,24 @@
-//! How a team stands today.
+//! A team's own status: today's evaluation and the submission for the next cutoff.
 
 use crate::{
     app::AppState,
     boxed,
     problem::Problem,
     viewer::Viewer,
-    views::{day, evaluation, sight::Sight, stage, submission, team},
+    views::{day, evaluation, visibility::Visibility, stage, submission, team},
 };
 use faceoff_api::views::{
-    me::{MeView, TurnView, ValidatingView},
+    me::{MeView, TodayView, PendingValidationView},
     submission::SubmissionStatus,
 };
 use faceoff_store::{Evaluation, EvaluationState, Team};
 
-/// What there is to know for a team.
+/// The status of a team.
 #[boxed]
-pub async fn of(app: &AppState, team: Team) -> Result<MeView, Problem> {
-    let sight = Sight::of(app, Viewer::Team(team.id)).await?;
+pub async fn build(app: &AppState, team: Team) -> Result<MeView, Problem> {
+    let visibility = Visibility::load(app, Viewer::Team(team.id)).await?;
     let today = stage::current(app).await?.day(app.config.clock.now());
-    let counts = |evaluation: &Evaluation| {
+    let counts_for_day = |evaluation: &Evaluation| {
         let stopped = matches!(
             evaluation.state,
             EvaluationState::PlatformFailed { .. }
@@ -30,25 +30,25 @@ pub async fn of(app: &AppState, team: Team) -> Result<MeView, Problem> {
     let evaluations = app.store.evaluations_of(team.id).await?;
     let evaluation = evaluations
         .iter()
-        .find(|evaluation| evaluation.of == today && counts(evaluation))
+        .find(|evaluation| evaluation.stage_day == today && counts_for_day(evaluation))
         .cloned();
     let evaluation = match evaluation {
-        Some(evaluation) => Some(evaluation::of(app, &sight, evaluation).await?),
+        Some(evaluation) => Some(evaluation::build(app, &visibility, evaluation).await?),
         None => None,
     };
-    let submissions = submission::of_team(app, team.id).await?;
+    let submissions = submission::team_submissions(app, team.id).await?;
     let validating = submissions
         .iter()
         .filter(|submission| submission.status == SubmissionStatus::Validating)
-        .map(|submission| ValidatingView {
+        .map(|submission| PendingValidationView {
             submission: submission.id,
             queue: submission.queue,
             next: submission.next.clone(),
         });
     let active = submissions.iter().find(|submission| submission.active);
     Ok(MeView {
-        team: team::of(team),
-        turn: TurnView {
+        team: team::view(team),
+        turn: TodayView {
             stage: today.stage,
             day: today.date,
             evaluation: evaluation.as_ref().map(|evaluation| evaluation.id),
@@ -58,7 +58,7 @@ pub async fn of(app: &AppState, team: Team) -> Result<MeView, Problem> {
         validating: validating.collect(),
         active_submission: active.map(|submission| submission.id),
         not_taken: active.map_or_else(Vec::new, |active| active.not_taken.clone()),
-        next_cut: day::first_cut(app).await?,
+        next_cut: day::first_cutoff(app).await?,
         max_bundle_bytes: app.config.max_bundle_bytes,
     })
 }

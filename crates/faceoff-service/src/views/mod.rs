@@ -1,13 +1,13 @@
-//! How what can be known of a resource is made from the store and the scoring: one file per resource. Its types are
+//! Builds response bodies from the store and the scoring, one file per resource. Their types are in
 //! [`faceoff_api::views`].
 //!
-//! What may be told of a day's episodes follows from its release, the same for everybody. Who asks decides in one
-//! file alone, `sight.rs`: of blind stages, whose scores the organiser sees, and of evaluations that are not public.
+//! Data about a day's episodes becomes visible with the day's release, for everyone at once. What depends on the viewer
+//! (scores of blind stages, evaluations that are not public) is decided only in [`visibility`].
 
 pub mod ablation;
 pub mod ablation_clips;
 pub mod announcement;
-pub(crate) mod archived;
+pub(crate) mod archive;
 pub mod attempt;
 pub mod board;
 pub mod capacity;
@@ -19,16 +19,16 @@ mod division;
 pub mod evaluation;
 pub mod event;
 pub mod feed;
-pub(crate) mod finalised;
+pub(crate) mod sign_off;
 pub mod game;
 pub mod game_clips;
-pub mod game_live;
+pub mod live_game;
 pub mod health;
 pub mod history;
 pub mod invitation;
 pub mod me;
-pub(crate) mod not_taken;
-pub mod person;
+pub(crate) mod exclusions;
+pub mod user;
 pub mod proposal;
 pub mod queue;
 pub mod ratings;
@@ -36,16 +36,16 @@ pub mod replays;
 pub mod ruling;
 pub mod runtimes;
 pub mod season;
-pub mod sight;
+pub mod visibility;
 pub mod stage;
-mod standings;
+mod board_rows;
 pub mod storage;
 pub mod submission;
 pub mod team;
 pub mod token;
 pub mod tournament;
-pub mod tournament_sheet;
-pub mod trail;
+pub mod tournament_state;
+pub mod board_timeline;
 pub mod violations;
 pub mod webhook;
 pub mod workers;

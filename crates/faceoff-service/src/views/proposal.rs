@@ -1,12 +1,12 @@
-//! What is tried without counting, and what a re-evaluation would change.
+//! Trials and proposed re-evaluations, and the changes that they would make.
 
 use crate::{
     app::AppState,
     boxed,
     problem::Problem,
     views::{
-        board::{self, Whose},
-        sight::Sight,
+        board::{self, BoardSelection},
+        visibility::Visibility,
     },
 };
 use faceoff_api::{
@@ -15,66 +15,66 @@ use faceoff_api::{
         board::BoardView,
         evaluation::{FaultView, Progress, ResultView},
         proposal::{
-            ChangeView, DraftStatus, DraftView, OutcomeView, ProposalKindView, ProposalStateView,
-            ProposalView, StandingView,
+            ChangeView, ProposedEvaluationStatus, ProposedEvaluationView, OutcomeView, ProposalKindView, ProposalStateView,
+            ProposalView, RankView,
         },
-        shown,
+        printable,
     },
 };
 use faceoff_store::{
-    BoardRecord, BoardScope, Draft, EvaluationState, Proposal, ProposalKind, Settled, Stage,
+    BoardRecord, BoardScope, ProposedEvaluation, EvaluationState, Proposal, ProposalKind, ProposalOutcome, Stage,
 };
 use faceoff_types::{ProposalId, TeamId};
 use jiff::Timestamp;
 use std::collections::BTreeSet;
 
-async fn draft(app: &AppState, draft: Draft, is_dropped: bool) -> Result<DraftView, Problem> {
+async fn evaluation_view(app: &AppState, evaluation: ProposedEvaluation, is_dropped: bool) -> Result<ProposedEvaluationView, Problem> {
     let (mut done, mut total) = (0, 0);
     if let EvaluationState::Running {
         episodes_done,
         episodes_total,
-    } = &draft.state
+    } = &evaluation.state
     {
         (done, total) = (*episodes_done, *episodes_total);
     }
-    let status = match draft.state {
-        EvaluationState::Queued => DraftStatus::Queued,
-        EvaluationState::Running { .. } => DraftStatus::Running,
-        EvaluationState::Finalising => DraftStatus::Finalising,
+    let status = match evaluation.state {
+        EvaluationState::Queued => ProposedEvaluationStatus::Queued,
+        EvaluationState::Running { .. } => ProposedEvaluationStatus::Running,
+        EvaluationState::Finalising => ProposedEvaluationStatus::Finalising,
         EvaluationState::Finished {
             finished_at,
             result,
             dataset_blake3,
             ..
-        } => DraftStatus::Finished {
+        } => ProposedEvaluationStatus::Finished {
             finished_at,
             result: Box::new(ResultView::new(*result, true)),
-            dataset: (!is_dropped).then(|| format!("{}/dataset", paths::evaluation(draft.id))),
+            dataset: (!is_dropped).then(|| format!("{}/dataset", paths::evaluation(evaluation.id))),
             dataset_blake3: dataset_blake3.filter(|_| !is_dropped),
         },
         EvaluationState::AgentFailed { finished_at } => {
-            let of_run = app.store.run_faults(draft.run).await?;
-            DraftStatus::AgentFailed {
+            let run_faults = app.store.run_faults(evaluation.run).await?;
+            ProposedEvaluationStatus::AgentFailed {
                 finished_at,
-                faults: of_run.faults.into_iter().map(FaultView::from).collect(),
+                faults: run_faults.faults.into_iter().map(FaultView::from).collect(),
             }
         }
         EvaluationState::PlatformFailed {
             finished_at,
             reason,
-        } => DraftStatus::PlatformFailed {
+        } => ProposedEvaluationStatus::PlatformFailed {
             finished_at,
-            reason: shown(reason),
+            reason: printable(reason),
         },
         EvaluationState::NotPlayed { finished_at, .. }
-        | EvaluationState::Cancelled { finished_at, .. } => DraftStatus::Cancelled { finished_at },
+        | EvaluationState::Cancelled { finished_at, .. } => ProposedEvaluationStatus::Cancelled { finished_at },
     };
-    Ok(DraftView {
-        evaluation: draft.id,
-        team: draft.team,
-        team_name: app.store.team(draft.team).await?.name,
-        submission: draft.submission,
-        replaces: draft.replaces,
+    Ok(ProposedEvaluationView {
+        evaluation: evaluation.id,
+        team: evaluation.team,
+        team_name: app.store.team(evaluation.team).await?.name,
+        submission: evaluation.submission,
+        replaces: evaluation.replaces,
         progress: Progress {
             episodes_done: done,
             episodes_total: total,
@@ -83,27 +83,27 @@ async fn draft(app: &AppState, draft: Draft, is_dropped: bool) -> Result<DraftVi
     })
 }
 
-/// The row that a draft with a score would be.
+/// The board record of a proposed evaluation with a score.
 async fn record(
     app: &AppState,
     stage: &Stage,
     proposal: &Proposal,
-    draft: &Draft,
+    evaluation: &ProposedEvaluation,
 ) -> Result<Option<BoardRecord>, Problem> {
     let EvaluationState::Finished {
         finished_at,
         result,
         ..
-    } = &draft.state
+    } = &evaluation.state
     else {
         return Ok(None);
     };
-    let team = app.store.team(draft.team).await?;
+    let team = app.store.team(evaluation.team).await?;
     if team.disqualified.is_some() {
         return Ok(None);
     }
-    let submission = app.store.submission(draft.submission).await?;
-    let (released_at, extra_for) = match draft.replaces {
+    let submission = app.store.submission(evaluation.submission).await?;
+    let (released_at, extra_for) = match evaluation.replaces {
         Some(id) => {
             let replaced = app.store.evaluation(id).await?;
             (replaced.released_at, replaced.extra_for)
@@ -116,8 +116,8 @@ async fn record(
         submission: submission.id,
         submitted_at: submission.created_at,
         agent_name: submission.agent_name,
-        evaluation: draft.id,
-        run: draft.run,
+        evaluation: evaluation.id,
+        run: evaluation.run,
         day: day.unwrap_or_else(|| stage.day(proposal.created_at).date),
         released_at,
         extra_for,
@@ -129,25 +129,25 @@ async fn record(
 async fn outcome(
     app: &AppState,
     proposal: &Proposal,
-    drafts: &[Draft],
+    proposed: &[ProposedEvaluation],
 ) -> Result<OutcomeView, Problem> {
     let stage = app.store.stage(proposal.stage).await?;
-    let sight = Sight::of_organiser(app).await?;
+    let visibility = Visibility::for_organiser(app).await?;
     let mut played = Vec::new();
-    for draft in drafts {
-        played.extend(record(app, &stage, proposal, draft).await?);
+    for evaluation in proposed {
+        played.extend(record(app, &stage, proposal, evaluation).await?);
     }
     let revision = proposal.revision;
     let old_revision = match proposal.kind {
         ProposalKind::Trial => {
-            // Nothing that counts.
+            // Without the results that count.
             let nothing = BoardScope {
                 until: Some(Timestamp::MIN),
                 ..BoardScope::default()
             };
-            let tried = (&nothing, played);
+            let trial_results = (&nothing, played);
             let new_board =
-                board::of(app, &sight, &stage, revision, Whose::default(), tried).await?;
+                board::build(app, &visibility, &stage, revision, BoardSelection::default(), trial_results).await?;
             return Ok(OutcomeView {
                 changes: Vec::new(),
                 old_board: None,
@@ -157,19 +157,19 @@ async fn outcome(
         ProposalKind::Rules(_) => app.store.board_revision(&stage).await?,
         ProposalKind::Evaluation(_) | ProposalKind::Day(_) => revision,
     };
-    let now = (&BoardScope::default(), Vec::new());
-    let old_board = board::of(app, &sight, &stage, old_revision, Whose::default(), now).await?;
-    // What we broke replaces nothing.
-    let replaces = |draft: &Draft| match draft.state {
-        EvaluationState::Finished { .. } | EvaluationState::AgentFailed { .. } => draft.replaces,
+    let current_scope = (&BoardScope::default(), Vec::new());
+    let old_board = board::build(app, &visibility, &stage, old_revision, BoardSelection::default(), current_scope).await?;
+    // A platform fault replaces no result.
+    let replaces = |evaluation: &ProposedEvaluation| match evaluation.state {
+        EvaluationState::Finished { .. } | EvaluationState::AgentFailed { .. } => evaluation.replaces,
         _ => None,
     };
     let scope = BoardScope {
-        without: drafts.iter().filter_map(replaces).collect(),
+        without: proposed.iter().filter_map(replaces).collect(),
         ..BoardScope::default()
     };
-    let then = (&scope, played);
-    let new_board = board::of(app, &sight, &stage, revision, Whose::default(), then).await?;
+    let new_scope = (&scope, played);
+    let new_board = board::build(app, &visibility, &stage, revision, BoardSelection::default(), new_scope).await?;
     Ok(OutcomeView {
         changes: changes(&old_board, &new_board),
         old_board: Some(old_board),
@@ -177,20 +177,20 @@ async fn outcome(
     })
 }
 
-/// Whose rank, tier, score or points differ, in the order of the new board, then of the old one.
+/// Teams whose rank, tier, score or points differ, in the order of the new board, then of the old one.
 fn changes(old: &BoardView, new: &BoardView) -> Vec<ChangeView> {
-    let standing = |board: &BoardView, team: TeamId| {
+    let rank = |board: &BoardView, team: TeamId| {
         let ranked = board.rows.iter().find(|row| row.team_id == team);
-        let ranked = ranked.map(|row| StandingView {
+        let ranked = ranked.map(|row| RankView {
             rank: row.rank,
             tier: row.tier,
             score: row.score,
             penalty_points: row.penalty_points,
         });
-        // A baseline stands where it would.
+        // A baseline has the rank that it would have as a team.
         ranked.or_else(|| {
             let row = board.baselines.iter().find(|row| row.team_id == team)?;
-            Some(StandingView {
+            Some(RankView {
                 rank: row.would_rank,
                 tier: row.tier,
                 score: row.score,
@@ -209,37 +209,37 @@ fn changes(old: &BoardView, new: &BoardView) -> Vec<ChangeView> {
         .filter(|(id, _)| seen.insert(*id))
         .map(|(id, team)| ChangeView {
             team: team.clone(),
-            old: standing(old, id),
-            new: standing(new, id),
+            old: rank(old, id),
+            new: rank(new, id),
         })
         .filter(|change| change.old != change.new)
         .collect()
 }
 
-/// These, in their order, without what they play.
+/// The proposals, in order, without their evaluations.
 #[boxed]
 pub async fn heads(app: &AppState, proposals: Vec<Proposal>) -> Result<Vec<ProposalView>, Problem> {
     let mut views = Vec::new();
     for proposal in proposals {
-        let (proposal, drafts) = app.store.proposal(proposal.id).await?;
-        views.push(head(app, &proposal, &drafts).await?);
+        let (proposal, proposed) = app.store.proposal(proposal.id).await?;
+        views.push(head(app, &proposal, &proposed).await?);
     }
     Ok(views)
 }
 
-/// One, with what it plays and, if that is to be decided, what it would change.
+/// A proposal with its evaluations and, once it can be decided, the changes that it would make.
 #[boxed]
 pub async fn find(app: &AppState, id: ProposalId) -> Result<ProposalView, Problem> {
-    let (proposal, drafts) = app.store.proposal(id).await?;
-    let head = head(app, &proposal, &drafts).await?;
+    let (proposal, proposed) = app.store.proposal(id).await?;
+    let head = head(app, &proposal, &proposed).await?;
     let outcome = match head.state {
-        ProposalStateView::Played => Some(outcome(app, &proposal, &drafts).await?),
+        ProposalStateView::Played => Some(outcome(app, &proposal, &proposed).await?),
         _ => None,
     };
-    let is_dropped = matches!(proposal.settled, Some(Settled::Dropped(_)));
+    let is_dropped = matches!(proposal.outcome, Some(ProposalOutcome::Dropped(_)));
     let mut evaluations = Vec::new();
-    for one in drafts {
-        evaluations.push(draft(app, one, is_dropped).await?);
+    for evaluation in proposed {
+        evaluations.push(evaluation_view(app, evaluation, is_dropped).await?);
     }
     Ok(ProposalView {
         evaluations,
@@ -251,13 +251,13 @@ pub async fn find(app: &AppState, id: ProposalId) -> Result<ProposalView, Proble
 async fn head(
     app: &AppState,
     proposal: &Proposal,
-    drafts: &[Draft],
+    proposed: &[ProposedEvaluation],
 ) -> Result<ProposalView, Problem> {
     let stage = app.store.stage(proposal.stage).await?;
-    let is_over = drafts.iter().all(|draft| draft.state.is_over());
-    let (state, settled_at) = match proposal.settled {
-        Some(Settled::Applied(at)) => (ProposalStateView::Applied, Some(at)),
-        Some(Settled::Dropped(at)) => (ProposalStateView::Dropped, Some(at)),
+    let is_over = proposed.iter().all(|evaluation| evaluation.state.is_over());
+    let (state, settled_at) = match proposal.outcome {
+        Some(ProposalOutcome::Applied(at)) => (ProposalStateView::Applied, Some(at)),
+        Some(ProposalOutcome::Dropped(at)) => (ProposalStateView::Dropped, Some(at)),
         None if is_over => (ProposalStateView::Played, None),
         None => (ProposalStateView::Playing, None),
     };

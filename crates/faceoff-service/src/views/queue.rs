@@ -1,27 +1,27 @@
-//! Where something stands in the queue.
+//! Positions in the queue.
 
 use crate::{app::AppState, boxed, problem::Problem};
 use faceoff_api::views::queue::QueueView;
-use faceoff_store::{Outlook, QueuePlace};
+use faceoff_store::{QueueForecast, QueuePosition};
 
-/// A place in the queue.
-pub fn of(place: QueuePlace) -> QueueView {
+
+pub fn view(position: QueuePosition) -> QueueView {
     QueueView {
-        place: place.place,
-        of: place.of,
-        expected_at: place.expected_at,
+        place: position.position,
+        of: position.total,
+        expected_at: position.expected_at,
     }
 }
 
-/// Slots that play now, here and on other machines.
+/// Slots that run jobs now: the server's own and those of remote workers.
 pub fn slots(app: &AppState) -> u32 {
-    let elsewhere = app.store.workers().slots(app.config.clock.now());
-    app.config.capacity.slots + elsewhere
+    let remote = app.store.workers().available_slots(app.config.clock.now());
+    app.config.capacity.slots + remote
 }
 
-/// Where everything stands that waits or is under way.
+/// Positions and expected completion of all pending and running evaluations and validation runs.
 #[boxed]
-pub async fn outlook(app: &AppState) -> Result<Outlook, Problem> {
+pub async fn forecast(app: &AppState) -> Result<QueueForecast, Problem> {
     let now = app.config.clock.now();
-    Ok(app.store.outlook(slots(app), now).await?)
+    Ok(app.store.queue_forecast(slots(app), now).await?)
 }

@@ -1,10 +1,10 @@
-//! How strong a tournament's submissions are, from their games.
+//! Ratings of a tournament's submissions, from their games.
 
 use crate::{
     app::App,
     boxed,
     problem::{Problem, ProblemKind},
-    views::tournament_sheet::TournamentSheet,
+    views::tournament_state::TournamentState,
 };
 use faceoff_scoring::tournament::{
     HeadToHead, head_to_head,
@@ -13,23 +13,23 @@ use faceoff_scoring::tournament::{
 use faceoff_types::TournamentId;
 use std::sync::Arc;
 
-/// As they were worked out since the newest change of the season; the same numbers for everybody. In a task of its own,
-/// so that who asks and goes does not have them worked out for nobody.
+/// The ratings, cached until the season changes. They are computed in a separate task, so that the result is cached even
+/// if the client disconnects.
 #[boxed]
 pub async fn ratings(app: &App, id: TournamentId) -> Result<Arc<Ratings>, Problem> {
     let app = Arc::clone(app);
     let task = tokio::spawn(async move {
-        let make = async || make(&app, id).await;
-        app.ratings.get(&app.store, id, make).await
+        let compute_ratings = async || compute(&app, id).await;
+        app.rating_cache.get(&app.store, id, compute_ratings).await
     });
     task.await.map_err(Problem::internal)?
 }
 
-async fn make(app: &App, id: TournamentId) -> Result<Ratings, Problem> {
-    let sheet = TournamentSheet::find(app, id).await?;
-    // A thousand fits for the intervals.
+async fn compute(app: &App, id: TournamentId) -> Result<Ratings, Problem> {
+    let state = TournamentState::find(app, id).await?;
+    // The intervals need a thousand fits.
     let rated =
-        tokio::task::spawn_blocking(move || rate(sheet.departures.counting(sheet.played())));
+        tokio::task::spawn_blocking(move || rate(state.departures.counting(state.played())));
     match rated.await.map_err(Problem::internal)? {
         Err(error @ RatingError::TooMany(_)) => {
             Err(Problem::new(ProblemKind::Conflict, error.to_string()))
@@ -38,9 +38,9 @@ async fn make(app: &App, id: TournamentId) -> Result<Ratings, Problem> {
     }
 }
 
-/// The record of each two teams that met, by name.
+/// The head-to-head record of each pair of teams that met, by name.
 #[boxed]
 pub async fn records(app: &App, id: TournamentId) -> Result<Vec<HeadToHead>, Problem> {
-    let sheet = TournamentSheet::find(app, id).await?;
-    Ok(head_to_head(sheet.departures.counting(sheet.played())))
+    let state = TournamentState::find(app, id).await?;
+    Ok(head_to_head(state.departures.counting(state.played())))
 }

@@ -1,38 +1,38 @@
-//! The schedule of a tournament, played again with fresh seeds: who would have been its champion.
+//! Replays of a tournament's schedule with other seeds, to estimate how certain its champion is.
 
 use crate::{
     app::App,
     boxed,
     problem::Problem,
-    views::{tournament::first_place, tournament_sheet::TournamentSheet},
+    views::{tournament::first_place, tournament_state::TournamentState},
 };
-use faceoff_api::views::certainty::CertaintyView;
-use faceoff_scoring::tournament::champions;
-use faceoff_store::{Game, GamePurpose, GameState, GamesOf};
+use faceoff_api::views::champion_shares::ChampionSharesView;
+use faceoff_scoring::tournament::compute_champion_shares;
+use faceoff_store::{Game, GamePurpose, GameState, GameFilter};
 use faceoff_types::{TeamName, TournamentId};
 use std::{collections::BTreeMap, sync::Arc};
 
-/// As it was worked out since the newest change of the season. In a task of its own, so that who asks and goes does
-/// not have it worked out for nobody.
+/// The shares, cached until the season changes. They are computed in a separate task, so that the result is cached even
+/// if the client disconnects.
 #[boxed]
-pub async fn certainty(app: &App, id: TournamentId) -> Result<Arc<CertaintyView>, Problem> {
+pub async fn champion_shares(app: &App, id: TournamentId) -> Result<Arc<ChampionSharesView>, Problem> {
     let app = Arc::clone(app);
     let task = tokio::spawn(async move {
-        let make = async || make(&app, id).await;
-        app.certainties.get(&app.store, id, make).await
+        let compute_shares = async || compute(&app, id).await;
+        app.champion_share_cache.get(&app.store, id, compute_shares).await
     });
     task.await.map_err(Problem::internal)?
 }
 
-async fn make(app: &App, id: TournamentId) -> Result<CertaintyView, Problem> {
-    let sheet = TournamentSheet::find(app, id).await?;
-    let games = app.store.games(id, GamesOf::Replays).await?;
-    // Each result is read and scored: of a thousand replays that is some work.
-    let made = tokio::task::spawn_blocking(move || of(&sheet, &games));
-    made.await.map_err(Problem::internal)?
+async fn compute(app: &App, id: TournamentId) -> Result<ChampionSharesView, Problem> {
+    let state = TournamentState::find(app, id).await?;
+    let games = app.store.games(id, GameFilter::Replays).await?;
+    // Every result is parsed and scored, which takes a while for a thousand replays.
+    let shares = tokio::task::spawn_blocking(move || count_champions(&state, &games));
+    shares.await.map_err(Problem::internal)?
 }
 
-fn of(sheet: &TournamentSheet, games: &[Game]) -> Result<CertaintyView, Problem> {
+fn count_champions(state: &TournamentState, games: &[Game]) -> Result<ChampionSharesView, Problem> {
     let mut replays = BTreeMap::<u32, Vec<&Game>>::new();
     for game in games {
         if let GamePurpose::Replay { replay, .. } = game.purpose {
@@ -41,19 +41,19 @@ fn of(sheet: &TournamentSheet, games: &[Game]) -> Result<CertaintyView, Problem>
     }
     let mut first_places = Vec::<TeamName>::new();
     let mut given_up = 0;
-    for of_replay in replays.values() {
-        let (mut awaits, mut lacks) = (false, false);
-        for game in of_replay {
+    for games in replays.values() {
+        let (mut is_running, mut is_incomplete) = (false, false);
+        for game in games {
             let is_played = matches!(game.state, GameState::Played(_));
-            if !is_played && sheet.taken_out_by(game)?.is_none() {
-                awaits |= game.state.is_open();
-                lacks |= !game.state.is_open();
+            if !is_played && state.excluded_by(game)?.is_none() {
+                is_running |= game.state.is_open();
+                is_incomplete |= !game.state.is_open();
             }
         }
-        if lacks {
+        if is_incomplete {
             given_up += 1;
-        } else if !awaits {
-            let tables = sheet.tables(&sheet.results(of_replay.iter().copied())?);
+        } else if !is_running {
+            let tables = state.tables(&state.results(games.iter().copied())?);
             first_places.extend(tables.first().and_then(first_place));
         }
     }
@@ -63,13 +63,13 @@ fn of(sheet: &TournamentSheet, games: &[Game]) -> Result<CertaintyView, Problem>
     let to_be_played = games
         .iter()
         .filter(|game| !matches!(game.state, GameState::Cancelled { .. }));
-    Ok(CertaintyView {
+    Ok(ChampionSharesView {
         replays: count(replays.len()),
         complete: count(first_places.len()),
         given_up,
         games: count(to_be_played.count()),
         games_played: count(played.count()),
-        champions: champions(&first_places),
+        champions: compute_champion_shares(&first_places),
     })
 }
 

@@ -4,6 +4,6 @@ use faceoff_api::views::ruling::RulingView;
 use faceoff_store::Ruling;
 
 /// A ruling of the organisers.
-pub fn of(Ruling { at, reason }: Ruling) -> RulingView {
+pub fn view(Ruling { at, reason }: Ruling) -> RulingView {
     RulingView { at, reason }
 }

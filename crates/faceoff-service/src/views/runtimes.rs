@@ -1,20 +1,20 @@
-//! What agents find on this server: runtimes with their packages, and limits, contest by contest.
+//! Runtimes and resource limits of agents, for the server and for each stage and tournament.
 
 use crate::{app::AppState, boxed, problem::Problem, views::stage};
 use faceoff_api::views::{
-    runtimes::{Absent, RuntimesView, StageOffer, TournamentOffer},
+    runtimes::{Absent, RuntimesView, StageResources, TournamentResources},
     stage::PhaseView,
 };
 use faceoff_types::{RULESET, RuntimeContent, RuntimeInventory, Runtimes};
 
-/// What agents find here now.
+/// The current runtimes and limits.
 #[boxed]
-pub async fn now(app: &AppState) -> Result<RuntimesView, Problem> {
-    let offer = &app.config.offer;
-    let gave_up = || Problem::internal("the runtimes were not looked into to the end");
-    let found = offer.inventories().await.ok_or_else(gave_up)?;
-    let runtimes: Vec<_> = found.iter().map(public).collect();
-    let taken = |by: Option<&Runtimes>| -> Vec<String> {
+pub async fn build(app: &AppState) -> Result<RuntimesView, Problem> {
+    let resources = &app.config.agent_resources;
+    let aborted = || Problem::internal("the inspection of the runtimes was aborted");
+    let inventories = resources.inventories().await.ok_or_else(aborted)?;
+    let runtimes: Vec<_> = inventories.iter().map(public).collect();
+    let accepted = |by: Option<&Runtimes>| -> Vec<String> {
         let names = runtimes.iter().map(|runtime| &runtime.name);
         names
             .filter(|name| by.is_none_or(|by| by.contains(name)))
@@ -25,33 +25,33 @@ pub async fn now(app: &AppState) -> Result<RuntimesView, Problem> {
     let mut stages = Vec::new();
     for stage in app.store.stages().await? {
         let phase = stage::phase(stage.phase(now));
-        if phase == PhaseView::Closed || stage.finalised.is_some() {
+        if phase == PhaseView::Closed || stage.sign_off.is_some() {
             continue;
         }
         let rules = &stage.rules.rules;
-        stages.push(StageOffer {
-            runtimes: taken(rules.runtimes.as_ref()),
-            limits: rules.limits.over(&offer.limits),
+        stages.push(StageResources {
+            runtimes: accepted(rules.runtimes.as_ref()),
+            limits: rules.limits.apply_to(&resources.limits),
             id: stage.id,
             name: stage.name,
             phase,
         });
     }
     let tournaments = app.store.tournaments().await?.into_iter();
-    let tournaments = tournaments.filter(|one| one.closed_at.is_none());
+    let tournaments = tournaments.filter(|tournament| tournament.closed_at.is_none());
     Ok(RuntimesView {
         ruleset: RULESET.to_owned(),
-        machine: offer.machine.clone(),
+        machine: resources.machine.clone(),
         gpu: Absent::None,
         network: Absent::None,
-        limits: offer.limits.clone(),
+        limits: resources.limits.clone(),
         stages,
         tournaments: tournaments
-            .map(|tournament| TournamentOffer {
+            .map(|tournament| TournamentResources {
                 id: tournament.id,
                 name: tournament.name,
-                runtimes: taken(tournament.rules.runtimes.as_ref()),
-                limits: tournament.rules.limits.over(&offer.limits),
+                runtimes: accepted(tournament.rules.runtimes.as_ref()),
+                limits: tournament.rules.limits.apply_to(&resources.limits),
                 game_limits: tournament.rules.game_limits,
             })
             .collect(),
@@ -59,14 +59,14 @@ pub async fn now(app: &AppState) -> Result<RuntimesView, Problem> {
     })
 }
 
-/// Why a runtime does not work may name the host's folders.
+/// Hides why a runtime does not work: the reason may contain the host's folders.
 fn public(runtime: &RuntimeInventory) -> RuntimeInventory {
     match &runtime.content {
-        RuntimeContent::Broken { .. } => RuntimeInventory {
+        RuntimeContent::Failed { .. } => RuntimeInventory {
             name: runtime.name.clone(),
-            content: RuntimeContent::Broken {
-                why:
-                    "it does not work; the server's log and `faceoff doctor` tell the organiser why"
+            content: RuntimeContent::Failed {
+                reason:
+                    "it does not work; the server's log and `faceoff doctor` show the reason to the organisers"
                         .to_owned(),
             },
         },

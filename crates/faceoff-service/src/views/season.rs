@@ -1,11 +1,11 @@
-//! The season's commitment, and what may be known of its seeds.
+//! The season: its commitment, stages and days, and the seeds that are revealed.
 
 use crate::{
     app::AppState,
     boxed,
     problem::Problem,
     viewer::Viewer,
-    views::{archived, day, ruling, sight::Sight, stage},
+    views::{archive, day, ruling, visibility::Visibility, stage},
 };
 use faceoff_api::views::{
     ruling::RulingView,
@@ -14,48 +14,48 @@ use faceoff_api::views::{
 use faceoff_types::{RULESET, Seed, StageDay};
 use std::{collections::HashMap, sync::atomic::Ordering};
 
-/// The season as the viewer sees it.
+/// The season, as the viewer may see it.
 #[boxed]
-pub async fn now(app: &AppState, viewer: Viewer) -> Result<SeasonView, Problem> {
+pub async fn build(app: &AppState, viewer: Viewer) -> Result<SeasonView, Problem> {
     let season = app.store.season().await?;
-    look_for_tournaments(app).await?;
-    let sight = Sight::of(app, viewer).await?;
+    update_has_tournaments(app).await?;
+    let visibility = Visibility::load(app, viewer).await?;
     let days = app.store.days().await?;
     let missed: HashMap<StageDay, String> = app.store.missed_days().await?.into_iter().collect();
     let stages = app.store.stages().await?;
     let seeds = app
         .store
-        .day_seeds(&season, &stages, days.iter().map(|(day, _)| day.of))
+        .day_seeds(&season, &stages, days.iter().map(|(day, _)| day.stage_day))
         .await?;
     let revealed = |seed: Seed| season.closed_at.map(|_| seed);
     Ok(SeasonView {
         ruleset: RULESET.to_owned(),
         created_at: season.created_at,
         closed_at: season.closed_at,
-        paused: season.paused.map(ruling::of),
-        archived: app.store.archived().map(archived::of),
-        takes_registrations: season.takes_registrations,
+        paused: season.paused.map(ruling::view),
+        archived: app.store.archived_season().map(archive::view),
+        takes_registrations: season.registration_open,
         divisions: app.store.divisions().await?,
         terms_version: app.store.terms().await?.first().map(|terms| terms.version),
         secret: revealed(season.secret),
         mismatch_seed: revealed(season.secret.model_mismatch()),
         today: stage::current(app).await?.day(app.config.clock.now()).date,
-        stages: stage::all_seen_by(app, viewer).await?,
-        next_cut: day::first_cut(app).await?,
+        stages: stage::all_for_viewer(app, viewer).await?,
+        next_cut: day::first_cutoff(app).await?,
         days: days
             .into_iter()
             .map(|(day, finished)| SeasonDay {
-                stage: day.of.stage,
-                day: day.of.date,
-                cut_at: day.cut_at,
+                stage: day.stage_day.stage,
+                day: day.stage_day.date,
+                cut_at: day.cutoff_at,
                 deadline_at: day.deadline_at,
                 released_at: day.released_at,
-                missed: missed.get(&day.of).cloned(),
+                missed: missed.get(&day.stage_day).cloned(),
                 finished,
                 seed: day
                     .released_at
-                    .filter(|_| !sight.is_hidden(day.of.stage))
-                    .and_then(|_| seeds.get(&day.of).copied()),
+                    .filter(|_| !visibility.is_hidden(day.stage_day.stage))
+                    .and_then(|_| seeds.get(&day.stage_day).copied()),
             })
             .collect(),
         name: season.name,
@@ -63,32 +63,31 @@ pub async fn now(app: &AppState, viewer: Viewer) -> Result<SeasonView, Problem> 
     })
 }
 
-/// What the heads of pages tell of the season: one read, however long the season is.
+/// The season's data in page headers; one database read, however long the season is.
 pub struct SeasonHead {
-    /// As the organiser named it.
     pub name: String,
-    /// The hash of its secret, in hexadecimal digits.
+    /// Hash of the season secret, in hexadecimal digits.
     pub commitment: String,
-    /// The organiser holds the queue: since when, and why.
+    /// If an organiser paused the queue: since when, and why.
     pub paused: Option<RulingView>,
 }
 
 impl SeasonHead {
-    /// As it is now.
+    /// The current data.
     #[boxed]
-    pub async fn now(app: &AppState) -> Result<Self, Problem> {
+    pub async fn load(app: &AppState) -> Result<Self, Problem> {
         let season = app.store.season().await?;
-        look_for_tournaments(app).await?;
+        update_has_tournaments(app).await?;
         Ok(Self {
             name: season.name,
             commitment: season.commitment,
-            paused: season.paused.map(ruling::of),
+            paused: season.paused.map(ruling::view),
         })
     }
 }
 
-/// Pages lead to tournaments once there is one.
-async fn look_for_tournaments(app: &AppState) -> Result<(), Problem> {
+/// Pages link to the tournaments once there is one.
+async fn update_has_tournaments(app: &AppState) -> Result<(), Problem> {
     if !app.has_tournaments.load(Ordering::Relaxed) && !app.store.tournaments().await?.is_empty() {
         app.has_tournaments.store(true, Ordering::Relaxed);
     }

@@ -1,17 +1,17 @@
-//! A stage: when it is open, by which rules it is played, and when its next day starts.
+//! Stages: opening times, rules and the next cutoff.
 
 use crate::{
     app::AppState,
     boxed,
     problem::Problem,
     viewer::Viewer,
-    views::{capacity, day, finalised, ruling},
+    views::{capacity, day, sign_off, ruling},
 };
 use faceoff_api::views::stage::{PhaseView, RevisionView, StageView};
 use faceoff_store::{Revision, Stage, StagePhase};
 use faceoff_types::StageId;
 
-/// A revision of the rules.
+
 pub fn revision(revision: Revision) -> RevisionView {
     RevisionView {
         revision: revision.number,
@@ -20,7 +20,7 @@ pub fn revision(revision: Revision) -> RevisionView {
     }
 }
 
-/// Where a stage is.
+
 pub fn phase(phase: StagePhase) -> PhaseView {
     match phase {
         StagePhase::Upcoming => PhaseView::Upcoming,
@@ -29,57 +29,57 @@ pub fn phase(phase: StagePhase) -> PhaseView {
     }
 }
 
-/// All of the season, the first to open first.
+/// All stages, in order of their opening, without capacity forecasts.
 #[boxed]
 pub async fn all(app: &AppState) -> Result<Vec<StageView>, Problem> {
     let mut views = Vec::new();
     for stage in app.store.stages().await? {
-        views.push(of(app, stage).await?);
+        views.push(build(app, stage).await?);
     }
     Ok(views)
 }
 
-/// One, as everybody sees it.
+/// A stage without its capacity forecast.
 #[boxed]
 pub async fn find(app: &AppState, id: StageId) -> Result<StageView, Problem> {
-    of(app, app.store.stage(id).await?).await
+    build(app, app.store.stage(id).await?).await
 }
 
-/// As the viewer sees it.
+/// Adds the capacity forecast, if the viewer may see it.
 #[boxed]
-pub async fn seen_by(
+pub async fn for_viewer(
     view: StageView,
     app: &AppState,
     viewer: Viewer,
 ) -> Result<StageView, Problem> {
     let capacity = match viewer {
-        // an archive has no slots that could play a day
-        Viewer::Organiser if app.store.archived().is_none() => {
-            Some(capacity::of(app, view.id).await?.days)
+        // An archived season has no slots.
+        Viewer::Organiser if app.store.archived_season().is_none() => {
+            Some(capacity::build(app, view.id).await?.days)
         }
-        Viewer::Organiser | Viewer::Team(_) | Viewer::Anybody => None,
+        Viewer::Organiser | Viewer::Team(_) | Viewer::Visitor => None,
     };
     Ok(StageView { capacity, ..view })
 }
 
-/// All of the season as the viewer sees them, the first to open first.
+/// All stages as the viewer may see them, in order of their opening.
 #[boxed]
-pub async fn all_seen_by(app: &AppState, viewer: Viewer) -> Result<Vec<StageView>, Problem> {
+pub async fn all_for_viewer(app: &AppState, viewer: Viewer) -> Result<Vec<StageView>, Problem> {
     let mut views = Vec::new();
     for view in all(app).await? {
-        views.push(seen_by(view, app, viewer).await?);
+        views.push(for_viewer(view, app, viewer).await?);
     }
     Ok(views)
 }
 
-/// One, as everybody sees it.
+/// A stage without its capacity forecast.
 #[boxed]
-pub async fn of(app: &AppState, stage: Stage) -> Result<StageView, Problem> {
+pub async fn build(app: &AppState, stage: Stage) -> Result<StageView, Problem> {
     let revisions = app.store.stage_revisions(stage.id).await?;
     Ok(StageView {
         retention: app.store.stage_retention(stage.id).await?,
-        next_cut: day::next_cut(app, &stage).await?,
-        frozen: app.store.boards_frozen(stage.id).await?.map(ruling::of),
+        next_cut: day::next_cutoff(app, &stage).await?,
+        frozen: app.store.board_freeze(stage.id).await?.map(ruling::view),
         phase: phase(stage.phase(app.config.clock.now())),
         id: stage.id,
         name: stage.name,
@@ -88,7 +88,7 @@ pub async fn of(app: &AppState, stage: Stage) -> Result<StageView, Problem> {
         zone: stage.zone,
         names_seeds: stage.names_seeds,
         configured: stage.configured,
-        finalised: stage.finalised.map(finalised::of),
+        finalised: stage.sign_off.map(sign_off::view),
         settings: stage.settings,
         rules: revision(stage.rules),
         revisions: revisions.into_iter().map(revision).collect(),
@@ -96,7 +96,7 @@ pub async fn of(app: &AppState, stage: Stage) -> Result<StageView, Problem> {
     })
 }
 
-/// The stage that a request is about which names none: the open one, or the nearest.
+/// The default stage of requests: the open one, or the nearest in time.
 #[boxed]
 pub async fn current(app: &AppState) -> Result<Stage, Problem> {
     let current = app.store.current_stage(app.config.clock.now()).await?;

@@ -1,42 +1,42 @@
-//! How much room a team's files take, and how much of that counts towards its quota.
+//! Disk usage and quota of teams.
 
 use crate::{app::AppState, boxed, problem::Problem, views::stage};
 use faceoff_api::views::storage::StorageView;
-use faceoff_store::{Counted, TeamStorage};
+use faceoff_store::{StorageScope, TeamStorage};
 use faceoff_types::TeamId;
 
-fn view(storage: TeamStorage, quota_bytes: u64, counted: Counted) -> StorageView {
+fn view(storage: TeamStorage, quota_bytes: u64, counted: StorageScope) -> StorageView {
     StorageView {
         team: storage.team,
         team_name: storage.name,
-        archives: storage.archives,
-        archive_bytes: storage.archive_bytes,
+        archives: storage.bundles,
+        archive_bytes: storage.bundle_bytes,
         quota_bytes,
         datasets: storage.datasets,
         dataset_bytes: storage.dataset_bytes,
         unmeasured_datasets: storage.unmeasured,
-        proposal_bytes: (counted == Counted::All).then_some(storage.draft_bytes),
+        proposal_bytes: (counted == StorageScope::All).then_some(storage.proposal_bytes),
     }
 }
 
-/// Of all teams by name, for an organiser.
+/// Disk usage of all teams by name, for organisers.
 #[boxed]
 pub async fn all(app: &AppState) -> Result<Vec<StorageView>, Problem> {
-    of(app, None, Counted::All).await
+    usage(app, None, StorageScope::All).await
 }
 
-/// Of one team, for itself or for an organiser.
+/// Disk usage of a team, for itself or for organisers.
 #[boxed]
-pub async fn find(app: &AppState, team: TeamId, counted: Counted) -> Result<StorageView, Problem> {
-    let found = of(app, Some(team), counted).await?;
+pub async fn find(app: &AppState, team: TeamId, counted: StorageScope) -> Result<StorageView, Problem> {
+    let found = usage(app, Some(team), counted).await?;
     let found = found.into_iter().next();
     found.ok_or_else(|| Problem::not_found("team"))
 }
 
-async fn of(
+async fn usage(
     app: &AppState,
     team: Option<TeamId>,
-    counted: Counted,
+    counted: StorageScope,
 ) -> Result<Vec<StorageView>, Problem> {
     let own = stage::current(app).await?.settings.uploads;
     let configured = app.config.limits.upload_quota.stored_bytes;

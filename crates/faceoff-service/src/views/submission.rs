@@ -1,44 +1,44 @@
-//! An uploaded agent and its smoke run's verdict.
+//! Submissions and the verdicts of their validation runs.
 
 use crate::{
     app::AppState,
     boxed,
     problem::Problem,
-    views::{not_taken, queue, ruling},
+    views::{exclusions, queue, ruling},
 };
 use faceoff_api::views::{
-    shown,
-    submission::{DeletedView, SubmissionStatus, SubmissionView},
+    printable,
+    submission::{DeletionView, SubmissionStatus, SubmissionView},
 };
 use faceoff_store::{Stage, Submission, SubmissionState};
 use faceoff_types::{SubmissionId, TeamId};
 use jiff::Timestamp;
 
-/// What happens next to what was valid and has no archive any more.
-const GONE: &str = "It plays nothing any more: its archive was removed. What it has played stays; to play it again, upload it again.";
+/// What happens next to a valid submission whose bundle was removed.
+const REMOVED: &str = "It cannot be evaluated any more: its bundle was deleted. Its results stay; to evaluate it again, upload it again.";
 
-/// One, with its log.
+/// A submission with its log and its position in the queue.
 #[boxed]
 pub async fn find(app: &AppState, id: SubmissionId) -> Result<SubmissionView, Problem> {
-    of(app, app.store.submission(id).await?).await
+    build(app, app.store.submission(id).await?).await
 }
 
 #[boxed]
-pub async fn of(app: &AppState, submission: Submission) -> Result<SubmissionView, Problem> {
+pub async fn build(app: &AppState, submission: Submission) -> Result<SubmissionView, Problem> {
     let log = app.store.submission_log(submission.id).await?;
     let (stages, now) = (app.store.stages().await?, app.config.clock.now());
     let mut view = view(submission, log, &stages, now);
-    place(app, std::slice::from_mut(&mut view)).await?;
+    add_queue_positions(app, std::slice::from_mut(&mut view)).await?;
     Ok(view)
 }
 
-/// Of a team, newest first.
+/// The submissions of a team, newest first.
 #[boxed]
-pub async fn of_team(app: &AppState, team: TeamId) -> Result<Vec<SubmissionView>, Problem> {
+pub async fn team_submissions(app: &AppState, team: TeamId) -> Result<Vec<SubmissionView>, Problem> {
     all(app, app.store.submissions_of(team).await?).await
 }
 
-/// These, in their order; without their logs, which are long.
+/// Views of these submissions, in order; without their logs, which are long.
 #[boxed]
 pub async fn all(
     app: &AppState,
@@ -47,56 +47,56 @@ pub async fn all(
     let (stages, now) = (app.store.stages().await?, app.config.clock.now());
     let without_log = |submission| view(submission, None, &stages, now);
     let mut views: Vec<SubmissionView> = submissions.into_iter().map(without_log).collect();
-    place(app, &mut views).await?;
+    add_queue_positions(app, &mut views).await?;
     Ok(views)
 }
 
-/// Tells of those that wait for their smoke run where they stand. If none does, nothing is read.
-async fn place(app: &AppState, views: &mut [SubmissionView]) -> Result<(), Problem> {
+/// Adds positions in the queue to submissions that wait for their validation run. Without any, the database is not read.
+async fn add_queue_positions(app: &AppState, views: &mut [SubmissionView]) -> Result<(), Problem> {
     if views
         .iter()
         .all(|view| view.status != SubmissionStatus::Validating)
     {
         return Ok(());
     }
-    let outlook = queue::outlook(app).await?;
+    let forecast = queue::forecast(app).await?;
     for view in views {
-        view.queue = outlook.submissions.get(&view.id).copied().map(queue::of);
+        view.queue = forecast.submissions.get(&view.id).copied().map(queue::view);
     }
     Ok(())
 }
 
-/// One, without its place in the queue.
+/// A submission without its position in the queue.
 pub fn view(
     submission: Submission,
     log: Option<String>,
     stages: &[Stage],
     now: Timestamp,
 ) -> SubmissionView {
-    let not_taken = not_taken::by_stages(stages, &submission, now);
+    let exclusions = exclusions::excluding_stages(stages, &submission, now);
     let status = match submission.state {
         SubmissionState::Validating => SubmissionStatus::Validating,
         SubmissionState::Valid => SubmissionStatus::Valid {
-            log: log.map(shown),
+            log: log.map(printable),
         },
         SubmissionState::Invalid { reason } => SubmissionStatus::Invalid {
-            reason: shown(reason),
-            log: log.map(shown),
+            reason: printable(reason),
+            log: log.map(printable),
         },
-        // It may name a file of the bundle.
+        // The reason may contain a file name from the bundle.
         SubmissionState::ValidationError { reason } => SubmissionStatus::ValidationError {
-            reason: shown(reason),
+            reason: printable(reason),
         },
     };
     let is_withdrawn = submission.withdrawn_at.is_some();
-    let is_gone =
-        matches!(status, SubmissionStatus::Valid { .. }) && submission.archive_removed.is_some();
-    let next = if is_gone {
-        GONE.to_owned()
+    let is_removed =
+        matches!(status, SubmissionStatus::Valid { .. }) && submission.bundle_removed.is_some();
+    let next = if is_removed {
+        REMOVED.to_owned()
     } else {
         let mut next = status.next(submission.active, is_withdrawn).to_owned();
-        for one in &not_taken {
-            next.push_str(&format!(" It plays no day of one stage: {}.", one.reason));
+        for exclusion in &exclusions {
+            next.push_str(&format!(" One stage excludes it: {}.", exclusion.reason));
         }
         next
     };
@@ -107,17 +107,17 @@ pub fn view(
         bytes: submission.bundle.bytes,
         blake3: submission.bundle.blake3,
         created_at: submission.created_at,
-        agent_name: submission.agent_name.map(shown),
+        agent_name: submission.agent_name.map(printable),
         runtime: submission.runtime,
-        not_taken,
+        not_taken: exclusions,
         timing: submission.timing,
         active: submission.active,
         withdrawn_at: submission.withdrawn_at,
-        label: submission.label.map(shown),
-        note: submission.note.map(shown),
-        same_as: submission.same_as,
-        archive_removed: submission.archive_removed.map(ruling::of),
-        deleted: submission.deleted.map(|deleted| DeletedView {
+        label: submission.label.map(printable),
+        note: submission.note.map(printable),
+        same_as: submission.duplicate_of,
+        archive_removed: submission.bundle_removed.map(ruling::view),
+        deleted: submission.deleted.map(|deleted| DeletionView {
             at: deleted.at,
             by: deleted.by.to_string(),
         }),

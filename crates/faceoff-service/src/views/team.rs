@@ -1,17 +1,17 @@
-//! Teams, and their tokens as they are handed out.
+//! Teams.
 
 use crate::{app::AppState, boxed, problem::Problem, views::ruling};
 use faceoff_api::views::team::TeamView;
 use faceoff_store::Team;
 use faceoff_types::TeamId;
 
-/// A team, without what only the team is told.
-pub fn of(team: Team) -> TeamView {
+/// A team, without whether it declines friendly games.
+pub fn view(team: Team) -> TeamView {
     TeamView {
         id: team.id,
         name: team.name,
         created_at: team.created_at,
-        disqualified: team.disqualified.map(ruling::of),
+        disqualified: team.disqualified.map(ruling::view),
         affiliation: team.profile.affiliation,
         link: team.profile.link,
         division: team.profile.division,
@@ -21,12 +21,12 @@ pub fn of(team: Team) -> TeamView {
     }
 }
 
-/// A team, with whether it declines friendly games.
+/// A team, including whether it declines friendly games.
 #[boxed]
 pub async fn find(app: &AppState, id: TeamId) -> Result<TeamView, Problem> {
     Ok(TeamView {
         declines_friendly_games: Some(app.store.declines_friendly_games(id).await?),
-        ..of(app.store.team(id).await?)
+        ..view(app.store.team(id).await?)
     })
 }
 
@@ -34,5 +34,5 @@ pub async fn find(app: &AppState, id: TeamId) -> Result<TeamView, Problem> {
 #[boxed]
 pub async fn all(app: &AppState) -> Result<Vec<TeamView>, Problem> {
     let teams = app.store.teams().await?;
-    Ok(teams.into_iter().map(of).collect())
+    Ok(teams.into_iter().map(view).collect())
 }

@@ -1,20 +1,20 @@
-//! Tokens and sessions, without what would open anything.
+//! Tokens and sessions, without their secrets.
 
 use faceoff_api::views::token::TokenView;
 use faceoff_store::{Token, TokenKind, TokenOwner};
 
-/// A token, without its secret.
-pub fn of(token: Token) -> TokenView {
+
+pub fn view(token: Token) -> TokenView {
     let (team, person) = match token.owner {
         TokenOwner::Host => (None, None),
         TokenOwner::Team(id) => (Some(id), None),
-        TokenOwner::Person(id) => (None, Some(id)),
+        TokenOwner::User(id) => (None, Some(id)),
     };
     TokenView {
         id: token.id,
         name: token.name,
         kind: match token.kind {
-            TokenKind::Key => "key".into(),
+            TokenKind::ApiToken => "key".into(),
             TokenKind::Session => "session".into(),
         },
         team,

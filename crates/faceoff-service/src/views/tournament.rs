@@ -1,41 +1,41 @@
-//! A tournament: its rules, who is in it, its rounds, its tables, and what comes next.
+//! Tournaments: rules, entrants, rounds and standings.
 
 use crate::{
     app::AppState,
     boxed,
     problem::Problem,
-    views::{ruling, tournament_sheet::TournamentSheet},
+    views::{ruling, tournament_state::TournamentState},
 };
 use faceoff_api::views::{
-    shown,
+    printable,
     tournament::{
-        ByeView, EntrantView, LeaveView, RoundProgress, RoundSubmission, RoundView, TournamentHead,
+        ByeView, EntrantView, DepartureView, RoundProgress, RoundSubmission, RoundView, TournamentHead,
         TournamentPhase, TournamentView,
     },
 };
 use faceoff_scoring::tournament::schedule::Table;
-use faceoff_store::{Entrant, Game, GamePurpose, GameState, Leave, TournamentRound};
+use faceoff_store::{Entrant, Game, GamePurpose, GameState, Departure, TournamentRound};
 use faceoff_types::{RoundNumber, StageName, TeamId, TeamName, TournamentId};
 
-/// All of the season, the first one first.
+/// All tournaments, in order of creation.
 #[boxed]
 pub async fn heads(app: &AppState) -> Result<Vec<TournamentHead>, Problem> {
     let mut heads = Vec::new();
     for tournament in app.store.tournaments().await? {
-        let sheet = TournamentSheet::find(app, tournament.id).await?;
-        heads.push(head(&sheet));
+        let state = TournamentState::find(app, tournament.id).await?;
+        heads.push(head(&state));
     }
     Ok(heads)
 }
 
-fn head(sheet: &TournamentSheet) -> TournamentHead {
-    let tables = sheet.tables(sheet.played());
-    head_with(sheet, &tables)
+fn head(state: &TournamentState) -> TournamentHead {
+    let tables = state.tables(state.played());
+    build_head(state, &tables)
 }
 
-fn head_with(sheet: &TournamentSheet, tables: &[Table]) -> TournamentHead {
-    let tournament = &sheet.tournament;
-    let phase = phase(sheet);
+fn build_head(state: &TournamentState, tables: &[Table]) -> TournamentHead {
+    let tournament = &state.tournament;
+    let phase = phase(state);
     TournamentHead {
         id: tournament.id,
         number: tournament.number,
@@ -43,90 +43,90 @@ fn head_with(sheet: &TournamentSheet, tables: &[Table]) -> TournamentHead {
         phase,
         created_at: tournament.created_at,
         stage: tournament.stage,
-        paused: tournament.paused.clone().map(ruling::of),
+        paused: tournament.paused.clone().map(ruling::view),
         closed_at: tournament.closed_at,
-        champion: champion(sheet, tables),
-        next: next(sheet, phase),
+        champion: champion(state, tables),
+        next: next(state, phase),
     }
 }
 
-/// One, with its rounds and tables.
+/// A tournament with its rounds and tables.
 #[boxed]
 pub async fn find(app: &AppState, id: TournamentId) -> Result<TournamentView, Problem> {
-    of(&TournamentSheet::find(app, id).await?)
+    view(&TournamentState::find(app, id).await?)
 }
 
-/// One, with its rounds and tables.
-pub fn of(sheet: &TournamentSheet) -> Result<TournamentView, Problem> {
-    let tables = sheet.tables(sheet.played());
-    let tournament = &sheet.tournament;
-    let rounds = sheet.rounds.iter();
+/// A tournament with its rounds and tables.
+pub fn view(state: &TournamentState) -> Result<TournamentView, Problem> {
+    let tables = state.tables(state.played());
+    let tournament = &state.tournament;
+    let rounds = state.rounds.iter();
     Ok(TournamentView {
-        head: head_with(sheet, &tables),
+        head: build_head(state, &tables),
         rules: tournament.rules.clone(),
         settings: tournament.settings.clone(),
         baseline: tournament.baseline,
-        entrants: sheet.entrants.iter().cloned().map(entrant).collect(),
+        entrants: state.entrants.iter().cloned().map(entrant).collect(),
         rounds: rounds
-            .map(|round| round_of(sheet, round))
+            .map(|round| round_view(state, round))
             .collect::<Result<_, _>>()?,
         tables,
     })
 }
 
-/// The tournaments that a team has entered, the first one first: ids and names.
+/// Ids and names of the tournaments that a team has entered, in order of creation.
 #[boxed]
-pub async fn entered_by(
+pub async fn entered_tournaments(
     app: &AppState,
     team: TeamId,
 ) -> Result<Vec<(TournamentId, StageName)>, Problem> {
     let mut entered = Vec::new();
     for tournament in app.store.tournaments().await? {
-        let sheet = TournamentSheet::unscored(app, tournament.id).await?;
-        if sheet.entrants.iter().any(|entrant| entrant.team == team) {
+        let state = TournamentState::unscored(app, tournament.id).await?;
+        if state.entrants.iter().any(|entrant| entrant.team == team) {
             entered.push((tournament.id, tournament.name));
         }
     }
     Ok(entered)
 }
 
-/// A team that has entered.
+
 pub fn entrant(entrant: Entrant) -> EntrantView {
     EntrantView {
         team: entrant.team,
         team_name: entrant.name,
         entered_at: entrant.entered_at,
-        left: entrant.left.map(leave),
+        left: entrant.departure.map(departure),
     }
 }
 
-/// How and when a team left.
-pub fn leave(leave: Leave) -> LeaveView {
-    LeaveView {
-        r#as: leave.left_as,
+
+pub fn departure(leave: Departure) -> DepartureView {
+    DepartureView {
+        r#as: leave.kind,
         from_round: leave.from_round,
         at: leave.at,
-        reason: shown(leave.reason),
+        reason: printable(leave.reason),
     }
 }
 
-/// A round, and how far it is.
-pub fn round_of(sheet: &TournamentSheet, round: &TournamentRound) -> Result<RoundView, Problem> {
-    let games = games_of(sheet, round.number);
+/// A round with its draw and progress.
+pub fn round_view(state: &TournamentState, round: &TournamentRound) -> Result<RoundView, Problem> {
+    let games = games_in_round(state, round.number);
     let names = |group: &Vec<TeamId>| -> Result<Vec<TeamName>, Problem> {
-        group.iter().map(|team| sheet.name(*team)).collect()
+        group.iter().map(|team| state.name(*team)).collect()
     };
     let byes = round.byes.iter().map(|bye| {
         Ok(ByeView {
             matchday: bye.matchday,
             team: bye.team,
-            team_name: sheet.name(bye.team)?,
+            team_name: state.name(bye.team)?,
         })
     });
     let submissions = round.submissions.iter().map(|(team, submission)| {
         Ok(RoundSubmission {
             team: *team,
-            team_name: sheet.name(*team)?,
+            team_name: state.name(*team)?,
             submission: *submission,
         })
     });
@@ -154,14 +154,14 @@ const fn count(progress: &mut RoundProgress, state: &GameState) {
         GameState::Queued => &mut progress.queued,
         GameState::Running { .. } => &mut progress.running,
         GameState::Played(_) => &mut progress.played,
-        GameState::Broken { .. } | GameState::Void { .. } => &mut progress.to_be_rerun,
+        GameState::PlatformFailed { .. } | GameState::Void { .. } => &mut progress.to_be_rerun,
         GameState::Cancelled { .. } => &mut progress.cancelled,
     } += 1;
 }
 
-/// A round's games, with their matchdays.
-fn games_of(sheet: &TournamentSheet, number: RoundNumber) -> impl Iterator<Item = (&Game, u32)> {
-    sheet
+/// The games of a round, with their matchdays.
+fn games_in_round(state: &TournamentState, number: RoundNumber) -> impl Iterator<Item = (&Game, u32)> {
+    state
         .games
         .iter()
         .filter_map(move |game| match game.purpose {
@@ -172,82 +172,82 @@ fn games_of(sheet: &TournamentSheet, number: RoundNumber) -> impl Iterator<Item 
         })
 }
 
-fn phase(sheet: &TournamentSheet) -> TournamentPhase {
-    let last = sheet.tournament.rules.format.last_round();
-    if sheet.tournament.closed_at.is_some() {
+fn phase(state: &TournamentState) -> TournamentPhase {
+    let last = state.tournament.rules.format.last_round();
+    if state.tournament.closed_at.is_some() {
         TournamentPhase::Closed
-    } else if sheet.rounds.is_empty() {
+    } else if state.rounds.is_empty() {
         TournamentPhase::Open
-    } else if sheet.games.iter().any(|game| sheet.is_awaited(game))
-        || sheet.rounds.iter().any(|round| round.over_at.is_none())
+    } else if state.games.iter().any(|game| state.needs_result(game))
+        || state.rounds.iter().any(|round| round.over_at.is_none())
     {
         TournamentPhase::Round
-    } else if sheet.rounds.len() < last.get() as usize {
+    } else if state.rounds.len() < last.get() as usize {
         TournamentPhase::Between
     } else {
         TournamentPhase::Played
     }
 }
 
-/// Who is first of a table, and has not left.
+/// The first team of a table that has not left.
 pub(super) fn first_place(table: &Table) -> Option<TeamName> {
     let mut standings = table.standings.iter();
-    let first = standings.find(|standing| standing.left.is_none())?;
+    let first = standings.find(|standing| standing.departure.is_none())?;
     Some(first.team.clone())
 }
 
-fn champion(sheet: &TournamentSheet, tables: &[Table]) -> Option<TeamName> {
-    let last = sheet.tournament.rules.format.last_round();
-    // Of a round that was not over by then an archive has a part.
-    let are_over = sheet.rounds.iter().all(|round| round.over_at.is_some());
-    let is_over = sheet.rounds.len() >= last.get() as usize
+fn champion(state: &TournamentState, tables: &[Table]) -> Option<TeamName> {
+    let last = state.tournament.rules.format.last_round();
+    // An archive may contain only a part of a round that was running.
+    let are_over = state.rounds.iter().all(|round| round.over_at.is_some());
+    let is_over = state.rounds.len() >= last.get() as usize
         && are_over
-        && !sheet.games.iter().any(|game| sheet.is_awaited(game));
+        && !state.games.iter().any(|game| state.needs_result(game));
     first_place(tables.first().filter(|_| is_over)?)
 }
 
-/// What comes next, in words for everybody.
-fn next(sheet: &TournamentSheet, phase: TournamentPhase) -> String {
-    let last = sheet.tournament.rules.format.last_round();
-    let coming = sheet.rounds.len() + 1;
+/// What happens next, in words.
+fn next(state: &TournamentState, phase: TournamentPhase) -> String {
+    let last = state.tournament.rules.format.last_round();
+    let next_number = state.rounds.len() + 1;
     match phase {
-        TournamentPhase::Closed => "Nothing more: the tournament is closed.".to_owned(),
+        TournamentPhase::Closed => "The tournament is closed.".to_owned(),
         TournamentPhase::Played => {
-            "All rounds are over; the organiser closes the tournament.".to_owned()
+            "All rounds have been played; the organisers still have to close the tournament.".to_owned()
         }
         TournamentPhase::Open | TournamentPhase::Between => format!(
-            "The organiser starts round {coming} of {last}; what each team has active then plays all of it."
+            "An organiser starts round {next_number} of {last}; the active submissions of that moment play the whole round."
         ),
-        TournamentPhase::Round => under_way(sheet),
+        TournamentPhase::Round => running_round_text(state),
     }
 }
 
-fn under_way(sheet: &TournamentSheet) -> String {
+fn running_round_text(state: &TournamentState) -> String {
     let mut progress = RoundProgress::default();
-    let awaited = sheet.games.iter().filter(|game| sheet.is_awaited(game));
-    awaited.for_each(|game| count(&mut progress, &game.state));
+    let unfinished = state.games.iter().filter(|game| state.needs_result(game));
+    unfinished.for_each(|game| count(&mut progress, &game.state));
     let all = progress.games;
-    let mut text = match &sheet.tournament.paused {
+    let mut text = match &state.tournament.paused {
         Some(paused) => format!(
-            "Paused ({}): no game begins. ",
-            shown(paused.reason.clone())
+            "Paused ({}): no game starts. ",
+            printable(paused.reason.clone())
         ),
         None => String::new(),
     };
     text += &format!(
-        "Without a result: {all}; under way: {}, waiting for a slot: {}",
+        "Games without a result: {all}; running: {}, waiting for a slot: {}",
         progress.running, progress.queued
     );
     if progress.to_be_rerun > 0 {
         text += &format!(
-            ", void or broken, which the organiser has played again: {}",
+            ", void or failed, to be rerun by an organiser: {}",
             progress.to_be_rerun
         );
     }
-    let last = sheet.tournament.rules.format.last_round();
-    if sheet.rounds.len() < last.get() as usize {
-        text + ". The next round waits for them."
+    let last = state.tournament.rules.format.last_round();
+    if state.rounds.len() < last.get() as usize {
+        text + ". Then the next round can start."
     } else {
-        text + ". The tournament can be closed then."
+        text + ". Then the tournament can be closed."
     }
 }

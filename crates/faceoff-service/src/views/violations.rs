@@ -1,20 +1,20 @@
-//! Where an evaluation cost points, episode by episode: what its dataset says in `violations.json`.
+//! Violations of an evaluation, episode by episode, from the dataset's `violations.json`.
 
 use crate::{app::AppState, boxed, problem::Problem};
 use faceoff_api::views::violations::ViolationsView;
 use faceoff_dataset::Dataset;
 
-/// Reads them out of a finished evaluation's dataset, an artifact. Whether its day is released is the caller's
-/// to check.
+/// Reads the violations from a finished evaluation's dataset, given its artifact key. The caller checks that the day is
+/// released.
 ///
 /// # Errors
-/// An internal problem if the dataset cannot be read: what a finished evaluation names must be there.
+/// `Internal` if the dataset cannot be read: a finished evaluation must have one.
 #[boxed]
 pub async fn read(app: &AppState, dataset: &str) -> Result<ViolationsView, Problem> {
     let path = app
         .store
         .artifacts()
-        .path_of(dataset)
+        .local_path(dataset)
         .map_err(Problem::internal)?;
     let read = move || Dataset::open_unread(&path)?.violations();
     let file = tokio::task::spawn_blocking(read)

@@ -1,14 +1,14 @@
-//! Webhooks, without what signs, and what came of their deliveries.
+//! Webhooks, without their secrets, and their deliveries.
 
 use faceoff_api::views::webhook::{
-    AttemptView, DeliveryStateView, DeliveryView, WebhookState, WebhookView,
+    DeliveryAttemptView, DeliveryStateView, DeliveryView, WebhookState, WebhookView,
 };
 use faceoff_store::{Delivery, DeliveryState, Webhook};
 use jiff::Timestamp;
 
-/// A webhook, as it is at `now`.
-pub fn of(webhook: Webhook, now: Timestamp) -> WebhookView {
-    let state = match (webhook.dead, webhook.failing_since) {
+/// The webhook's state at `now`.
+pub fn view(webhook: Webhook, now: Timestamp) -> WebhookView {
+    let state = match (webhook.disabled, webhook.failing_since) {
         (Some(dead), _) => WebhookState::Dead {
             since: dead.at,
             reason: dead.reason,
@@ -21,7 +21,7 @@ pub fn of(webhook: Webhook, now: Timestamp) -> WebhookView {
         team: webhook.team,
         name: webhook.name,
         url: webhook.url,
-        about: webhook.about,
+        about: webhook.topics,
         created_at: webhook.created_at,
         old_secret_until: webhook.old_secret_until.filter(|until| now < *until),
         state,
@@ -35,13 +35,13 @@ pub fn delivery(delivery: Delivery) -> DeliveryView {
         kind: delivery.kind,
         created_at: delivery.created_at,
         attempts: delivery.attempts,
-        last: delivery.last.map(|last| AttemptView {
+        last: delivery.last.map(|last| DeliveryAttemptView {
             at: last.at,
             status: last.status,
             error: last.error,
         }),
         state: match delivery.state {
-            DeliveryState::Waiting { next_at } => DeliveryStateView::Waiting { next_at },
+            DeliveryState::Pending { next_at } => DeliveryStateView::Waiting { next_at },
             DeliveryState::Delivered { at } => DeliveryStateView::Delivered { settled_at: at },
             DeliveryState::GivenUp { at } => DeliveryStateView::GivenUp { settled_at: at },
         },

@@ -1,106 +1,106 @@
-//! Who works for the server on other machines.
+//! Remote workers and their slots.
 
 use crate::{app::AppState, boxed, problem::Problem};
-use faceoff_api::views::workers::{BusyView, WorkerBanView, WorkerState, WorkerView, WorkersView};
-use faceoff_store::{WorkerBusy, WorkerHeard};
+use faceoff_api::views::workers::{BusySlotView, WorkerBanView, WorkerState, WorkerView, WorkersView};
+use faceoff_store::{SlotStatus, WorkerStatus};
 use jiff::{SignedDuration, Timestamp};
 
-/// A unit that takes longer than this is worth a look.
-const LONG: SignedDuration = SignedDuration::from_hours(1);
+/// A job that runs longer than this raises an alarm.
+const ALARM_AFTER: SignedDuration = SignedDuration::from_hours(1);
 
-/// So much is listed of what a worker has played.
-const MOST_PLAYED: u32 = 100;
+/// Evaluations and games that are listed for a banned worker.
+const MAX_LISTED: u32 = 100;
 
-/// All that is known, with the bans.
+/// All workers, with the bans.
 #[boxed]
 pub async fn with_bans(app: &AppState) -> Result<WorkersView, Problem> {
     let mut bans = Vec::new();
     for ban in app.store.worker_bans().await? {
         let worker = ban.worker.parse().map_err(Problem::internal)?;
-        let played = app.store.played_by(&worker, MOST_PLAYED).await?;
+        let results = app.store.results_of_worker(&worker, MAX_LISTED).await?;
         bans.push(WorkerBanView {
             worker: ban.worker,
             at: ban.at,
             reason: ban.reason,
-            evaluations: played.evaluations,
-            games: played.games,
+            evaluations: results.evaluations,
+            games: results.games,
         });
     }
-    Ok(WorkersView { bans, ..now(app) })
+    Ok(WorkersView { bans, ..current(app) })
 }
 
-/// As far as it is known without asking the database: nothing of bans.
-pub fn now(app: &AppState) -> WorkersView {
+/// All workers, without the bans, which need a database read.
+pub fn current(app: &AppState) -> WorkersView {
     let (workers, now) = (app.store.workers(), app.config.clock.now());
-    let troubles = workers.troubles().into_iter();
-    let troubles = troubles.map(|(what, why)| format!("The server cannot {what}: {why}"));
+    let problems = workers.problems().into_iter();
+    let problems = problems.map(|(activity, why)| format!("The server cannot {activity}: {why}"));
     let all = workers.all();
-    let stuck = all.iter().flat_map(stuck);
-    let troubles = troubles.chain(stuck).collect();
-    let alarms = all.iter().flat_map(|worker| long(worker, now)).collect();
+    let stuck = all.iter().flat_map(stuck_jobs);
+    let problems = problems.chain(stuck).collect();
+    let alarms = all.iter().flat_map(|worker| long_jobs(worker, now)).collect();
     WorkersView {
         own_slots: app.config.capacity.slots,
-        remote_slots: workers.slots(now),
-        is_given: workers.are_used(),
-        troubles,
+        remote_slots: workers.available_slots(now),
+        is_given: workers.are_enabled(),
+        troubles: problems,
         alarms,
         workers: all.into_iter().map(|heard| worker(heard, now)).collect(),
         bans: Vec::new(),
     }
 }
 
-/// What a worker has played and cannot hand in.
-fn stuck(worker: &WorkerHeard) -> impl Iterator<Item = String> {
-    worker.busy.iter().filter_map(|(slot, busy)| {
-        let trouble = busy.trouble.as_ref()?;
-        let what = named(worker, slot, busy);
+/// Jobs whose result a worker cannot send.
+fn stuck_jobs(worker: &WorkerStatus) -> impl Iterator<Item = String> {
+    worker.busy_slots.iter().filter_map(|(slot, busy)| {
+        let problem = busy.problem.as_ref()?;
+        let job = describe(worker, slot, busy);
         Some(format!(
-            "A worker cannot hand in what it has played: {what}: {trouble}"
+            "A worker cannot send the result of a job: {job}: {problem}"
         ))
     })
 }
 
-/// What a worker has worked at for very long.
-fn long(worker: &WorkerHeard, now: Timestamp) -> impl Iterator<Item = String> {
-    worker.busy.iter().filter_map(move |(slot, busy)| {
-        let what = named(worker, slot, busy);
-        is_long(busy, now).then(|| format!("A worker takes more than an hour: {what}"))
+/// Jobs that a worker has been running for very long.
+fn long_jobs(worker: &WorkerStatus, now: Timestamp) -> impl Iterator<Item = String> {
+    worker.busy_slots.iter().filter_map(move |(slot, busy)| {
+        let job = describe(worker, slot, busy);
+        is_long(busy, now).then(|| format!("A job has been running for more than an hour: {job}"))
     })
 }
 
-fn named(worker: &WorkerHeard, slot: &str, busy: &WorkerBusy) -> String {
-    let what = busy.what.as_deref().unwrap_or("begun before this server");
-    format!("{}/{slot}, unit {} ({what})", worker.name, busy.unit)
+fn describe(worker: &WorkerStatus, slot: &str, busy: &SlotStatus) -> String {
+    let job = busy.description.as_deref().unwrap_or("started before this server process");
+    format!("{}/{slot}, job {} ({job})", worker.name, busy.job)
 }
 
-fn is_long(busy: &WorkerBusy, now: Timestamp) -> bool {
-    now.duration_since(busy.since) > LONG
+fn is_long(busy: &SlotStatus, now: Timestamp) -> bool {
+    now.duration_since(busy.since) > ALARM_AFTER
 }
 
-fn worker(worker: WorkerHeard, now: Timestamp) -> WorkerView {
-    let state = match &worker.refused {
-        _ if !worker.is_there(now) => WorkerState::Silent,
+fn worker(worker: WorkerStatus, now: Timestamp) -> WorkerView {
+    let state = match &worker.refusal {
+        _ if !worker.is_online(now) => WorkerState::Silent,
         Some(_) => WorkerState::Refused,
-        None if worker.busy.is_empty() => WorkerState::Idle,
+        None if worker.busy_slots.is_empty() => WorkerState::Idle,
         None => WorkerState::Working,
     };
-    let busy = worker.busy.into_iter().map(|(slot, busy)| BusyView {
+    let busy = worker.busy_slots.into_iter().map(|(slot, busy)| BusySlotView {
         is_long: is_long(&busy, now),
         slot,
-        unit: busy.unit,
-        what: busy.what,
+        unit: busy.job,
+        what: busy.description,
         since: busy.since,
-        trouble: busy.trouble,
+        trouble: busy.problem,
     });
     WorkerView {
         busy: busy.collect(),
         name: worker.name,
-        version: worker.about.version,
-        slots: worker.about.slots,
-        labels: worker.about.labels,
-        first_at: worker.first_at,
-        last_at: worker.last_at,
-        refused: worker.refused,
+        version: worker.info.version,
+        slots: worker.info.slots,
+        labels: worker.info.labels,
+        first_at: worker.first_seen_at,
+        last_at: worker.last_seen_at,
+        refused: worker.refusal,
         state,
     }
 }

@@ -84,7 +84,7 @@ fn compare(name: &str, recorded: &[Recorded]) {
 
 /// A batch on one thread and on all, by the clock: what the machine gives.
 fn batch() {
-    let held = Interpolation::Cubic.held(&INITIAL_Q);
+    let held = Interpolation::Cubic.hold_position(&INITIAL_Q);
     let actions = held[..2 * JOINTS].repeat(BATCH as usize);
     let all = std::thread::available_parallelism().map_or(1, usize::from);
     let counts = [1, all];

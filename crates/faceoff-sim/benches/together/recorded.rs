@@ -35,7 +35,7 @@ pub fn record(task: Task, factors: Factors, episodes: u32) -> Vec<Recorded> {
 
 /// Episodes in which the arm holds still, cut off after some steps.
 pub fn hold(task: Task, factors: Factors, steps: u32, episodes: u32) -> Vec<Recorded> {
-    let held = Interpolation::Cubic.held(&INITIAL_Q);
+    let held = Interpolation::Cubic.hold_position(&INITIAL_Q);
     let action = held[..Interpolation::Cubic.len()].to_vec();
     (0..episodes)
         .map(|number| {

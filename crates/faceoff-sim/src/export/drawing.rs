@@ -26,7 +26,7 @@ pub fn drawing() -> String {
     format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {height}\" width=\"{width}\" \
          height=\"{height}\" font-family=\"sans-serif\" font-size=\"12\">\n\
-         <!-- Written by `faceoff sim export`. -->\n\
+         <!-- SavedState by `faceoff sim export`. -->\n\
          <rect width=\"{width}\" height=\"{height}\" fill=\"white\"/>\n{}</svg>\n",
         picture.text
     )

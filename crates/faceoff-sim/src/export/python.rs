@@ -201,7 +201,7 @@ impl Module {
     fn new() -> Self {
         Self {
             text: "\"\"\"The numbers of robot, table and puck, as the simulator has them. SI units, radians.\n\n\
-                   Written by `faceoff sim export --format python`; a test compares it with what the program writes.\n\
+                   SavedState by `faceoff sim export --format python`; a test compares it with what the program writes.\n\
                    \"\"\"\n\nfrom typing import Final\n"
                 .to_owned(),
         }

@@ -80,7 +80,7 @@ impl Arm {
 
     /// Starts a control step that commands the last position again, at rest.
     pub fn hold(&mut self, interpolation: Interpolation) {
-        let action = interpolation.held(&self.end().position);
+        let action = interpolation.hold_position(&self.end().position);
         self.command(interpolation, &action[..interpolation.len()]);
     }
 

@@ -48,7 +48,7 @@ fn a_game_allocates_only_when_a_rally_starts() {
         plant: Plant::nominal(),
         seed: Seed::from_number(1),
     });
-    let hold = Interpolation::Cubic.held(&INITIAL_Q);
+    let hold = Interpolation::Cubic.hold_position(&INITIAL_Q);
     let mut steps = 0;
     for _ in 0..1000 {
         let mut new_rally = false;

@@ -18,7 +18,7 @@ fn episode(task: Task, factors: Factors, seed: u64) -> Episode {
 }
 
 fn hold() -> [f64; 14] {
-    Interpolation::Cubic.held(&INITIAL_Q)[..14]
+    Interpolation::Cubic.hold_position(&INITIAL_Q)[..14]
         .try_into()
         .unwrap()
 }

@@ -23,7 +23,7 @@ fn setup(factors: Factors, seed: u64) -> GameSetup {
 }
 
 fn hold() -> [f64; 14] {
-    Interpolation::Cubic.held(&INITIAL_Q)[..14]
+    Interpolation::Cubic.hold_position(&INITIAL_Q)[..14]
         .try_into()
         .unwrap()
 }
@@ -223,7 +223,7 @@ fn mallets_push_each_other_and_never_pass_through() {
                 target,
                 &world.joints(robot),
             );
-            let action = Interpolation::Cubic.held(&q);
+            let action = Interpolation::Cubic.hold_position(&q);
             world.command(robot, Interpolation::Cubic, &action[..14]);
         }
         world.control_step(|_| [0.0; 2]);

@@ -54,7 +54,7 @@ fn action(
 ) -> Vec<f64> {
     let (q, dq) = (&observation[6..13], &observation[13..20]);
     let held: [f64; JOINTS] = std::array::from_fn(|i| q[i]);
-    let held = interpolation.held(&held);
+    let held = interpolation.hold_position(&held);
     let alternating = |n: usize| if n.is_multiple_of(2) { size } else { -size };
     (0..interpolation.len())
         .map(|i| {
@@ -194,7 +194,7 @@ fn in_a_game_the_robot_that_first_left_its_bounds_is_to_blame() {
                         if robot == hostile {
                             action(habit, ACTION_LIMIT, interpolation, step, seen, &mut stream)
                         } else {
-                            interpolation.held(&INITIAL_Q)[..interpolation.len()].to_vec()
+                            interpolation.hold_position(&INITIAL_Q)[..interpolation.len()].to_vec()
                         }
                     });
                     let outcome = game.step(actions.each_ref().map(|a| Command::Act(a)));

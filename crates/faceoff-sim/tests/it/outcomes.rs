@@ -5,7 +5,7 @@ use faceoff_types::{Factors, Seed, Task, Violations};
 
 /// Successes and episodes with a violation.
 fn hold(task: Task, episodes: u32) -> (u32, u32) {
-    let action = Interpolation::Cubic.held(&INITIAL_Q);
+    let action = Interpolation::Cubic.hold_position(&INITIAL_Q);
     let (mut successes, mut violations) = (0, 0);
     for index in 0..episodes {
         let mut episode = Episode::new(

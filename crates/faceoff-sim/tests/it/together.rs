@@ -61,7 +61,7 @@ impl Play {
 
     fn action(&self) -> Vec<f64> {
         let step = self.episode.steps();
-        let held = self.interpolation.held(&INITIAL_Q);
+        let held = self.interpolation.hold_position(&INITIAL_Q);
         let held = held[..self.interpolation.len()].to_vec();
         match self.habit {
             Habit::Strikes => strike(self.episode.observation(), step).to_vec(),
@@ -181,7 +181,7 @@ fn a_world_that_diverges_leaves_the_others_as_they_are() {
 #[test]
 fn any_number_of_worlds_may_be_stepped() {
     for count in 0..6 {
-        let held = Interpolation::Quintic.held(&INITIAL_Q);
+        let held = Interpolation::Quintic.hold_position(&INITIAL_Q);
         let action = &held[..Interpolation::Quintic.len()];
         let play = |number| Play::new(Task::Prepare, number, Factors::NONE, Habit::Holds).episode;
         let mut episodes: Vec<Episode> = (0..count).map(play).collect();

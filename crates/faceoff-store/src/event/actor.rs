@@ -1,22 +1,22 @@
 use super::parse::ParseEventError;
-use faceoff_types::{PersonId, TeamId};
+use faceoff_types::{UserId, TeamId};
 use std::{fmt, str::FromStr};
 
-/// Who caused a change.
+/// The cause of a change.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub enum Actor {
-    /// Whoever holds the host's token, or the server's configuration.
+    /// An organiser without a user account: by the host's token, or by the server's configuration.
     Organiser,
-    /// Whoever holds a token of the team's own.
+    /// A client with a token of the team itself.
     Team(TeamId),
-    /// A person, whatever their role.
-    Person(PersonId),
-    /// Somebody without an account.
+    /// A user, organiser or member.
+    User(UserId),
+    /// A person without an account.
     Visitor,
     Schedule,
-    /// A worker's slot, by the name under which it claims.
+    /// A worker's slot, by the name under which it claims jobs.
     Worker(String),
-    /// What the server does by itself: tidying, derived data.
+    /// Automatic work of the server: clean-up, derived data.
     Server,
 }
 
@@ -25,7 +25,7 @@ impl fmt::Display for Actor {
         match self {
             Self::Organiser => f.write_str("organiser"),
             Self::Team(id) => write!(f, "team:{id}"),
-            Self::Person(id) => write!(f, "person:{id}"),
+            Self::User(id) => write!(f, "person:{id}"),
             Self::Visitor => f.write_str("visitor"),
             Self::Schedule => f.write_str("schedule"),
             Self::Worker(name) => write!(f, "worker:{name}"),
@@ -43,7 +43,7 @@ impl FromStr for Actor {
             None if s == "schedule" => Self::Schedule,
             None if s == "server" => Self::Server,
             None if s == "visitor" => Self::Visitor,
-            Some(("person", id)) => Self::Person(id.parse().map_err(|_| unknown())?),
+            Some(("person", id)) => Self::User(id.parse().map_err(|_| unknown())?),
             Some(("team", id)) => Self::Team(id.parse().map_err(|_| unknown())?),
             Some(("worker", name)) => Self::Worker(name.to_owned()),
             _ => return Err(unknown()),
@@ -56,11 +56,11 @@ mod tests {
     use super::*;
 
     #[test]
-    fn actors_read_back_as_they_are_written() {
+    fn actor_parses_back_from_its_text() {
         let actors = [
             Actor::Organiser,
             Actor::Team(TeamId::new()),
-            Actor::Person(PersonId::new()),
+            Actor::User(UserId::new()),
             Actor::Visitor,
             Actor::Schedule,
             Actor::Worker("host:1/slot-0".into()),

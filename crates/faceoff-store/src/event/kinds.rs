@@ -1,25 +1,25 @@
-//! The names of what happens.
+//! Names of event kinds.
 
 use super::Event;
 
 impl Event {
     #[must_use]
     pub fn kind(&self) -> String {
-        let told = serde_json::to_value(self).unwrap_or_default();
-        told["kind"].as_str().unwrap_or_default().to_owned()
+        let json = serde_json::to_value(self).unwrap_or_default();
+        json["kind"].as_str().unwrap_or_default().to_owned()
     }
 
-    /// Is there an event of this name?
+    /// Checks that an event kind of this name exists.
     ///
     /// # Errors
-    /// If not, with the names that there are.
+    /// If not, with the names that exist.
     pub fn check_kind(name: &str) -> Result<(), String> {
-        let named = serde_json::json!({ "kind": name });
-        match serde_json::from_value::<Self>(named) {
+        let kind_only = serde_json::json!({ "kind": name });
+        match serde_json::from_value::<Self>(kind_only) {
             Err(error) if error.to_string().starts_with("unknown variant") => {
                 Err(error.to_string())
             }
-            // There is, whether or not it has fields that are wanting here.
+            // The kind exists; other errors are about missing fields.
             _ => Ok(()),
         }
     }
@@ -30,12 +30,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn an_event_has_the_name_that_the_log_has() {
+    fn event_kind_is_its_stored_name() {
         assert_eq!(Event::SeasonClosed.kind(), "season_closed");
     }
 
     #[test]
-    fn names_of_events_are_known_with_and_without_fields() {
+    fn check_kind_accepts_kinds_with_and_without_fields() {
         for kind in ["season_closed", "team_created", "day_started"] {
             assert_eq!(Event::check_kind(kind), Ok(()));
         }

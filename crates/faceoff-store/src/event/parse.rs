@@ -1,4 +1,4 @@
-/// Text that is none of an event's parts.
+/// A text that is neither an actor nor a subject of an event.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("{0:?} is no actor or subject of an event")]
+#[error("{0:?} is not an actor or subject of an event")]
 pub struct ParseEventError(pub(super) String);

@@ -1,10 +1,10 @@
-//! What of the log everybody may read.
+//! Which events are public.
 
 use super::Event;
 
 impl Event {
-    /// May everybody know of it, with all of its fields? So they do already: from boards, pages of evaluations,
-    /// announcements and the season's page. What is about a single evaluation is public only where that is.
+    /// Is the event public with all of its fields? Everything public is also on boards, pages of evaluations,
+    /// announcements or the season's page. An event of a single evaluation is public only if the evaluation is.
     #[must_use]
     pub const fn is_public(&self) -> bool {
         match self {
@@ -98,7 +98,7 @@ impl Event {
             | Self::ProposalApplied
             | Self::ProposalDropped
             | Self::ShardCommitted { .. }
-            // Of games that do not count, too.
+            // These concern test games and friendly games, too.
             | Self::FreeGameQueued { .. }
             | Self::GameBegun { .. }
             | Self::GamePlayed { .. }

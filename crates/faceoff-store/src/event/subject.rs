@@ -1,37 +1,35 @@
 use super::parse::ParseEventError;
 use faceoff_types::{
-    AblationId, AnnouncementId, EvaluationId, GameId, PersonId, ProposalId, QuestionId,
+    AblationId, AnnouncementId, EvaluationId, GameId, UserId, ProposalId, QuestionId,
     RegistrationId, StageDay, StageId, SubmissionId, TeamId, TournamentId,
 };
 use jiff::civil::Date;
 use std::{fmt, str::FromStr};
 
-/// What a change is about.
+/// The entity that a change concerns.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Subject {
-    /// The season, of which a data folder has one.
+    /// The season; a data folder has one.
     Season,
     Stage(StageId),
     /// A day of a stage.
     Day(StageDay),
-    /// A day from before there were stages.
-    DayOfNone(Date),
+    /// A day from before there were stages; stored as `day` without a stage.
+    DayWithoutStage(Date),
     Team(TeamId),
-    /// An upload and its smoke run.
+    /// A submission with its validation run.
     Submission(SubmissionId),
     /// An evaluation with its run and its scoring.
     Evaluation(EvaluationId),
     /// An ablation with its runs.
     Ablation(AblationId),
-    /// Somebody with an account.
-    Person(PersonId),
-    /// A team's wish to take part.
+    /// A user with an account; stored as `person`.
+    User(UserId),
     Registration(RegistrationId),
-    /// What is told to everybody.
     Announcement(AnnouncementId),
-    /// What a team asks.
+    /// A team's question to the organisers, with its answer.
     Question(QuestionId),
-    /// A trial or a re-evaluation with its runs.
+    /// A trial or a proposed re-evaluation with its runs.
     Proposal(ProposalId),
     Tournament(TournamentId),
     /// One game with its attempts.
@@ -39,18 +37,18 @@ pub enum Subject {
 }
 
 impl Subject {
-    /// As the columns of the events table have it: kind and id.
+    /// Kind and id, as in the columns of the events table.
     pub(crate) fn columns(self) -> (&'static str, String) {
         match self {
             Self::Season => ("season", String::new()),
             Self::Stage(id) => ("stage", id.to_string()),
-            Self::Day(of) => ("day", of.to_string()),
-            Self::DayOfNone(date) => ("day", date.to_string()),
+            Self::Day(stage_day) => ("day", stage_day.to_string()),
+            Self::DayWithoutStage(date) => ("day", date.to_string()),
             Self::Team(id) => ("team", id.to_string()),
             Self::Submission(id) => ("submission", id.to_string()),
             Self::Evaluation(id) => ("evaluation", id.to_string()),
             Self::Ablation(id) => ("ablation", id.to_string()),
-            Self::Person(id) => ("person", id.to_string()),
+            Self::User(id) => ("person", id.to_string()),
             Self::Registration(id) => ("registration", id.to_string()),
             Self::Announcement(id) => ("announcement", id.to_string()),
             Self::Question(id) => ("question", id.to_string()),
@@ -66,12 +64,12 @@ impl Subject {
             "season" => Self::Season,
             "stage" => Self::Stage(id.parse().map_err(|_| unknown())?),
             "day" if id.contains('/') => Self::Day(id.parse().map_err(|_| unknown())?),
-            "day" => Self::DayOfNone(id.parse().map_err(|_| unknown())?),
+            "day" => Self::DayWithoutStage(id.parse().map_err(|_| unknown())?),
             "team" => Self::Team(id.parse().map_err(|_| unknown())?),
             "submission" => Self::Submission(id.parse().map_err(|_| unknown())?),
             "evaluation" => Self::Evaluation(id.parse().map_err(|_| unknown())?),
             "ablation" => Self::Ablation(id.parse().map_err(|_| unknown())?),
-            "person" => Self::Person(id.parse().map_err(|_| unknown())?),
+            "person" => Self::User(id.parse().map_err(|_| unknown())?),
             "registration" => Self::Registration(id.parse().map_err(|_| unknown())?),
             "announcement" => Self::Announcement(id.parse().map_err(|_| unknown())?),
             "question" => Self::Question(id.parse().map_err(|_| unknown())?),
@@ -106,7 +104,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn subjects_read_back_as_they_are_written() {
+    fn subject_parses_back_from_columns_and_text() {
         let subjects = [
             Subject::Season,
             Subject::Stage(StageId::new()),
@@ -114,12 +112,12 @@ mod tests {
                 stage: StageId::new(),
                 date: jiff::civil::date(2026, 3, 1),
             }),
-            Subject::DayOfNone(jiff::civil::date(2026, 3, 1)),
+            Subject::DayWithoutStage(jiff::civil::date(2026, 3, 1)),
             Subject::Team(TeamId::new()),
             Subject::Submission(SubmissionId::new()),
             Subject::Evaluation(EvaluationId::new()),
             Subject::Ablation(AblationId::new()),
-            Subject::Person(PersonId::new()),
+            Subject::User(UserId::new()),
             Subject::Registration(RegistrationId::new()),
             Subject::Announcement(AnnouncementId::new()),
             Subject::Question(QuestionId::new()),

@@ -18,13 +18,13 @@ fn check_valid(submission: &Submission) -> Result<()> {
     Err(StoreError::Conflict(match &submission.state {
         SubmissionState::Valid => return Ok(()),
         SubmissionState::Validating => {
-            "the submission's smoke run is not over: wait until it is valid".into()
+            "the submission's validation run is not over: wait until it is valid".into()
         }
         SubmissionState::Invalid { reason } => {
             format!("the submission is invalid ({reason}): upload a corrected one")
         }
         SubmissionState::ValidationError { .. } => {
-            "the submission could not be checked, by our fault: upload it again".into()
+            "the submission could not be checked because of a platform fault: upload it again".into()
         }
     }))
 }
@@ -32,9 +32,9 @@ fn check_valid(submission: &Submission) -> Result<()> {
 async fn activate(tx: &mut Tx, id: SubmissionId) -> Result<Submission> {
     season::check_open(tx).await?;
     let submission = submissions::find(tx, id).await?;
-    teams::check_may_play(tx, submission.team).await?;
+    teams::check_may_compete(tx, submission.team).await?;
     check_valid(&submission)?;
-    bundles::check_kept(tx, id).await?;
+    bundles::check_available(tx, id).await?;
     let now = tx.now;
     active_submissions::choose(tx, submission.team, id, now).await?;
     submissions::set_withdrawn(tx, id, None).await?;
@@ -45,9 +45,9 @@ async fn activate(tx: &mut Tx, id: SubmissionId) -> Result<Submission> {
 }
 
 impl Store {
-    /// Chooses what a team enters at the next cut, and at those after it, until a later upload turns
-    /// valid; also what it had withdrawn. A day that had its cut goes on with what was active then.
-    /// [`StoreError::Conflict`] if the submission is not valid (yet), or its archive was removed;
+    /// Makes a submission its team's active one from the next cutoff on, until a later upload turns
+    /// valid. A withdrawn submission can be chosen too. Days past their cutoff are not affected.
+    /// [`StoreError::Conflict`] if the submission is not valid (yet), or its bundle was removed;
     /// [`StoreError::Disqualified`] if its team is;
     /// [`StoreError::SeasonClosed`] once the season is over.
     #[boxed]

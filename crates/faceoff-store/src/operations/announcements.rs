@@ -1,4 +1,4 @@
-//! What is told to everybody, and what teams ask.
+//! Public announcements, and questions of teams with their answers.
 
 use crate::{
     boxed,
@@ -13,7 +13,7 @@ use crate::{
 use faceoff_types::{AnnouncementId, QuestionId, TeamId};
 use jiff::Timestamp;
 
-/// Questions of a team that wait for an answer at a time.
+/// Unanswered questions that a team may have at a time.
 pub const MAX_OPEN_QUESTIONS: i64 = 10;
 
 impl Store {
@@ -41,13 +41,13 @@ impl Store {
         .await
     }
 
-    /// The newest announcements first, at most so many.
+    /// At most `limit` announcements, the newest first.
     #[boxed]
     pub async fn announcements(&self, limit: u32) -> Result<Vec<Announcement>> {
         announcements::newest(&mut *self.database.read.acquire().await?, limit).await
     }
 
-    /// A team asks. [`StoreError::Conflict`] if too many of its questions wait for an answer.
+    /// Adds a question of a team. [`StoreError::Conflict`] if it has [`MAX_OPEN_QUESTIONS`] unanswered ones.
     #[boxed]
     pub async fn ask(
         &self,
@@ -59,7 +59,7 @@ impl Store {
         self.write(actor, now, async |tx| {
             if questions::count_open(tx, team).await? >= MAX_OPEN_QUESTIONS {
                 return Err(StoreError::Conflict(format!(
-                    "{MAX_OPEN_QUESTIONS} questions of the team wait for an answer, and no more than that at a time"
+                    "the team has {MAX_OPEN_QUESTIONS} unanswered questions, which is the limit: wait for an answer"
                 )));
             }
             let question = Question {
@@ -76,7 +76,7 @@ impl Store {
         .await
     }
 
-    /// Answers a question, or answers it anew: to the team, or to everybody, who then read the question too.
+    /// Answers a question, or replaces its answer. A public answer is shown to everyone, together with the question.
     #[boxed]
     pub async fn answer(
         &self,

@@ -1,4 +1,4 @@
-//! A copy of the whole database, beside servers that go on, and what it needs of the artifacts.
+//! A copy of the whole database while servers run, and the artifacts that it needs.
 
 use crate::{
     boxed,
@@ -7,7 +7,7 @@ use crate::{
     schema::{self, MIGRATIONS},
     store::Store,
     tables::{
-        needed::{self, Needed},
+        required_artifacts::{self, RequiredArtifact},
         season,
     },
 };
@@ -17,21 +17,21 @@ use sqlx::{
 };
 use std::path::Path;
 
-/// A database that was found to be whole.
+/// A database that passed all checks.
 #[derive(Debug)]
 pub struct CheckedDatabase {
     pub season: String,
     pub schema: i64,
-    /// Artifacts without which something would be missing.
-    pub needed: Vec<Needed>,
+    /// Artifacts that its rows refer to.
+    pub needed: Vec<RequiredArtifact>,
 }
 
 impl Store {
-    /// Copies the database of a data folder, with all that is committed, to a new file; who writes to it goes on. Takes
-    /// room and time in proportion to the database.
+    /// Copies the database of a data folder, with everything committed, to a new file. Writers are not blocked. Takes
+    /// disk space and time in proportion to the database.
     ///
     /// # Errors
-    /// [`StoreError::NotFound`] if there is none; if it cannot be read, or the copy not be written.
+    /// [`StoreError::NotFound`] if there is no database; if it cannot be read, or the copy cannot be written.
     #[boxed]
     pub async fn copy_database(data_dir: &Path, to: &Path) -> Result<()> {
         let from = data_dir.join(Self::DATABASE_FILE);
@@ -42,16 +42,16 @@ impl Store {
         copy(&from, to).await
     }
 
-    /// Makes sure that a database that nobody has open is whole, and of this version or an earlier one; nothing of it is
-    /// changed. One of an earlier version is migrated in `scratch`, a folder, to ask it.
+    /// Checks that a database is intact, and of this version or an earlier one. No process may have it open; it is not
+    /// changed. A database of an earlier version is copied to the folder `scratch` and migrated there.
     ///
     /// # Errors
-    /// [`StoreError::Damaged`] with what is wrong, [`StoreError::NewerDatabase`].
+    /// [`StoreError::Damaged`] with the defect, [`StoreError::NewerDatabase`].
     pub async fn check_database(file: &Path, scratch: &Path) -> Result<CheckedDatabase> {
         let options = SqliteConnectOptions::new()
             .filename(file)
             .read_only(true)
-            // nobody writes to it, and nothing is to lie beside it afterwards
+            // no process writes to it, and no extra file may be left beside it
             .immutable(true)
             .pragma("trusted_schema", "OFF");
         let mut connection = SqliteConnection::connect_with(&options).await?;
@@ -60,11 +60,11 @@ impl Store {
         checked
     }
 
-    /// Lets the ids of events go on far behind those that a restored database has. Whoever followed the server knows ids
-    /// that were given after the copy was made, and must not take what happens next for what it has heard of.
+    /// Raises the next event id far above those of a restored database. Clients that followed the server know ids
+    /// assigned after the copy was made; they must not mistake new events for those.
     ///
     /// # Errors
-    /// If the database, which nobody has open, cannot be written.
+    /// If the database cannot be written. No process may have it open.
     #[boxed]
     pub async fn skip_event_ids(file: &Path) -> Result<()> {
         let options = SqliteConnectOptions::new()
@@ -73,16 +73,16 @@ impl Store {
             .synchronous(SqliteSynchronous::Full)
             .pragma("trusted_schema", "OFF");
         let mut connection = SqliteConnection::connect_with(&options).await?;
-        let skipped = skip(&mut connection).await;
+        let skipped = skip_ids(&mut connection).await;
         connection.close().await?;
         skipped
     }
 }
 
-/// More than a server gives between two backups.
+/// More ids than a server assigns between two backups.
 const IDS_SKIPPED: i64 = 100_000_000;
 
-async fn skip(connection: &mut SqliteConnection) -> Result<()> {
+async fn skip_ids(connection: &mut SqliteConnection) -> Result<()> {
     let counted: bool =
         sqlx::query_scalar("SELECT COUNT(*) FROM sqlite_master WHERE name = 'sqlite_sequence'")
             .fetch_one(&mut *connection)
@@ -109,17 +109,17 @@ async fn check(
     if found != "ok" {
         return Err(StoreError::Damaged(format!("the database: {found}")));
     }
-    let Some(schema) = schema::applied(connection).await? else {
+    let Some(schema) = schema::newest_applied(connection).await? else {
         return Err(StoreError::Damaged(
             "the database: it has no tables of Faceoff's".to_owned(),
         ));
     };
-    schema::before(connection).await?;
+    schema::check_migratable(connection).await?;
     check_references(connection).await?;
     let (season, needed) = if schema < schema::this_program().schema {
-        migrated(file, &scratch.join("migrated.sqlite3")).await?
+        read_migrated_copy(file, &scratch.join("migrated.sqlite3")).await?
     } else {
-        asked(connection).await?
+        read_contents(connection).await?
     };
     Ok(CheckedDatabase {
         season,
@@ -128,15 +128,15 @@ async fn check(
     })
 }
 
-async fn asked(connection: &mut SqliteConnection) -> Result<(String, Vec<Needed>)> {
+async fn read_contents(connection: &mut SqliteConnection) -> Result<(String, Vec<RequiredArtifact>)> {
     Ok((
         season::read(connection).await?.name,
-        needed::all(connection).await?,
+        required_artifacts::all(connection).await?,
     ))
 }
 
-/// What a copy says that was brought up to this version; it is thrown away.
-async fn migrated(file: &Path, copied: &Path) -> Result<(String, Vec<Needed>)> {
+/// The contents of a copy that is migrated to this version and then removed.
+async fn read_migrated_copy(file: &Path, copied: &Path) -> Result<(String, Vec<RequiredArtifact>)> {
     copy(file, copied).await?;
     let options = SqliteConnectOptions::new()
         .filename(copied)
@@ -148,8 +148,8 @@ async fn migrated(file: &Path, copied: &Path) -> Result<(String, Vec<Needed>)> {
         .run(&mut connection)
         .await
         .map_err(|error| StoreError::Database(error.into()))?;
-    let told = asked(&mut connection).await;
+    let contents = read_contents(&mut connection).await;
     connection.close().await?;
     std::fs::remove_file(copied).map_err(|error| StoreError::artifact(copied.display(), &error))?;
-    told
+    contents
 }

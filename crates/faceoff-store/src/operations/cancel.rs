@@ -2,8 +2,8 @@ use crate::{
     boxed,
     error::{Result, StoreError},
     event::Actor,
-    operations::ends,
-    reads,
+    operations::completion,
+    queries,
     store::Store,
     tables::evaluations::Failure,
 };
@@ -11,8 +11,8 @@ use faceoff_types::EvaluationId;
 use jiff::Timestamp;
 
 impl Store {
-    /// Stops an evaluation that is not over. Workers that play its shards learn of it at their next
-    /// heartbeat. If it was the last of its day, that is released.
+    /// Stops an evaluation that is not over. Workers that run its shards learn of it at their next
+    /// heartbeat. If it was the last open one of its day, the day is released.
     #[boxed]
     pub async fn cancel_evaluation(
         &self,
@@ -22,13 +22,13 @@ impl Store {
         now: Timestamp,
     ) -> Result<()> {
         self.write(actor, now, async |tx| {
-            let evaluation = reads::evaluations::find(tx, id).await?;
+            let evaluation = queries::evaluations::find(tx, id).await?;
             if evaluation.state.is_over() {
                 return Err(StoreError::Conflict(
                     "the evaluation is over already".into(),
                 ));
             }
-            ends::fail_evaluation(tx, id, evaluation.run, Failure::Cancelled(reason)).await
+            completion::fail_evaluation(tx, id, evaluation.run, Failure::Cancelled(reason)).await
         })
         .await
     }

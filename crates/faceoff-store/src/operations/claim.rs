@@ -3,14 +3,14 @@ use crate::{
     error::{Result, StoreError},
     event::{Actor, Subject},
     operations::{
-        ends,
-        give_back::give_up,
-        purpose::{self, Lot, Purpose},
+        completion,
+        lease_release::give_up,
+        purpose::{self, JobFilter, Purpose},
         runs,
-        tournament::play,
-        work::{Claimed, RunSeeds, Work},
+        tournament::game_lifecycle,
+        jobs::{ClaimedJob, RunSeeds, Job},
     },
-    queue::{self, Claim, Leased},
+    queue::{self, JobClaim, LeasedJob},
     store::Store,
     tables::{
         evaluations, runs as run_rows,
@@ -24,72 +24,72 @@ use faceoff_types::{EvaluationId, RunId, SubmissionId};
 use jiff::{SignedDuration, Timestamp};
 use uuid::Uuid;
 
-/// Leases of one unit after which it is given up although no worker reported a failure: something in
-/// it kills its worker. Far above [`MAX_ATTEMPTS`](crate::MAX_ATTEMPTS), since a server that is killed
-/// again and again for other reasons must not cost a team its evaluation.
+/// Leases of one job after which it is given up although no worker reported a failure: something in
+/// it kills its worker. Far above [`MAX_ATTEMPTS`](crate::MAX_ATTEMPTS): a server that is killed
+/// repeatedly for other reasons must not cost a team its evaluation.
 pub const MAX_LEASES: u32 = 50;
 
 impl Store {
-    /// Leases the next unit of work for `lease_s` seconds. Finalisations come first; smoke runs and
-    /// shards of evaluations share the slots half and half, and the teams that wait for either share
-    /// that half equally, by slot time; shards of ablations have what is left. A unit whose lease is
-    /// over is leased again. `None`: nothing to do now (see [`Store::work_signal`]), or the queue is paused.
+    /// Leases the next job for `lease_s` seconds. Scoring comes first. Validation runs and shards
+    /// of evaluations each get half of the slots; within each half, teams get equal slot time. Shards
+    /// of ablations get what is left. A job with an expired lease is leased again. `None`: there is
+    /// no job to run now (see [`Store::job_signal`]), or the queue is paused.
     #[boxed]
     pub async fn claim(
         &self,
         worker: &str,
         lease_s: u32,
         now: Timestamp,
-    ) -> Result<Option<Claimed>> {
-        self.claim_of(Lot::All, worker, lease_s, now).await
+    ) -> Result<Option<ClaimedJob>> {
+        self.claim_matching(JobFilter::All, worker, lease_s, now).await
     }
 
-    /// [`claim`](Self::claim), of some of the work alone.
+    /// [`claim`](Self::claim), limited to some kinds of jobs.
     #[boxed]
-    pub async fn claim_of(
+    pub async fn claim_matching(
         &self,
-        lot: Lot,
+        filter: JobFilter,
         worker: &str,
         lease_s: u32,
         now: Timestamp,
-    ) -> Result<Option<Claimed>> {
+    ) -> Result<Option<ClaimedJob>> {
         let actor = Actor::Worker(worker.to_owned());
         self.write(actor, now, async |tx| {
             if season::is_paused(tx).await? {
                 return Ok(None);
             }
             let nonce = Uuid::now_v7();
-            while let Some(unit) =
-                queue::claim_next(tx, worker, nonce, lot.lanes(), lease_s, now).await?
+            while let Some(leased) =
+                queue::claim_next(tx, worker, nonce, filter.lanes(), lease_s, now).await?
             {
-                let reason = if unit.attempts > MAX_LEASES {
-                    format!("{MAX_LEASES} workers died over it")
+                let reason = if leased.attempts > MAX_LEASES {
+                    format!("{MAX_LEASES} workers died while running it")
                 } else {
-                    match describe(tx, &unit, worker).await {
+                    match describe_job(tx, &leased, worker).await {
                         Ok(None) => {
-                            queue::park(tx, unit.id.0).await?;
+                            queue::park(tx, leased.id.0).await?;
                             continue;
                         }
-                        Ok(Some(work)) => {
+                        Ok(Some(job)) => {
                             let lease = SignedDuration::from_secs(lease_s.into());
-                            let claim = Claim {
-                                unit: unit.id.0,
+                            let claim = JobClaim {
+                                job: leased.id.0,
                                 nonce,
                                 worker: worker.to_owned(),
                                 lease_until: now.saturating_add(lease).unwrap_or(Timestamp::MAX),
                             };
-                            return Ok(Some(Claimed { claim, work }));
+                            return Ok(Some(ClaimedJob { claim, job }));
                         }
-                        // Given up rather than returned: it would be the next claim's unit again, and
-                        // nobody else's work would ever be done.
-                        Err(StoreError::Damaged(what)) => {
-                            tracing::error!(unit = %unit.id.0, what, "damaged work is given up");
+                        // Given up rather than returned: the next claim would lease it again, and
+                        // no other job would ever be run.
+                        Err(StoreError::Damaged(defect)) => {
+                            tracing::error!(job = %leased.id.0, defect, "a damaged job is given up");
                             "a stored value is damaged".to_owned()
                         }
                         Err(error) => return Err(error),
                     }
                 };
-                give_up(tx, unit.id.0, &unit.kind, &reason).await?;
+                give_up(tx, leased.id.0, &leased.kind, &reason).await?;
             }
             Ok(None)
         })
@@ -97,28 +97,28 @@ impl Store {
     }
 }
 
-/// Reads what the leased unit is about. `None`: it is not to be begun now.
-async fn describe(tx: &mut Tx, unit: &Leased, worker: &str) -> Result<Option<Work>> {
-    let retries = unit.attempts.saturating_sub(1);
-    let work = match purpose::of_unit(tx, unit.id.0, &unit.kind).await? {
+/// Reads the rows that a leased job refers to. `None`: the job must not start now.
+async fn describe_job(tx: &mut Tx, leased: &LeasedJob, worker: &str) -> Result<Option<Job>> {
+    let retries = leased.attempts.saturating_sub(1);
+    let job = match purpose::of_job(tx, leased.id.0, &leased.kind).await? {
         Purpose::Game(id) => {
-            tx.advanced(Subject::Game(id));
-            return play::begin(tx, id, worker, retries).await;
+            tx.record_progress(Subject::Game(id));
+            return game_lifecycle::begin(tx, id, worker, retries).await;
         }
-        Purpose::Smoke(id) => {
-            tx.advanced(Subject::Submission(id));
+        Purpose::Validation(id) => {
+            tx.record_progress(Subject::Submission(id));
             let submission = submissions::find(tx, id).await?;
             let secret = season::read(tx).await?.secret;
             let seeds = RunSeeds {
-                episodes: secret.smoke(id),
+                episodes: secret.validation(id),
                 mismatch: secret.model_mismatch(),
             };
             let all = stages::all(tx).await?;
             let limits = stages::current(&all, tx.now)
                 .map(|stage| stage.rules.rules.limits.clone())
                 .unwrap_or_default();
-            let runtimes = stage_runtimes::of_uploads(&all, tx.now);
-            Ok(Work::Smoke {
+            let runtimes = stage_runtimes::required_runtimes(&all, tx.now);
+            Ok(Job::Validation {
                 submission,
                 seeds,
                 limits,
@@ -128,10 +128,10 @@ async fn describe(tx: &mut Tx, unit: &Leased, worker: &str) -> Result<Option<Wor
         Purpose::Shard { run: id, shard } => {
             let owner = runs::owner(tx, id).await?;
             let (run, seeds) = read_run(tx, id).await?;
-            let submission = contestant(tx, id).await?;
-            ends::run_begun(tx, id, owner).await?;
-            tx.advanced(owner.subject());
-            Ok(Work::Shard {
+            let submission = single_contestant(tx, id).await?;
+            completion::record_run_start(tx, id, owner).await?;
+            tx.record_progress(owner.subject());
+            Ok(Job::Shard {
                 owner,
                 run,
                 shard,
@@ -140,26 +140,26 @@ async fn describe(tx: &mut Tx, unit: &Leased, worker: &str) -> Result<Option<Wor
                 platform_retries: retries,
             })
         }
-        Purpose::Finalise(evaluation) => {
-            tx.advanced(Subject::Evaluation(evaluation));
+        Purpose::Scoring(evaluation) => {
+            tx.record_progress(Subject::Evaluation(evaluation));
             let run = evaluations::run_of(tx, evaluation).await?;
-            finalise(tx, evaluation, run).await
+            describe_scoring(tx, evaluation, run).await
         }
-        Purpose::FinaliseDraft { id, run, proposal } => {
-            tx.advanced(Subject::Proposal(proposal));
-            finalise(tx, id, run).await
+        Purpose::ProposedScoring { id, run, proposal } => {
+            tx.record_progress(Subject::Proposal(proposal));
+            describe_scoring(tx, id, run).await
         }
     };
-    work.map(Some)
+    job.map(Some)
 }
 
-async fn finalise(tx: &mut Tx, evaluation: EvaluationId, id: RunId) -> Result<Work> {
+async fn describe_scoring(tx: &mut Tx, evaluation: EvaluationId, id: RunId) -> Result<Job> {
     let (run, seeds) = read_run(tx, id).await?;
     let of_run = shards::of_run(tx, id).await?;
-    let missing = |what| StoreError::Damaged(format!("evaluation {evaluation}: {what}"));
+    let missing = |defect| StoreError::Damaged(format!("evaluation {evaluation}: {defect}"));
     let recordings: Option<Vec<_>> = of_run.into_iter().map(|shard| shard.recording).collect();
-    let agent_name = contestant(tx, id).await?.agent_name;
-    Ok(Work::Finalise {
+    let agent_name = single_contestant(tx, id).await?.agent_name;
+    Ok(Job::Scoring {
         evaluation,
         run,
         recordings: recordings.ok_or_else(|| missing("a shard without a recording"))?,
@@ -178,8 +178,8 @@ async fn read_run(tx: &mut Tx, id: RunId) -> Result<(Run, RunSeeds)> {
     Ok((run, seeds))
 }
 
-/// The one that plays a run of tasks.
-async fn contestant(tx: &mut Tx, run: RunId) -> Result<Submission> {
+/// The only contestant of a run of tasks.
+async fn single_contestant(tx: &mut Tx, run: RunId) -> Result<Submission> {
     let sides: Vec<SubmissionId> = run_rows::contestants(tx, run).await?;
     match sides[..] {
         [submission] => submissions::find(tx, submission).await,

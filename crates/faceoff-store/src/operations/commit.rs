@@ -3,11 +3,11 @@ use crate::{
     error::{Result, StoreError},
     event::{Actor, Event},
     operations::{
-        ends::{self, RunEnd},
+        completion::{self, RunEnd},
         purpose::{self, Purpose},
         runs,
     },
-    queue::{self, Claim, Hold},
+    queue::{self, JobClaim, ClaimState},
     store::Store,
     tables::{
         runs as run_rows,
@@ -18,70 +18,69 @@ use crate::{
 use faceoff_types::RunId;
 use jiff::Timestamp;
 
-/// What became of a commit. An error in place of one leaves open whether it was stored if it is a
-/// database's ([`StoreError::Database`]); after any other nothing was.
+/// Result of a commit. After [`StoreError::Database`] it is unknown whether it was stored; after any
+/// other error nothing was stored.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Committed {
-    Now,
-    /// This very lease has committed before; nothing was changed.
-    Before,
-    /// The unit is another worker's, or was dropped; nothing was changed.
+pub enum CommitOutcome {
+    Stored,
+    /// The same lease has committed before; nothing was changed.
+    AlreadyStored,
+    /// Another worker holds the lease, or the job was dropped; nothing was changed.
     LeaseLost,
 }
 
-/// A claim on one kind of work cannot be committed as another.
-pub(crate) fn other_work(expected: &str, purpose: &Purpose) -> StoreError {
+/// The error for a claim on one kind of job that is committed as another kind.
+pub(crate) fn wrong_job(expected: &str, purpose: &Purpose) -> StoreError {
     StoreError::Conflict(format!(
         "the claim is not on a {expected}, but on {purpose:?}"
     ))
 }
 
 impl Store {
-    /// Does what a claim is good for, unless it was done under the same lease before or the lease is
-    /// lost; then the unit is done.
+    /// Runs `commit` and marks the job done, unless the same lease has committed before or was lost.
     pub(crate) async fn commit(
         &self,
-        claim: &Claim,
+        claim: &JobClaim,
         now: Timestamp,
         commit: impl AsyncFnOnce(&mut Tx, Purpose) -> Result<()>,
-    ) -> Result<Committed> {
+    ) -> Result<CommitOutcome> {
         let actor = Actor::Worker(claim.worker.clone());
         self.write(actor, now, async |tx| {
-            let kind = match queue::hold(tx, claim).await? {
-                Hold::Held { kind } => kind,
-                Hold::DoneBefore => return Ok(Committed::Before),
-                Hold::Lost => return Ok(Committed::LeaseLost),
+            let kind = match queue::claim_state(tx, claim).await? {
+                ClaimState::Leased { kind } => kind,
+                ClaimState::AlreadyDone => return Ok(CommitOutcome::AlreadyStored),
+                ClaimState::Lost => return Ok(CommitOutcome::LeaseLost),
             };
-            let purpose = purpose::of_unit(tx, claim.unit, &kind).await?;
+            let purpose = purpose::of_job(tx, claim.job, &kind).await?;
             let progress = match &purpose {
                 Purpose::Shard { shard, .. } => shard.episodes(),
-                Purpose::Smoke(_)
+                Purpose::Validation(_)
                 | Purpose::Game(_)
-                | Purpose::Finalise(_)
-                | Purpose::FinaliseDraft { .. } => 0,
+                | Purpose::Scoring(_)
+                | Purpose::ProposedScoring { .. } => 0,
             };
             queue::mark_done(tx, claim, progress).await?;
             commit(tx, purpose).await?;
-            Ok(Committed::Now)
+            Ok(CommitOutcome::Stored)
         })
         .await
     }
 
-    /// Stores a played shard. Idempotent: a second commit under the same lease, or one under a lost
-    /// lease, changes nothing and says so. More agent faults than the plan allows, summed over the
-    /// run, end an evaluation as [`AgentFailed`](crate::EvaluationState::AgentFailed) and an ablation
-    /// without a result; the last shard of an evaluation queues the finalisation, that of an
-    /// ablation's last run ends it.
+    /// Stores the results of a shard. Idempotent: a second commit under the same lease, or one under a
+    /// lost lease, changes nothing; the outcome reports it. If the run has more agent faults than its
+    /// plan allows, an evaluation ends as [`AgentFailed`](crate::EvaluationState::AgentFailed) and an
+    /// ablation ends without a result. The last shard of an evaluation queues its scoring. The
+    /// last shard of all runs of an ablation ends the ablation.
     #[boxed]
     pub async fn commit_shard(
         &self,
-        claim: &Claim,
+        claim: &JobClaim,
         commit: ShardCommit,
         now: Timestamp,
-    ) -> Result<Committed> {
+    ) -> Result<CommitOutcome> {
         self.commit(claim, now, async |tx, purpose| match purpose {
             Purpose::Shard { run, shard } => store_shard(tx, run, &shard, &commit).await,
-            other => Err(other_work("shard", &other)),
+            other => Err(wrong_job("shard", &other)),
         })
         .await
     }
@@ -106,9 +105,9 @@ async fn store_shard(tx: &mut Tx, id: RunId, shard: &Shard, commit: &ShardCommit
     );
     let sums = shards::sums(tx, id).await?;
     if commit.stopped_by_faults || sums.agent_faults > i64::from(run.plan.max_faults) {
-        ends::run_ended(tx, id, owner, RunEnd::AgentFailed).await
+        completion::end_run(tx, id, owner, RunEnd::AgentFailed).await
     } else if sums.open == 0 {
-        ends::run_ended(tx, id, owner, RunEnd::Played).await
+        completion::end_run(tx, id, owner, RunEnd::Completed).await
     } else {
         Ok(())
     }

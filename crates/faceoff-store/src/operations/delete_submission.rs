@@ -1,4 +1,4 @@
-//! A team, or an organiser, has the archive of a submission removed.
+//! Removal of a submission's bundle on request of its team or an organiser.
 
 use crate::{
     boxed,
@@ -19,17 +19,17 @@ fn conflict<T>(why: impl Into<String>) -> Result<T> {
     Err(StoreError::Conflict(why.into()))
 }
 
-/// Refuses to remove what is evidence against a team, or of one that an organiser has taken out of the season.
+/// Refuses to remove evidence against a team, and submissions of a team that an organiser has withdrawn.
 async fn check_no_evidence(tx: &mut Tx, team: TeamId) -> Result<()> {
     let why = match teams::evidence(tx, team).await? {
         None => return Ok(()),
         Some(Evidence::Disqualified(ruling)) => format!(
-            "the team was disqualified on {} ({}); what it has uploaded and played is kept as evidence as long as it is",
+            "the team was disqualified on {} ({}); its submissions and results are kept as evidence while it is",
             ruling.at.strftime("%Y-%m-%d at %H:%M UTC"),
             ruling.reason
         ),
         Some(Evidence::Retired(at)) => format!(
-            "an organiser has taken the team out of the season on {}; what it has uploaded and played is kept for the \
+            "an organiser withdrew the team from the season on {}; its submissions and results are kept for the \
              organisers",
             at.strftime("%Y-%m-%d at %H:%M UTC")
         ),
@@ -37,7 +37,7 @@ async fn check_no_evidence(tx: &mut Tx, team: TeamId) -> Result<()> {
     conflict(why)
 }
 
-/// Refuses to remove an archive that somebody needs.
+/// Refuses to remove a bundle that is still needed.
 async fn check_idle(tx: &mut Tx, submission: &Submission) -> Result<()> {
     if let Some(deleted) = &submission.deleted {
         return conflict(format!(
@@ -46,9 +46,9 @@ async fn check_idle(tx: &mut Tx, submission: &Submission) -> Result<()> {
             deleted.by
         ));
     }
-    if let Some(removed) = &submission.archive_removed {
+    if let Some(removed) = &submission.bundle_removed {
         return conflict(format!(
-            "its archive was removed on {} {}: there is nothing left to delete",
+            "its bundle was removed on {} {}: there is nothing left to delete",
             removed.at.strftime("%Y-%m-%d at %H:%M UTC"),
             removed.reason
         ));
@@ -56,39 +56,39 @@ async fn check_idle(tx: &mut Tx, submission: &Submission) -> Result<()> {
     match submission.state {
         SubmissionState::Valid => {}
         SubmissionState::Validating => {
-            return conflict("its smoke run is queued or running: wait for its verdict");
+            return conflict("its validation run is queued or running: wait for its result");
         }
         SubmissionState::Invalid { .. } | SubmissionState::ValidationError { .. } => {
             return conflict(
-                "its smoke run refused it, so the server removes its archive by itself: there is nothing to delete",
+                "it failed its validation run, so the server removes its bundle automatically: there is nothing to delete",
             );
         }
     }
     check_no_evidence(tx, submission.team).await?;
-    let needs = bundles::needs(tx, submission.id).await?;
-    if needs.is_active {
+    let uses = bundles::uses(tx, submission.id).await?;
+    if uses.is_active {
         return conflict(
-            "it is active, and enters the next cut: choose another one, or withdraw it, first",
+            "it is active and will be evaluated at the next cutoff: choose another one, or withdraw it, first",
         );
     }
-    if needs.open > 0 {
+    if uses.open > 0 {
         return conflict(format!(
-            "it is queued or playing ({} evaluations or ablations are not over): wait for their end",
-            needs.open
+            "it is being evaluated ({} evaluations or ablations are queued or running): wait for their end",
+            uses.open
         ));
     }
-    if needs.unreleased > 0 {
+    if uses.unreleased > 0 {
         return conflict(
-            "it has played a day that is not released, and may have to play it again: wait for the release",
+            "it was evaluated on a day that is not released, and a rerun may still need it: wait for the release",
         );
     }
-    if games::needs(tx, submission.id).await? {
+    if games::needs_submission(tx, submission.id).await? {
         return conflict(
-            "it plays in a tournament that is not closed: its games may have to be played again until then",
+            "it takes part in a tournament that is not closed: until then a game may have to be played again",
         );
     }
-    if needs.proposed > 0 {
-        // Nobody but the organisers learns of what.
+    if uses.proposed > 0 {
+        // Proposals are visible to organisers only.
         return conflict(
             "the organisers still need it for something that is not decided yet: try again later",
         );
@@ -97,13 +97,13 @@ async fn check_idle(tx: &mut Tx, submission: &Submission) -> Result<()> {
 }
 
 impl Store {
-    /// Would [`Store::delete_submission`] be done at `now`?
+    /// Checks whether [`Store::delete_submission`] would succeed at `now`.
     ///
     /// # Errors
-    /// [`StoreError::Conflict`] says what it waits for.
+    /// [`StoreError::Conflict`] with the reason why it would not.
     #[boxed]
     pub async fn check_deletable(&self, id: SubmissionId, now: Timestamp) -> Result<Submission> {
-        // It writes nothing, but what it finds belongs together.
+        // It writes nothing, but needs one consistent view of several tables.
         self.write(Actor::Server, now, async |tx| {
             let submission = submissions::find(tx, id).await?;
             check_idle(tx, &submission).await?;
@@ -112,9 +112,9 @@ impl Store {
         .await
     }
 
-    /// Has the archive of a valid submission removed, for good: nobody is promised it from now on, and its file goes
-    /// later, by [`Store::remove_files_of_removed`]. What it has played, its log and its hash stay. `reason` is in
-    /// words for its team. [`StoreError::Conflict`] if the archive is gone, is needed, or is evidence.
+    /// Removes the bundle of a valid submission for good. It cannot be downloaded from now on; its file is deleted
+    /// later, by [`Store::remove_files_of_removed`]. Its results, log and hash stay. The team can read `reason`.
+    /// [`StoreError::Conflict`] if the bundle is gone, is still needed, or is evidence.
     #[boxed]
     pub async fn delete_submission(
         &self,
@@ -126,7 +126,7 @@ impl Store {
         self.write(actor.clone(), now, async |tx| {
             let submission = submissions::find(tx, id).await?;
             check_idle(tx, &submission).await?;
-            bundles::remove(tx, id, reason, now).await?;
+            bundles::set_removed(tx, id, reason, now).await?;
             bundles::set_deleted(tx, id, &actor, now).await?;
             let event = Event::SubmissionDeleted {
                 reason: reason.to_owned(),

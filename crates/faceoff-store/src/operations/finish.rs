@@ -3,35 +3,36 @@ use crate::{
     error::Result,
     event::{Event, Subject},
     operations::{
-        commit::{Committed, other_work},
-        drafts as draft_ends,
+        commit::{CommitOutcome, wrong_job},
+        proposal_completion,
         purpose::Purpose,
         release_day,
     },
-    queue::Claim,
+    queue::JobClaim,
     store::Store,
-    tables::{drafts, evaluations, retentions},
+    tables::{proposed_evaluations, evaluations, retentions},
 };
 use faceoff_types::EvaluationResult;
 use jiff::Timestamp;
 
 impl Store {
-    /// Stores the score, the dataset's artifact key with the BLAKE3 of its archive (64 hexadecimal
-    /// digits), and the end in one transaction, with the release of the day if this was its last
-    /// evaluation. Idempotent, as [`Store::commit_shard`] is. After
-    /// [`StoreError::Database`](crate::StoreError::Database) the dataset may be the evaluation's: leave it.
+    /// Stores the score and the dataset's artifact key with the BLAKE3 of its archive (64 hexadecimal
+    /// digits), and ends the evaluation, in one transaction. If it was the last of its day, the day is
+    /// released. Idempotent, as [`Store::commit_shard`] is. After
+    /// [`StoreError::Database`](crate::StoreError::Database) the database may already refer to the dataset: do not
+    /// delete it.
     #[boxed]
     pub async fn finish_evaluation(
         &self,
-        claim: &Claim,
+        claim: &JobClaim,
         result: &EvaluationResult,
         dataset: &str,
         dataset_blake3: &str,
         now: Timestamp,
-    ) -> Result<Committed> {
-        let bytes = self.artifacts().bytes_of(dataset).await?;
+    ) -> Result<CommitOutcome> {
+        let bytes = self.artifacts().size_bytes(dataset).await?;
         self.commit(claim, now, async |tx, purpose| match purpose {
-            Purpose::Finalise(id) => {
+            Purpose::Scoring(id) => {
                 evaluations::set_finished(tx, id, result, dataset, dataset_blake3, now).await?;
                 if let Some(bytes) = bytes {
                     retentions::set_measured(tx, id, bytes).await?;
@@ -41,16 +42,16 @@ impl Store {
                     dataset_blake3: dataset_blake3.to_owned(),
                 };
                 tx.record(Subject::Evaluation(id), event);
-                release_day::if_over(tx, id).await
+                release_day::release_if_over(tx, id).await
             }
-            Purpose::FinaliseDraft { id, proposal, .. } => {
-                drafts::set_finished(tx, id, result, dataset, dataset_blake3, now).await?;
+            Purpose::ProposedScoring { id, proposal, .. } => {
+                proposed_evaluations::set_finished(tx, id, result, dataset, dataset_blake3, now).await?;
                 if let Some(bytes) = bytes {
                     retentions::set_measured(tx, id, bytes).await?;
                 }
-                draft_ends::tell_if_over(tx, proposal).await
+                proposal_completion::record_if_over(tx, proposal).await
             }
-            other => Err(other_work("finalisation", &other)),
+            other => Err(wrong_job("scoring job", &other)),
         })
         .await
     }

@@ -9,8 +9,8 @@ use faceoff_types::StageId;
 use jiff::Timestamp;
 
 impl Store {
-    /// Has the boards of a stage show what they show at `now`, until they are unfrozen: days go on, and what is
-    /// finished later is on none of them. [`StoreError::Conflict`] if they stand still already.
+    /// Freezes the boards of a stage as they are at `now`, until they are unfrozen. Evaluation days continue, but
+    /// results that finish later are not shown. [`StoreError::Conflict`] if the boards are frozen already.
     #[boxed]
     pub async fn freeze_boards(
         &self,
@@ -39,7 +39,7 @@ impl Store {
         .await
     }
 
-    /// Has the boards of a stage show everything again. [`StoreError::Conflict`] if they do.
+    /// Unfreezes the boards of a stage: they show all results again. [`StoreError::Conflict`] if they are not frozen.
     #[boxed]
     pub async fn unfreeze_boards(
         &self,
@@ -61,15 +61,15 @@ impl Store {
         .await
     }
 
-    /// All stages whose boards stand still: since when, and why.
+    /// All stages with frozen boards, with time and reason.
     #[boxed]
     pub async fn frozen_boards(&self) -> Result<Vec<(StageId, Ruling)>> {
         freezes::all(&mut *self.database.read.acquire().await?).await
     }
 
-    /// Since when the boards of a stage stand still, and why; `None` if they do not.
+    /// Time and reason of a stage's board freeze; `None` if its boards are not frozen.
     #[boxed]
-    pub async fn boards_frozen(&self, stage: StageId) -> Result<Option<Ruling>> {
+    pub async fn board_freeze(&self, stage: StageId) -> Result<Option<Ruling>> {
         freezes::find(&mut *self.database.read.acquire().await?, stage).await
     }
 }

@@ -1,4 +1,4 @@
-//! A database that came with an archive, taken in: whatever a stranger has put into it.
+//! Import of a database from an archive, which is untrusted input.
 
 use crate::{
     boxed,
@@ -7,7 +7,7 @@ use crate::{
     operations::scrub::check_references,
     schema::MIGRATIONS,
     store::Store,
-    tables::archived::{self, Archived},
+    tables::archive::{self, ArchivedSeason},
 };
 use jiff::Timestamp;
 use sqlx::{
@@ -21,7 +21,7 @@ use std::{
 };
 
 /// The database of a data folder.
-fn file_of(data_dir: &Path) -> PathBuf {
+fn database_file(data_dir: &Path) -> PathBuf {
     data_dir.join(Store::DATABASE_FILE)
 }
 
@@ -30,32 +30,32 @@ fn refused(why: impl std::fmt::Display) -> StoreError {
 }
 
 impl Store {
-    /// Is the season of a data folder an archive's? Nothing is made or changed; `None` also where there is no
-    /// database yet, or one from before there were archives.
+    /// The archive that a data folder's season was imported from. Nothing is created or changed. `None` also if there
+    /// is no database yet, or one of a version without archives.
     #[boxed]
-    pub async fn archived_in(data_dir: &Path) -> Result<Option<Archived>> {
-        let file = file_of(data_dir);
+    pub async fn archived_in(data_dir: &Path) -> Result<Option<ArchivedSeason>> {
+        let file = database_file(data_dir);
         if !file.exists() {
             return Ok(None);
         }
         let options = SqliteConnectOptions::new().filename(file).read_only(true);
         let mut connection = SqliteConnection::connect_with(&options).await?;
         let archived = match is_marked(&mut connection).await? {
-            true => archived::read(&mut connection).await?,
+            true => archive::read(&mut connection).await?,
             false => None,
         };
         connection.close().await?;
         Ok(archived)
     }
 
-    /// Takes the database in that lies as `faceoff.sqlite3` in `data_dir`, unpacked from an archive: migrates it, makes
-    /// sure that it is whole and nothing but our tables, and that no key of anybody's is in it. Run it on a folder that
-    /// counts only afterwards. [`StoreError::Conflict`] if it is refused, with the reason.
-    pub async fn import(data_dir: &Path, now: Timestamp) -> Result<Archived> {
+    /// Imports the database `faceoff.sqlite3` in `data_dir`, unpacked from an archive. Migrates it, checks that it is
+    /// intact and has exactly this program's schema, and removes all credentials. The folder must not be used before
+    /// this has succeeded. [`StoreError::Conflict`] if the database is refused, with the reason.
+    pub async fn import(data_dir: &Path, now: Timestamp) -> Result<ArchivedSeason> {
         let options = SqliteConnectOptions::new()
-            .filename(file_of(data_dir))
+            .filename(database_file(data_dir))
             .create_if_missing(false)
-            // what its schema may have been given to run is not run
+            // functions in an untrusted schema are not executed
             .pragma("trusted_schema", "OFF")
             .pragma("cell_size_check", "ON")
             .foreign_keys(true)
@@ -70,7 +70,7 @@ impl Store {
     }
 }
 
-async fn check(connection: &mut SqliteConnection, now: Timestamp) -> Result<Archived> {
+async fn check(connection: &mut SqliteConnection, now: Timestamp) -> Result<ArchivedSeason> {
     let found: String = sqlx::query_scalar("PRAGMA quick_check(1)")
         .fetch_one(&mut *connection)
         .await
@@ -89,14 +89,14 @@ async fn check(connection: &mut SqliteConnection, now: Timestamp) -> Result<Arch
     })?;
     check_schema(connection).await?;
     check_references(connection).await.map_err(refused)?;
-    let archived = match archived::read(connection).await {
+    let archived = match archive::read(connection).await {
         Ok(Some(archived)) => archived,
-        Ok(None) => return Err(refused("it does not say what it is an archive of")),
+        Ok(None) => return Err(refused("its description of the archive is missing")),
         Err(error) => return Err(refused(error)),
     };
     let now = Instant(now);
     let mut tx = connection.begin().await?;
-    // An archive has none of these; what somebody has put there is worth nothing here.
+    // An archive has no credentials; any that were added to it must not work here.
     sqlx::query!("DELETE FROM tokens").execute(&mut *tx).await?;
     sqlx::query!("DELETE FROM invitations")
         .execute(&mut *tx)
@@ -116,13 +116,13 @@ async fn check(connection: &mut SqliteConnection, now: Timestamp) -> Result<Arch
         .execute(&mut *tx)
         .await?;
     tx.commit().await?;
-    Ok(Archived {
+    Ok(ArchivedSeason {
         imported_at: Some(now.0),
         ..archived
     })
 }
 
-/// Has it the table in which archives say what they are?
+/// Whether the database has the table that describes an archive.
 async fn is_marked(connection: &mut SqliteConnection) -> Result<bool> {
     let found: i64 = sqlx::query_scalar(
         "SELECT COUNT(*) FROM sqlite_master WHERE type = 'table' AND name = 'archived'",
@@ -132,16 +132,16 @@ async fn is_marked(connection: &mut SqliteConnection) -> Result<bool> {
     Ok(found == 1)
 }
 
-/// Refuses what our migrations did not make: a trigger or a view would act from inside, whenever something is written
-/// or read.
+/// Refuses a schema that differs from the migrations': an added trigger or view would run on every write or
+/// read.
 async fn check_schema(connection: &mut SqliteConnection) -> Result<()> {
-    let mut ours = SqliteConnection::connect("sqlite::memory:").await?;
+    let mut reference = SqliteConnection::connect("sqlite::memory:").await?;
     MIGRATIONS
-        .run(&mut ours)
+        .run(&mut reference)
         .await
         .map_err(|error| StoreError::Database(error.into()))?;
-    let (expected, found) = (schema(&mut ours).await?, schema(connection).await?);
-    ours.close().await?;
+    let (expected, found) = (schema(&mut reference).await?, schema(connection).await?);
+    reference.close().await?;
     match found.symmetric_difference(&expected).next() {
         None => Ok(()),
         Some((kind, name, _)) => Err(refused(format_args!(
@@ -150,7 +150,7 @@ async fn check_schema(connection: &mut SqliteConnection) -> Result<()> {
     }
 }
 
-/// Everything that is defined, spaces and quotes apart, in which versions of SQLite differ.
+/// All schema definitions, without spaces and quotes, in which versions of SQLite differ.
 async fn schema(connection: &mut SqliteConnection) -> Result<BTreeSet<(String, String, String)>> {
     let rows: Vec<(String, String, Option<String>)> = sqlx::query_as(
         "SELECT type, name, sql FROM sqlite_master WHERE NOT (type = 'table' AND name = '_sqlx_migrations')",

@@ -1,15 +1,15 @@
-//! Links by which people join: made, taken back, and followed once.
+//! Invitations: single-use links with which users join. They are created, revoked and accepted here.
 
 use crate::{
     boxed,
     error::{Result, StoreError},
     event::{Actor, Event, Subject},
-    operations::tokens::{NewToken, add, revoke_all},
+    operations::tokens::{NewToken, add_token, revoke_all},
     store::Store,
     tables::{
         divisions,
-        invitations::{self, Invitation, InvitationState, InvitedAs},
-        people::{self, Person},
+        invitations::{self, Invitation, InvitationState, InvitationRole},
+        users::{self, User},
         registrations::{self, Registration, RegistrationState},
         season,
         teams::{self, Team, TeamProfile},
@@ -18,107 +18,102 @@ use crate::{
     },
     write::Tx,
 };
-use faceoff_types::{InvitationId, PersonId, PersonName, TeamId, TeamName};
+use faceoff_types::{InvitationId, UserId, UserName, TeamId, TeamName};
 use jiff::Timestamp;
 
-/// Links to one team that may be open at a time.
+/// Invitations to one team that may be open at a time.
 pub const MAX_OPEN_INVITATIONS: i64 = 20;
 
-/// An invitation to be made; the code in the link is the caller's.
+/// An invitation to be created. The caller makes the code in the link; only its hash is stored.
 #[derive(Debug, Clone)]
 pub struct NewInvitation {
-    /// Of the code's text.
+    /// Hash of the code's text.
     pub code_hash: [u8; 32],
-    /// What it makes of whoever follows the link.
-    pub invited_as: InvitedAs,
+    /// Role of the user who accepts it.
+    pub role: InvitationRole,
     pub note: String,
-    /// From then on it is worth nothing.
     pub expires_at: Timestamp,
 }
 
-/// What whoever follows a link brings.
+/// Data of a user who accepts an invitation.
 #[derive(Debug, Clone)]
-pub struct Joining {
-    /// Of the code in the link.
+pub struct JoinRequest {
+    /// Hash of the code in the link.
     pub code_hash: [u8; 32],
-    /// What they want to be called; whoever comes back has a name.
-    pub name: Option<PersonName>,
-    /// PHC string of the hash of their password, if they want one.
+    /// Name of a new user; `None` for a returning one, who has a name.
+    pub name: Option<UserName>,
+    /// Password hash as a PHC string, if the user wants a password.
     pub password: Option<String>,
-    /// The team, if the link is its founder's.
+    /// The new team, if the invitation is for a founder.
     pub team: Option<(TeamName, TeamProfile)>,
-    /// The version of the terms that they accept.
+    /// Version of the terms that the user accepts.
     pub accepted_terms: Option<u32>,
-    /// The hash of the key or session that they get.
+    /// Hash of the token or session that the user gets.
     pub token_hash: [u8; 32],
-    /// Which of both.
     pub token_kind: TokenKind,
-    /// What it is called.
     pub token_name: String,
-    /// Until when it is good.
     pub token_expires_at: Option<Timestamp>,
 }
 
 #[derive(Debug, Clone, PartialEq)]
-pub struct Joined {
-    pub person: Person,
-    /// Their team, unless they are an organiser.
+pub struct JoinOutcome {
+    pub user: User,
+    /// The user's team; `None` for an organiser.
     pub team: Option<Team>,
-    /// With what they call from now on.
     pub token: Token,
 }
 
-/// What a code is good for.
+/// Status of the code in an invitation or registration link.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Code {
-    /// A link that can be followed, to a team's name if it is a member's.
+pub enum CodeStatus {
+    /// An invitation that can be accepted, with the team's name if it is for a member.
     Open(Invitation, Option<TeamName>),
-    /// The registration waits for the organisers.
-    Waiting(Registration),
+    /// The organisers have not decided on the registration yet.
+    Pending(Registration),
     /// The organisers have refused the registration.
     Refused(Registration),
 }
 
-fn spent<T>(why: impl Into<String>) -> Result<T> {
-    Err(StoreError::InvitationSpent(why.into()))
+fn invalid_invitation<T>(why: impl Into<String>) -> Result<T> {
+    Err(StoreError::InvitationInvalid(why.into()))
 }
 
 fn check_open(invitation: &Invitation, now: Timestamp) -> Result<()> {
     let shown = |at: Timestamp| at.strftime("%Y-%m-%d %H:%M UTC").to_string();
     match invitation.state {
-        InvitationState::Accepted { at, .. } => spent(format!(
-            "the invitation was accepted on {}, and is good for one person; ask for another one",
+        InvitationState::Accepted { at, .. } => invalid_invitation(format!(
+            "the invitation was accepted on {}, and can be used only once; ask for another one",
             shown(at)
         )),
-        InvitationState::Revoked { at } => spent(format!(
-            "the invitation was taken back on {}; ask for another one",
+        InvitationState::Revoked { at } => invalid_invitation(format!(
+            "the invitation was revoked on {}; ask for another one",
             shown(at)
         )),
-        InvitationState::Open if invitation.expires_at <= now => spent(format!(
-            "the invitation was good until {}; ask for another one",
+        InvitationState::Open if invitation.expires_at <= now => invalid_invitation(format!(
+            "the invitation expired on {}; ask for another one",
             shown(invitation.expires_at)
         )),
         InvitationState::Open => Ok(()),
     }
 }
 
-/// Adds an invitation, for a time that is to come.
+/// Adds an invitation whose expiry has been checked.
 pub(super) async fn invite(tx: &mut Tx, new: NewInvitation) -> Result<Invitation> {
     let now = tx.now;
     let invitation = Invitation {
         id: InvitationId::new(),
-        invited_as: new.invited_as,
+        role: new.role,
         note: new.note,
         created_at: now,
         expires_at: new.expires_at,
         state: InvitationState::Open,
     };
     invitations::insert(tx, &invitation, new.code_hash).await?;
-    let (role, subject) = match invitation.invited_as {
-        InvitedAs::Organiser => ("organiser", Subject::Season),
-        InvitedAs::Founder => ("founder", Subject::Season),
-        InvitedAs::Member(team) => ("member", Subject::Team(team)),
-        InvitedAs::Return(person) => ("return", Subject::Person(person)),
+    let (role, subject) = match invitation.role {
+        InvitationRole::Organiser => ("organiser", Subject::Season),
+        InvitationRole::Founder => ("founder", Subject::Season),
+        InvitationRole::Member(team) => ("member", Subject::Team(team)),
+        InvitationRole::PasswordReset(user) => ("return", Subject::User(user)),
     };
     let event = Event::Invited {
         invitation: invitation.id,
@@ -130,7 +125,7 @@ pub(super) async fn invite(tx: &mut Tx, new: NewInvitation) -> Result<Invitation
     invitations::find(tx, invitation.id).await
 }
 
-/// Refuses a wrong consent to the terms: there are some, and it is not to the newest.
+/// Refuses if the newest terms of the season were not accepted, or if it has none and some were.
 pub(super) async fn check_terms(tx: &mut Tx, accepted: Option<u32>) -> Result<()> {
     match terms::newest(tx).await? {
         Some(newest) if accepted != Some(newest) => Err(StoreError::Conflict(format!(
@@ -168,143 +163,144 @@ pub(super) async fn add_team(
     Ok(id)
 }
 
-async fn newcomer(tx: &mut Tx, joining: &mut Joining, team: Option<TeamId>) -> Result<PersonId> {
-    let Some(name) = joining.name.clone() else {
+async fn add_user(tx: &mut Tx, request: &mut JoinRequest, team: Option<TeamId>) -> Result<UserId> {
+    let Some(name) = request.name.clone() else {
         return Err(StoreError::Conflict(
-            "name: expected the name by which the person is known and signs in; got none".into(),
+            "name: expected the name that the user is shown with and signs in with; got none".into(),
         ));
     };
-    check_terms(tx, joining.accepted_terms).await?;
-    let person = Person {
-        id: PersonId::new(),
+    check_terms(tx, request.accepted_terms).await?;
+    let user = User {
+        id: UserId::new(),
         name,
         team,
         joined_at: tx.now,
         left_at: None,
-        has_password: joining.password.is_some(),
-        accepted_terms: joining.accepted_terms,
+        has_password: request.password.is_some(),
+        accepted_terms: request.accepted_terms,
     };
-    people::insert(tx, &person, joining.password.as_deref()).await?;
-    let (id, name) = (person.id, person.name);
-    tx.record(Subject::Person(id), Event::PersonJoined { name, team });
+    users::insert(tx, &user, request.password.as_deref()).await?;
+    let (id, name) = (user.id, user.name);
+    tx.record(Subject::User(id), Event::PersonJoined { name, team });
     Ok(id)
 }
 
-/// Lets a person back in: what they had before is worth nothing any more.
-async fn come_back(tx: &mut Tx, id: PersonId, joining: &Joining) -> Result<()> {
-    let person = people::find(tx, id).await?;
-    if joining
+/// Gives a user access again: all earlier tokens and sessions are revoked.
+async fn restore_access(tx: &mut Tx, id: UserId, request: &JoinRequest) -> Result<()> {
+    let user = users::find(tx, id).await?;
+    if request
         .name
         .as_ref()
-        .is_some_and(|name| *name != person.name)
+        .is_some_and(|name| *name != user.name)
     {
         return Err(StoreError::Conflict(format!(
-            "name: the link is {}'s; leave the name out",
-            person.name
+            "name: the link belongs to {}; leave the name out",
+            user.name
         )));
     }
-    if person.left_at.is_some() {
-        return spent(format!("{} has left", person.name));
+    if user.left_at.is_some() {
+        return invalid_invitation(format!("{} has left", user.name));
     }
-    revoke_all(tx, TokenOwner::Person(id), None).await?;
-    if let Some(password) = &joining.password {
-        people::set_password(tx, id, password).await?;
-        tx.record(Subject::Person(id), Event::PasswordSet);
+    revoke_all(tx, TokenOwner::User(id), None).await?;
+    if let Some(password) = &request.password {
+        users::set_password(tx, id, password).await?;
+        tx.record(Subject::User(id), Event::PasswordSet);
     }
     Ok(())
 }
 
-async fn join(tx: &mut Tx, mut joining: Joining) -> Result<Joined> {
+async fn join(tx: &mut Tx, mut request: JoinRequest) -> Result<JoinOutcome> {
     let now = tx.now;
-    let invitation = match code(tx, joining.code_hash, now).await? {
-        Code::Open(invitation, _) => invitation,
-        Code::Waiting(registration) => {
-            return spent(format!(
-                "the registration of “{}” waits for the organisers; the same link is good once they have approved it",
+    let invitation = match code_status(tx, request.code_hash, now).await? {
+        CodeStatus::Open(invitation, _) => invitation,
+        CodeStatus::Pending(registration) => {
+            return invalid_invitation(format!(
+                "the registration of “{}” is pending; the same link is valid once the organisers have approved it",
                 registration.team_name
             ));
         }
-        Code::Refused(registration) => {
+        CodeStatus::Refused(registration) => {
             let RegistrationState::Refused { reason, .. } = registration.state else {
-                return spent("the registration was refused");
+                return invalid_invitation("the registration was refused");
             };
-            return spent(format!("the registration was refused: {reason}"));
+            return invalid_invitation(format!("the registration was refused: {reason}"));
         }
     };
-    let founds = invitation.invited_as == InvitedAs::Founder;
-    if founds != joining.team.is_some() {
-        return Err(StoreError::Conflict(if founds {
+    let is_founder = invitation.role == InvitationRole::Founder;
+    if is_founder != request.team.is_some() {
+        return Err(StoreError::Conflict(if is_founder {
             "team: the link is for the founder of a team; expected the team's name".into()
         } else {
             "team: the link is not for the founder of a team; leave it out".into()
         }));
     }
-    let person = match invitation.invited_as {
-        InvitedAs::Organiser => newcomer(tx, &mut joining, None).await?,
-        InvitedAs::Member(team) => newcomer(tx, &mut joining, Some(team)).await?,
-        InvitedAs::Founder => {
+    let user = match invitation.role {
+        InvitationRole::Organiser => add_user(tx, &mut request, None).await?,
+        InvitationRole::Member(team) => add_user(tx, &mut request, Some(team)).await?,
+        InvitationRole::Founder => {
             season::check_open(tx).await?;
-            let team = match joining.team.take() {
+            let team = match request.team.take() {
                 Some((name, profile)) => Some(add_team(tx, name, profile).await?),
                 None => None,
             };
-            newcomer(tx, &mut joining, team).await?
+            add_user(tx, &mut request, team).await?
         }
-        InvitedAs::Return(person) => {
-            come_back(tx, person, &joining).await?;
-            person
+        InvitationRole::PasswordReset(user) => {
+            restore_access(tx, user, &request).await?;
+            user
         }
     };
-    invitations::set_accepted(tx, invitation.id, person, now).await?;
+    invitations::set_accepted(tx, invitation.id, user, now).await?;
     let token = NewToken {
-        hash: joining.token_hash,
-        kind: joining.token_kind,
-        owner: TokenOwner::Person(person),
-        name: joining.token_name,
-        expires_at: joining.token_expires_at,
+        hash: request.token_hash,
+        kind: request.token_kind,
+        owner: TokenOwner::User(user),
+        name: request.token_name,
+        expires_at: request.token_expires_at,
     };
-    let token = add(tx, token).await?;
-    let person = people::find(tx, person).await?;
-    let team = match person.team {
+    let token = add_token(tx, token).await?;
+    let user = users::find(tx, user).await?;
+    let team = match user.team {
         Some(team) => Some(teams::find(tx, team).await?),
         None => None,
     };
-    Ok(Joined {
-        person,
+    Ok(JoinOutcome {
+        user,
         team,
         token,
     })
 }
 
-async fn code(
+async fn code_status(
     connection: &mut sqlx::SqliteConnection,
     hash: [u8; 32],
     now: Timestamp,
-) -> Result<Code> {
+) -> Result<CodeStatus> {
     if let Some(invitation) = invitations::by_code(connection, hash).await? {
         check_open(&invitation, now)?;
-        let team = match invitation.invited_as {
-            InvitedAs::Member(team) => Some(teams::find(connection, team).await?.name),
+        let team = match invitation.role {
+            InvitationRole::Member(team) => Some(teams::find(connection, team).await?.name),
             _ => None,
         };
-        return Ok(Code::Open(invitation, team));
+        return Ok(CodeStatus::Open(invitation, team));
     }
     match registrations::by_code(connection, hash).await? {
         Some(registration) => Ok(match registration.state {
-            RegistrationState::Refused { .. } => Code::Refused(registration),
-            RegistrationState::Waiting | RegistrationState::Approved { .. } => {
-                Code::Waiting(registration)
+            RegistrationState::Refused { .. } => CodeStatus::Refused(registration),
+            RegistrationState::Pending | RegistrationState::Approved { .. } => {
+                CodeStatus::Pending(registration)
             }
         }),
-        None => spent(
-            "there is no such invitation; look whether the whole link was copied, or ask for another one",
+        None => invalid_invitation(
+            "there is no such invitation; check that the whole link was copied, or ask for another one",
         ),
     }
 }
 
 impl Store {
-    /// Makes an invitation. [`StoreError::Conflict`] if it would be worth nothing, if the team has as many open as it
-    /// may have, or the person has left; [`StoreError::NotFound`] if there is no such team or person.
+    /// Creates an invitation. [`StoreError::Conflict`] if it would be expired, if the team has
+    /// [`MAX_OPEN_INVITATIONS`] open ones, or the user has left; [`StoreError::NotFound`] if there is no such team or
+    /// user.
     #[boxed]
     pub async fn invite(
         &self,
@@ -319,33 +315,33 @@ impl Store {
                     new.expires_at
                 )));
             }
-            match new.invited_as {
-                InvitedAs::Member(team) => {
+            match new.role {
+                InvitationRole::Member(team) => {
                     teams::find(tx, team).await?;
                     if invitations::count_open(tx, team, now).await? >= MAX_OPEN_INVITATIONS {
                         return Err(StoreError::Conflict(format!(
-                            "{MAX_OPEN_INVITATIONS} invitations to the team are open, and no more than that at a \
-                             time: revoke one that is not needed (DELETE /api/v1/invitations/ID)"
+                            "the team has {MAX_OPEN_INVITATIONS} open invitations, which is the limit: revoke one that \
+                             is not needed (DELETE /api/v1/invitations/ID)"
                         )));
                     }
                 }
-                InvitedAs::Return(person) => {
-                    let person = people::find(tx, person).await?;
-                    if person.left_at.is_some() {
+                InvitationRole::PasswordReset(user) => {
+                    let user = users::find(tx, user).await?;
+                    if user.left_at.is_some() {
                         return Err(StoreError::Conflict(format!(
-                            "{} has left; invite them anew, under another name",
-                            person.name
+                            "{} has left; create a new invitation, for another name",
+                            user.name
                         )));
                     }
                 }
-                InvitedAs::Organiser | InvitedAs::Founder => {}
+                InvitationRole::Organiser | InvitationRole::Founder => {}
             }
             invite(tx, new).await
         })
         .await
     }
 
-    /// Takes an invitation back. [`StoreError::Conflict`] if somebody has followed it.
+    /// Revokes an invitation. [`StoreError::Conflict`] if it was accepted.
     #[boxed]
     pub async fn revoke_invitation(
         &self,
@@ -358,17 +354,17 @@ impl Store {
             match invitation.state {
                 InvitationState::Accepted { .. } => {
                     return Err(StoreError::Conflict(
-                        "somebody has followed the link; remove them with DELETE /api/v1/people/ID"
+                        "the invitation was accepted; remove the user with DELETE /api/v1/people/ID"
                             .into(),
                     ));
                 }
                 InvitationState::Revoked { .. } => {}
                 InvitationState::Open => {
                     invitations::set_revoked(tx, id, now).await?;
-                    let subject = match invitation.invited_as {
-                        InvitedAs::Member(team) => Subject::Team(team),
-                        InvitedAs::Return(person) => Subject::Person(person),
-                        InvitedAs::Organiser | InvitedAs::Founder => Subject::Season,
+                    let subject = match invitation.role {
+                        InvitationRole::Member(team) => Subject::Team(team),
+                        InvitationRole::PasswordReset(user) => Subject::User(user),
+                        InvitationRole::Organiser | InvitationRole::Founder => Subject::Season,
                     };
                     tx.record(subject, Event::InvitationRevoked { invitation: id });
                 }
@@ -378,22 +374,22 @@ impl Store {
         .await
     }
 
-    /// What a code is good for. [`StoreError::InvitationSpent`] says why it is good for nothing.
+    /// Status of a code. [`StoreError::InvitationInvalid`] with the reason if it is not valid.
     #[boxed]
-    pub async fn code(&self, hash: [u8; 32], now: Timestamp) -> Result<Code> {
-        code(&mut *self.database.read.acquire().await?, hash, now).await
+    pub async fn code_status(&self, hash: [u8; 32], now: Timestamp) -> Result<CodeStatus> {
+        code_status(&mut *self.database.read.acquire().await?, hash, now).await
     }
 
-    /// Follows a link: a person joins, or comes back, and has a key or a session from now on.
-    /// [`StoreError::InvitationSpent`] if it is worth nothing (any more), [`StoreError::PersonNameTaken`],
-    /// [`StoreError::TeamNameTaken`], [`StoreError::Conflict`] if something is missing that the text names.
+    /// Accepts an invitation: a user joins, or gets access again, and receives a token or a session.
+    /// [`StoreError::InvitationInvalid`] if it is not valid (any more), [`StoreError::UserNameTaken`],
+    /// [`StoreError::TeamNameTaken`], [`StoreError::Conflict`] naming the missing field.
     #[boxed]
-    pub async fn join(&self, joining: Joining, now: Timestamp) -> Result<Joined> {
-        self.write(Actor::Visitor, now, async |tx| join(tx, joining).await)
+    pub async fn join(&self, request: JoinRequest, now: Timestamp) -> Result<JoinOutcome> {
+        self.write(Actor::Visitor, now, async |tx| join(tx, request).await)
             .await
     }
 
-    /// All invitations that were ever made, the newest first.
+    /// All invitations ever created, the newest first.
     #[boxed]
     pub async fn invitations(&self) -> Result<Vec<Invitation>> {
         invitations::all(&mut *self.database.read.acquire().await?).await

@@ -4,37 +4,37 @@ use crate::{
     database::Database,
     error::{Result, StoreError},
     live::LiveGames,
-    pulse::Pulse,
-    room::Room,
+    health_probes::HealthProbes,
+    free_space::FreeSpace,
     signals::Signals,
     store::Store,
-    tables::{archived, season},
+    tables::{archive, season},
     workers::Workers,
 };
 use std::{fs::File, path::Path, sync::Arc};
 
 impl Store {
     /// Opens `data_dir/faceoff.sqlite3` and `data_dir/artifacts`, creating and migrating them as
-    /// needed, and draws the season's secret on the first time.
+    /// needed. On the first start it draws the season's secret.
     #[boxed]
     pub async fn open(data_dir: &Path) -> Result<Self> {
-        // Two processes that start together must not both migrate.
+        // Two processes that start at the same time must not both migrate.
         let _opening = lock_folder(data_dir.to_owned()).await?;
         let artifacts = Artifacts::open(&data_dir.join("artifacts"))?;
         let database = Database::open(&data_dir.join(Self::DATABASE_FILE)).await?;
         let mut tx = database.begin().await?;
-        season::draw_secret_once(&mut tx).await?;
-        let archived = archived::read(&mut tx).await?;
+        season::create_once(&mut tx).await?;
+        let archived = archive::read(&mut tx).await?;
         tx.commit().await?;
         Ok(Self {
             database,
             signals: Arc::new(Signals::new()),
             artifacts,
-            room: Arc::new(Room::new(vec![data_dir.to_owned()], 0)),
-            pulse: Arc::new(Pulse::new()),
+            free_space: Arc::new(FreeSpace::new(vec![data_dir.to_owned()], 0)),
+            probes: Arc::new(HealthProbes::new()),
             live: LiveGames::default(),
             workers: Workers::default(),
-            archived: archived.map(Arc::new),
+            archive: archived.map(Arc::new),
         })
     }
 }

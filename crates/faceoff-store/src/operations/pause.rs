@@ -9,8 +9,8 @@ use crate::{
 use jiff::Timestamp;
 
 impl Store {
-    /// Holds the queue: no unit of work is begun, what is begun is played to its end, days start and wait.
-    /// [`StoreError::Conflict`] if it is held.
+    /// Pauses the queue: no job is started, running jobs continue to their end, new days are queued.
+    /// [`StoreError::Conflict`] if it is paused already.
     #[boxed]
     pub async fn pause_queue(&self, actor: Actor, reason: &str, now: Timestamp) -> Result<()> {
         self.write(actor, now, async |tx| {
@@ -29,7 +29,7 @@ impl Store {
         .await
     }
 
-    /// Lets the queue go on. [`StoreError::Conflict`] if it is not held.
+    /// Resumes the queue. [`StoreError::Conflict`] if it is not paused.
     #[boxed]
     pub async fn resume_queue(&self, actor: Actor, now: Timestamp) -> Result<()> {
         self.write(actor, now, async |tx| {
@@ -38,7 +38,7 @@ impl Store {
             }
             season::set_paused(tx, None).await?;
             tx.record(Subject::Season, Event::QueueResumed);
-            queue::goes_on(tx);
+            queue::resume(tx);
             Ok(())
         })
         .await

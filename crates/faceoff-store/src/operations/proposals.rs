@@ -1,26 +1,26 @@
-//! What is tried without counting, and re-evaluations, which count once the organiser has seen what they change.
+//! Trials, which never count, and proposed re-evaluations, which count once an organiser applies them.
 
 use crate::{
     boxed,
     error::{Result, StoreError},
     event::{Actor, Event, Subject},
-    operations::{drafts as draft_ends, purpose, rulings::void, runs},
-    queue::NewUnit,
-    reads,
+    operations::{proposal_completion, purpose, rulings::void, runs},
+    queue::NewJob,
+    queries,
     store::Store,
     tables::{
         days,
-        drafts::{self, Draft},
+        proposed_evaluations::{self, ProposedEvaluation},
         entries::{self, Entry},
         evaluations::{self, EvaluationState, Failure},
-        finalisations, finalised, freezes,
+        scorings, sign_offs, freezes,
         plan::RunPlan,
-        proposals::{self, Proposal, ProposalKind, Settled},
+        proposals::{self, Proposal, ProposalKind, ProposalOutcome},
         retentions, runs as run_rows,
         runs::Run,
         season, stage_runtimes,
         stages::{self, Stage, StagePhase},
-        standings, submissions,
+        counting_evaluations, submissions,
     },
     write::Tx,
 };
@@ -30,19 +30,19 @@ use faceoff_types::{
 use jiff::Timestamp;
 use std::collections::HashSet;
 
-/// What is to be played again, and by which rules.
+/// Scope of a proposed re-evaluation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Reevaluation {
-    /// One evaluation that counts.
+    /// One counting evaluation.
     Evaluation(EvaluationId),
-    /// All of a day that count.
+    /// All counting evaluations of a day.
     Day(StageDay),
-    /// All of a day that count, by the newest rules of its stage.
+    /// All counting evaluations of a day, with the newest rules of its stage.
     Rules(StageDay),
 }
 
-/// What one draft plays.
-struct Played {
+/// One evaluation of a proposal, before it is queued.
+struct ProposedRun {
     submission: SubmissionId,
     team: TeamId,
     replaces: Option<EvaluationId>,
@@ -55,16 +55,16 @@ fn conflict<T>(why: impl Into<String>) -> Result<T> {
     Err(StoreError::Conflict(why.into()))
 }
 
-/// Adds a proposal and queues its drafts, behind everything that counts.
-async fn enter(tx: &mut Tx, proposal: &Proposal, played: Vec<Played>) -> Result<()> {
+/// Adds a proposal and queues its evaluations, behind everything that counts.
+async fn add_proposal(tx: &mut Tx, proposal: &Proposal, proposed: Vec<ProposedRun>) -> Result<()> {
     proposals::insert(tx, proposal).await?;
     let now = tx.now;
-    let unit = NewUnit {
+    let job = NewJob {
         batch: now.as_millisecond(),
         ..purpose::PROPOSAL_SHARD
     };
-    let count = u32::try_from(played.len()).unwrap_or(u32::MAX);
-    for one in played {
+    let count = u32::try_from(proposed.len()).unwrap_or(u32::MAX);
+    for one in proposed {
         let run = Run {
             id: RunId::new(),
             ruleset: one.ruleset,
@@ -72,8 +72,8 @@ async fn enter(tx: &mut Tx, proposal: &Proposal, played: Vec<Played>) -> Result<
             seed: one.seed,
             keeps_recordings: true,
         };
-        runs::create(tx, &run, &[one.submission], unit, one.team).await?;
-        let draft = Draft {
+        runs::queue_run(tx, &run, &[one.submission], job, one.team).await?;
+        let evaluation = ProposedEvaluation {
             id: EvaluationId::new(),
             proposal: proposal.id,
             submission: one.submission,
@@ -83,7 +83,7 @@ async fn enter(tx: &mut Tx, proposal: &Proposal, played: Vec<Played>) -> Result<
             created_at: now,
             state: EvaluationState::Queued,
         };
-        drafts::insert(tx, &draft).await?;
+        proposed_evaluations::insert(tx, &evaluation).await?;
     }
     let event = Event::ProposalMade {
         stage: proposal.stage,
@@ -94,12 +94,12 @@ async fn enter(tx: &mut Tx, proposal: &Proposal, played: Vec<Played>) -> Result<
     Ok(())
 }
 
-/// The evaluations that are to be played again, by their own rules or by `newest`.
-async fn again(
+/// Runs that repeat these evaluations, with their own rules or those of `newest`, each with its revision.
+async fn runs_to_repeat(
     tx: &mut Tx,
     ids: &[EvaluationId],
     newest: Option<&Stage>,
-) -> Result<Vec<(u32, Played)>> {
+) -> Result<Vec<(u32, ProposedRun)>> {
     let mut all = Vec::with_capacity(ids.len());
     for id in ids {
         all.push(entries::find(tx, *id).await?);
@@ -111,12 +111,12 @@ async fn again(
         .filter(|entry| is_by_newest(entry))
         .map(|entry| entry.team)
         .collect();
-    let mut played = Vec::new();
+    let mut proposed = Vec::new();
     for entry in all.into_iter().filter(|entry| !done.contains(&entry.team)) {
         let submission = submissions::find(tx, entry.submission).await?;
-        // One team's deleted archive keeps no other from its turn. Asked for alone, it is refused with the reason.
-        let is_gone = ids.len() > 1 && submission.archive_removed.is_some();
-        if is_gone || newest.is_some_and(|stage| stage.check_takes(&submission).is_err()) {
+        // In a proposal for several teams, one with a deleted bundle is left out. Alone it is refused with the reason.
+        let is_deleted = ids.len() > 1 && submission.bundle_removed.is_some();
+        if is_deleted || newest.is_some_and(|stage| stage.check_accepts(&submission).is_err()) {
             continue;
         }
         let run = run_rows::find(tx, entry.run).await?;
@@ -124,7 +124,7 @@ async fn again(
             None => (entry.revision, run.ruleset, run.plan),
             Some(stage) => (stage.rules.number, stage.rules.rules.ruleset, stage.plan()),
         };
-        let one = Played {
+        let one = ProposedRun {
             submission: entry.submission,
             team: entry.team,
             replaces: Some(entry.id),
@@ -132,15 +132,15 @@ async fn again(
             ruleset,
             plan,
         };
-        played.push((revision, one));
+        proposed.push((revision, one));
     }
-    Ok(played)
+    Ok(proposed)
 }
 
 impl Store {
-    /// Plays what is active in a stage, or one submission that is valid, by the stage's rules on episodes that nothing
-    /// else plays: without a turn, without a board, behind everything that counts. [`StoreError::Conflict`] if there
-    /// is nothing to play or the stage has closed; [`StoreError::SeasonClosed`].
+    /// Queues a trial of a stage's active submissions, or of one valid submission, by the stage's rules on episodes of
+    /// its own. It appears on no board and runs behind everything that counts. [`StoreError::Conflict`] if there is no
+    /// submission to try or the stage has closed; [`StoreError::SeasonClosed`].
     #[boxed]
     pub async fn propose_trial(
         &self,
@@ -154,19 +154,19 @@ impl Store {
             season::check_open(tx).await?;
             let stage = stages::find(tx, stage).await?;
             if stage.phase(now) == StagePhase::Closed {
-                return conflict("the stage has closed, and nothing of it begins again");
+                return conflict("the stage has closed: no trial can start");
             }
             let active = match submission {
                 None => {
                     let mut active = submissions::active(tx).await?;
-                    active.retain(|one| stage.check_takes(one).is_ok());
+                    active.retain(|one| stage.check_accepts(one).is_ok());
                     active
                 }
                 Some(id) => vec![submissions::find(tx, id).await?],
             };
             if active.is_empty() {
                 return conflict(
-                    "no team has a valid submission that the stage takes, so there is nothing to try",
+                    "no team has a valid submission that the stage accepts, so there is nothing to try",
                 );
             }
             if active
@@ -176,8 +176,7 @@ impl Store {
                 return conflict("only a valid submission can be tried");
             }
             for one in &active {
-                let taken = stage.check_takes(one);
-                taken.map_err(|why| stage_runtimes::conflict(&why))?;
+                stage.check_accepts(one).map_err(|why| stage_runtimes::conflict(&why))?;
             }
             let id = ProposalId::new();
             let proposal = Proposal {
@@ -187,9 +186,9 @@ impl Store {
                 kind: ProposalKind::Trial,
                 reason: reason.to_owned(),
                 created_at: now,
-                settled: None,
+                outcome: None,
             };
-            let played = active.into_iter().map(|submission| Played {
+            let proposed = active.into_iter().map(|submission| ProposedRun {
                 submission: submission.id,
                 team: submission.team,
                 replaces: None,
@@ -197,63 +196,63 @@ impl Store {
                 ruleset: stage.rules.rules.ruleset,
                 plan: stage.plan(),
             });
-            enter(tx, &proposal, played.collect()).await?;
+            add_proposal(tx, &proposal, proposed.collect()).await?;
             proposals::find(tx, id).await
         })
         .await
     }
 
-    /// Plays results that count once more, beside them, behind everything that counts: the same submissions on the
-    /// same episodes. [`StoreError::Conflict`] if nothing of it counts, or its day is under way; of other rules, if
-    /// there are none.
+    /// Queues a re-evaluation of counting results, behind everything that counts: the same submissions on the same
+    /// episodes. The results stay until the proposal is applied. [`StoreError::Conflict`] if there is no counting
+    /// result or the day is not released; for new rules, if all results have them already.
     #[boxed]
     pub async fn propose_reevaluation(
         &self,
         actor: Actor,
-        what: Reevaluation,
+        scope: Reevaluation,
         reason: &str,
         now: Timestamp,
     ) -> Result<Proposal> {
         self.write(actor, now, async |tx| {
             season::check_open(tx).await?;
-            let of = match what {
-                Reevaluation::Evaluation(id) => entries::find(tx, id).await?.of,
-                Reevaluation::Day(of) | Reevaluation::Rules(of) => of,
+            let stage_day = match scope {
+                Reevaluation::Evaluation(id) => entries::find(tx, id).await?.stage_day,
+                Reevaluation::Day(stage_day) | Reevaluation::Rules(stage_day) => stage_day,
             };
-            finalised::check_not(tx, of.stage).await?;
-            let stage = stages::find(tx, of.stage).await?;
-            if days::find(tx, of).await?.released_at.is_none() {
+            sign_offs::check_not_signed_off(tx, stage_day.stage).await?;
+            let stage = stages::find(tx, stage_day.stage).await?;
+            if days::find(tx, stage_day).await?.released_at.is_none() {
                 return conflict(format!(
-                    "{} is under way: it is played again once it is released",
-                    of.date
+                    "{} is not released yet: a re-evaluation is possible once it is",
+                    stage_day.date
                 ));
             }
-            let counting = standings::of_day(tx, of).await?;
+            let counting = counting_evaluations::of_day(tx, stage_day).await?;
             let counting: Vec<EvaluationId> = counting
                 .into_iter()
                 .filter(|one| one.counts)
                 .map(|one| one.id)
-                .filter(|id| match what {
+                .filter(|id| match scope {
                     Reevaluation::Evaluation(only) => *id == only,
                     Reevaluation::Day(_) | Reevaluation::Rules(_) => true,
                 })
                 .collect();
-            let newest = match what {
+            let newest = match scope {
                 Reevaluation::Rules(_) => Some(&stage),
                 _ => None,
             };
-            let played = again(tx, &counting, newest).await?;
-            let Some(revision) = played.iter().map(|(revision, _)| *revision).max() else {
+            let proposed = runs_to_repeat(tx, &counting, newest).await?;
+            let Some(revision) = proposed.iter().map(|(revision, _)| *revision).max() else {
                 return conflict(if newest.is_some() && !counting.is_empty() {
-                    "all that counts of that day was played by the stage's newest rules, or by agents that these do not take or that were deleted"
+                    "there is nothing to re-evaluate: the counting results of that day have the stage's newest rules, or their submissions were deleted or are not accepted by these rules"
                 } else {
-                    "nothing of that counts or has its archive, so there is nothing to play again; `rerun` plays what was voided or cancelled"
+                    "there is nothing to re-evaluate: no result counts, or the bundles were removed; `rerun` repeats what was voided or cancelled"
                 });
             };
-            let kind = match what {
-                Reevaluation::Evaluation(_) => ProposalKind::Evaluation(of.date),
-                Reevaluation::Day(_) => ProposalKind::Day(of.date),
-                Reevaluation::Rules(_) => ProposalKind::Rules(of.date),
+            let kind = match scope {
+                Reevaluation::Evaluation(_) => ProposalKind::Evaluation(stage_day.date),
+                Reevaluation::Day(_) => ProposalKind::Day(stage_day.date),
+                Reevaluation::Rules(_) => ProposalKind::Rules(stage_day.date),
             };
             let proposal = Proposal {
                 id: ProposalId::new(),
@@ -262,20 +261,20 @@ impl Store {
                 kind,
                 reason: reason.to_owned(),
                 created_at: now,
-                settled: None,
+                outcome: None,
             };
-            // A proposal is by one of the stage's rules: its board can only be that of these.
-            let of_revision = played.into_iter().filter(|(of, _)| *of == revision);
-            enter(tx, &proposal, of_revision.map(|(_, one)| one).collect()).await?;
+            // All evaluations of a proposal have the same revision of the rules, that of one board.
+            let of_revision = proposed.into_iter().filter(|(number, _)| *number == revision);
+            add_proposal(tx, &proposal, of_revision.map(|(_, one)| one).collect()).await?;
             proposals::find(tx, proposal.id).await
         })
         .await
     }
 
-    /// Has what a proposal has played count from now on; the results that it plays again are voided, unless it is by
-    /// other rules, whose board is another. What we broke of it changes nothing. [`StoreError::Conflict`] if it is a
-    /// trial, is settled or under way, if the boards of its stage are frozen, or if what it would replace counts no
-    /// more.
+    /// Applies a proposal: its results count from now on, and those that they replace are voided. With new rules the
+    /// old results stay, on the board of their revision. Evaluations with a platform fault change nothing.
+    /// [`StoreError::Conflict`] if it is a trial, was decided, or has open evaluations; if the boards of its stage are
+    /// frozen; or if a result that it would replace does not count any more.
     #[boxed]
     pub async fn apply_proposal(
         &self,
@@ -285,12 +284,12 @@ impl Store {
     ) -> Result<Proposal> {
         self.write(actor, now, async |tx| {
             season::check_open(tx).await?;
-            let proposal = check_unsettled(tx, id).await?;
-            finalised::check_not(tx, proposal.stage).await?;
+            let proposal = find_undecided(tx, id).await?;
+            sign_offs::check_not_signed_off(tx, proposal.stage).await?;
             let Some(date) = proposal.kind.day() else {
-                return conflict("a trial has nothing to apply: it was on episodes of its own; it can be dropped");
+                return conflict("a trial cannot be applied, since it had episodes of its own; it can be dropped");
             };
-            let open = drafts::count_open(tx, Some(id)).await?;
+            let open = proposed_evaluations::count_open(tx, Some(id)).await?;
             if open > 0 {
                 return conflict(format!(
                     "{open} of its evaluations are queued or running: wait for their end"
@@ -302,22 +301,22 @@ impl Store {
                     frozen.at
                 ));
             }
-            let of = StageDay {
+            let stage_day = StageDay {
                 stage: proposal.stage,
                 date,
             };
-            for draft in reads::proposals::drafts_of(tx, id).await? {
-                apply(tx, &proposal, of, draft).await?;
+            for evaluation in queries::proposals::evaluations_of_proposal(tx, id).await? {
+                apply_evaluation(tx, &proposal, stage_day, evaluation).await?;
             }
-            proposals::settle(tx, id, Settled::Applied(now)).await?;
+            proposals::set_outcome(tx, id, ProposalOutcome::Applied(now)).await?;
             tx.record(Subject::Proposal(id), Event::ProposalApplied);
             proposals::find(tx, id).await
         })
         .await
     }
 
-    /// Has what a proposal has played never count; what is under way of it is stopped. [`StoreError::Conflict`] if it
-    /// is settled.
+    /// Drops a proposal: its results never count, and its open evaluations are cancelled. [`StoreError::Conflict`] if
+    /// it was decided.
     #[boxed]
     pub async fn drop_proposal(
         &self,
@@ -326,14 +325,14 @@ impl Store {
         now: Timestamp,
     ) -> Result<Proposal> {
         self.write(actor, now, async |tx| {
-            check_unsettled(tx, id).await?;
-            for draft in reads::proposals::drafts_of(tx, id).await? {
-                if !draft.state.is_over() {
+            find_undecided(tx, id).await?;
+            for evaluation in queries::proposals::evaluations_of_proposal(tx, id).await? {
+                if !evaluation.state.is_over() {
                     let failure = Failure::Cancelled("the proposal was dropped");
-                    draft_ends::fail(tx, draft.id, draft.run, id, failure).await?;
+                    proposal_completion::fail(tx, evaluation.id, evaluation.run, id, failure).await?;
                 }
             }
-            proposals::settle(tx, id, Settled::Dropped(now)).await?;
+            proposals::set_outcome(tx, id, ProposalOutcome::Dropped(now)).await?;
             tx.record(Subject::Proposal(id), Event::ProposalDropped);
             proposals::find(tx, id).await
         })
@@ -341,58 +340,58 @@ impl Store {
     }
 }
 
-async fn check_unsettled(tx: &mut Tx, id: ProposalId) -> Result<Proposal> {
+async fn find_undecided(tx: &mut Tx, id: ProposalId) -> Result<Proposal> {
     let proposal = proposals::find(tx, id).await?;
-    match proposal.settled {
+    match proposal.outcome {
         None => Ok(proposal),
-        Some(Settled::Applied(at)) => conflict(format!("the proposal was applied at {at}")),
-        Some(Settled::Dropped(at)) => conflict(format!("the proposal was dropped at {at}")),
+        Some(ProposalOutcome::Applied(at)) => conflict(format!("the proposal was applied at {at}")),
+        Some(ProposalOutcome::Dropped(at)) => conflict(format!("the proposal was dropped at {at}")),
     }
 }
 
-/// Has one draft take the place of what it plays again.
-async fn apply(tx: &mut Tx, proposal: &Proposal, of: StageDay, draft: Draft) -> Result<()> {
+/// Replaces a result by the re-evaluation in a proposal.
+async fn apply_evaluation(tx: &mut Tx, proposal: &Proposal, stage_day: StageDay, evaluation: ProposedEvaluation) -> Result<()> {
     let now = tx.now;
     if !matches!(
-        draft.state,
+        evaluation.state,
         EvaluationState::Finished { .. } | EvaluationState::AgentFailed { .. }
     ) {
         return Ok(());
     }
     if let (Some(replaced), false) = (
-        draft.replaces,
+        evaluation.replaces,
         matches!(proposal.kind, ProposalKind::Rules(_)),
     ) {
-        let standings = standings::of_day_and_team(tx, of, draft.team).await?;
-        if !standings.iter().any(|one| one.id == replaced && one.counts) {
+        let counting = counting_evaluations::of_day_and_team(tx, stage_day, evaluation.team).await?;
+        if !counting.iter().any(|one| one.id == replaced && one.counts) {
             return conflict(format!(
-                "the evaluation {replaced}, which would be replaced, counts no more: drop the proposal, and make another"
+                "the evaluation {replaced}, which would be replaced, does not count any more: drop the proposal and create another"
             ));
         }
         let why = format!("evaluated again: {}", proposal.reason);
         void(tx, replaced, &why).await?;
     }
     let entry = Entry {
-        id: draft.id,
-        submission: draft.submission,
-        team: draft.team,
-        of,
+        id: evaluation.id,
+        submission: evaluation.submission,
+        team: evaluation.team,
+        stage_day,
         revision: proposal.revision,
-        run: draft.run,
-        rerun_of: draft.replaces,
+        run: evaluation.run,
+        rerun_of: evaluation.replaces,
     };
-    entries::insert(tx, &entry, draft.created_at).await?;
-    if let Some(replaced) = draft.replaces {
-        entries::follow_extra(tx, draft.id, replaced).await?;
+    entries::insert(tx, &entry, evaluation.created_at).await?;
+    if let Some(replaced) = evaluation.replaces {
+        entries::copy_extra(tx, evaluation.id, replaced).await?;
     }
-    if let Some(unit) = drafts::finalisation_of(tx, draft.id).await? {
-        finalisations::insert(tx, draft.id, unit).await?;
+    if let Some(job) = proposed_evaluations::job_of(tx, evaluation.id).await? {
+        scorings::insert(tx, evaluation.id, job).await?;
     }
     let event = Event::EvaluationApplied {
         proposal: proposal.id,
     };
-    tx.record(Subject::Evaluation(draft.id), event);
-    match draft.state {
+    tx.record(Subject::Evaluation(evaluation.id), event);
+    match evaluation.state {
         EvaluationState::Finished {
             result,
             dataset,
@@ -400,18 +399,18 @@ async fn apply(tx: &mut Tx, proposal: &Proposal, of: StageDay, draft: Draft) -> 
             ..
         } => {
             let dataset_blake3 = dataset_blake3.unwrap_or_default();
-            evaluations::set_finished(tx, draft.id, &result, &dataset, &dataset_blake3, now)
+            evaluations::set_finished(tx, evaluation.id, &result, &dataset, &dataset_blake3, now)
                 .await?;
-            retentions::follow_draft(tx, draft.id).await?;
+            retentions::copy_dataset_bytes(tx, evaluation.id).await?;
             let event = Event::EvaluationFinished {
                 score: result.score,
                 dataset_blake3,
             };
-            tx.record(Subject::Evaluation(draft.id), event);
+            tx.record(Subject::Evaluation(evaluation.id), event);
         }
         _ => {
-            evaluations::set_failed(tx, draft.id, Failure::Agent, now).await?;
-            tx.record(Subject::Evaluation(draft.id), Event::EvaluationAgentFailed);
+            evaluations::set_failed(tx, evaluation.id, Failure::Agent, now).await?;
+            tx.record(Subject::Evaluation(evaluation.id), Event::EvaluationAgentFailed);
         }
     }
     Ok(())

@@ -2,18 +2,18 @@ use crate::{
     boxed,
     error::{Result, StoreError},
     event::{Actor, Event, Subject},
-    reads,
+    queries,
     store::Store,
     tables::{
         evaluations::{Evaluation, EvaluationState},
-        stages, standings,
+        stages, counting_evaluations,
     },
 };
 use faceoff_types::EvaluationId;
 use jiff::Timestamp;
 
 impl Store {
-    /// Makes an evaluation and its dataset public before its stage does; once that is done it stays.
+    /// Publishes an evaluation and its dataset earlier than its stage's settings do. This cannot be undone.
     /// [`StoreError::Conflict`] unless it is finished, its day is released and its stage is not blind.
     #[boxed]
     pub async fn publish_evaluation(
@@ -23,28 +23,28 @@ impl Store {
         now: Timestamp,
     ) -> Result<Evaluation> {
         self.write(actor, now, async |tx| {
-            let found = reads::evaluations::find(tx, id).await?;
-            let stage = stages::find(tx, found.of.stage).await?;
+            let found = queries::evaluations::find(tx, id).await?;
+            let stage = stages::find(tx, found.stage_day.stage).await?;
             let refused = |why: &str| Err(StoreError::Conflict(why.to_owned()));
             if !matches!(found.state, EvaluationState::Finished { .. }) {
                 return refused("only a finished evaluation has a dataset to publish");
             }
             if stage.settings.blind {
                 return refused(
-                    "the stage is blind: nothing of it is published before the organiser opens it",
+                    "the stage is blind: no dataset is published before the organiser opens it",
                 );
             }
             if found.released_at.is_none() {
                 return refused(
-                    "others of the day are still playing the same episodes: the dataset can be published once the day \
-                     is released",
+                    "other evaluations of the day are still running the same episodes: the dataset can be published \
+                     once the day is released",
                 );
             }
             if found.published_at.is_none() {
-                standings::set_published(tx, id, now).await?;
+                counting_evaluations::set_published(tx, id, now).await?;
                 tx.record(Subject::Evaluation(id), Event::EvaluationPublished);
             }
-            reads::evaluations::find(tx, id).await
+            queries::evaluations::find(tx, id).await
         })
         .await
     }

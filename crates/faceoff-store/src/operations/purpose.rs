@@ -1,39 +1,39 @@
 use crate::{
     error::{Result, StoreError},
-    queue::{Lane, NewUnit},
+    queue::{Lane, NewJob},
     tables::{
-        drafts, finalisations, games,
+        proposed_evaluations, scorings, games,
         shards::{self, Shard},
-        smoke_runs,
+        validation_runs,
     },
 };
 use faceoff_types::{EvaluationId, GameId, ProposalId, RunId, SubmissionId};
 use sqlx::SqliteConnection;
 use uuid::Uuid;
 
-/// What there is to do. The queue knows it as a label.
+/// Kind of a job. The queue stores its label.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Kind {
-    Smoke,
-    Finalise,
+enum JobKind {
+    Validation,
+    Scoring,
     Shard,
     Game,
 }
 
-impl Kind {
-    const ALL: [Self; 4] = [Self::Smoke, Self::Finalise, Self::Shard, Self::Game];
+impl JobKind {
+    const ALL: [Self; 4] = [Self::Validation, Self::Scoring, Self::Shard, Self::Game];
 
     const fn label(self) -> &'static str {
         match self {
-            Self::Smoke => "smoke",
-            Self::Finalise => "finalise",
+            Self::Validation => "smoke",
+            Self::Scoring => "finalise",
             Self::Shard => "shard",
             Self::Game => "game",
         }
     }
 
-    const fn waiting_in(self, lane: Lane) -> NewUnit {
-        NewUnit {
+    const fn in_lane(self, lane: Lane) -> NewJob {
+        NewJob {
             kind: self.label(),
             lane,
             batch: 0,
@@ -50,87 +50,85 @@ const fn lane(name: &'static str, urgency: u32, rank: u32) -> Lane {
     }
 }
 
-// A finalisation runs no agent, is the platform's own, and ends what has had its turn. Smoke runs, shards and games of
-// rounds share the slots equally, so that none makes the others wait for long. Ablations, trials, proposals and all
-// other games do not count: they have what is left.
-pub(crate) const FINALISE: NewUnit = Kind::Finalise.waiting_in(lane("finalise", 0, 0));
-pub(crate) const SMOKE: NewUnit = Kind::Smoke.waiting_in(lane("smoke", 1, 0));
-pub(crate) const SHARD: NewUnit = Kind::Shard.waiting_in(lane("shard", 1, 1));
-pub(crate) const ABLATION_SHARD: NewUnit = Kind::Shard.waiting_in(lane("ablation", 2, 0));
-pub(crate) const ROUND_GAME: NewUnit = Kind::Game.waiting_in(lane("game", 1, 2));
-pub(crate) const FREE_GAME: NewUnit = Kind::Game.waiting_in(lane("free_game", 2, 2));
-pub(crate) const REPLAY_GAME: NewUnit = Kind::Game.waiting_in(lane("replay", 2, 3));
-pub(crate) const PROPOSAL_SHARD: NewUnit = Kind::Shard.waiting_in(lane("proposal", 2, 1));
+// Scoring runs no agent, belongs to the platform, and ends an evaluation that has run. Validation runs, shards and games
+// of rounds share the slots equally, so that none delays the others for long. Ablations, trials, proposals and all other
+// games do not count: they get the slots that are left.
+pub(crate) const SCORING: NewJob = JobKind::Scoring.in_lane(lane("finalise", 0, 0));
+pub(crate) const VALIDATION: NewJob = JobKind::Validation.in_lane(lane("smoke", 1, 0));
+pub(crate) const SHARD: NewJob = JobKind::Shard.in_lane(lane("shard", 1, 1));
+pub(crate) const ABLATION_SHARD: NewJob = JobKind::Shard.in_lane(lane("ablation", 2, 0));
+pub(crate) const ROUND_GAME: NewJob = JobKind::Game.in_lane(lane("game", 1, 2));
+pub(crate) const TEST_OR_FRIENDLY_GAME: NewJob = JobKind::Game.in_lane(lane("free_game", 2, 2));
+pub(crate) const REPLAY_GAME: NewJob = JobKind::Game.in_lane(lane("replay", 2, 3));
+pub(crate) const PROPOSAL_SHARD: NewJob = JobKind::Shard.in_lane(lane("proposal", 2, 1));
 
-/// Which work is asked for.
+/// Kinds of jobs that a worker claims.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Lot {
+pub enum JobFilter {
     All,
-    /// What is played: shards and games.
-    Plays,
-    /// What is not: smoke runs and finalisations.
-    Rest,
+    ShardsAndGames,
+    ValidationAndScoring,
 }
 
-impl Lot {
-    /// The names of its lanes, as a JSON array.
+impl JobFilter {
+    /// Names of the lanes, as a JSON array.
     pub(crate) const fn lanes(self) -> &'static str {
         match self {
             Self::All => {
                 r#"["finalise","smoke","shard","ablation","proposal","game","free_game","replay"]"#
             }
-            Self::Plays => r#"["shard","ablation","proposal","game","free_game","replay"]"#,
-            Self::Rest => r#"["finalise","smoke"]"#,
+            Self::ShardsAndGames => r#"["shard","ablation","proposal","game","free_game","replay"]"#,
+            Self::ValidationAndScoring => r#"["finalise","smoke"]"#,
         }
     }
 }
 
-/// Finalisations are done for nobody in particular, in the order in which evaluations were played.
+/// Account of scoring jobs: they belong to no team, and run in the order in which evaluations were run.
 pub(crate) const PLATFORM: &str = "";
 
-/// What a unit of work is for.
+/// The submission, game, shard or evaluation that a job is for.
 #[derive(Debug)]
 pub(crate) enum Purpose {
-    Smoke(SubmissionId),
+    Validation(SubmissionId),
     Game(GameId),
     Shard {
         run: RunId,
         shard: Shard,
     },
-    Finalise(EvaluationId),
-    FinaliseDraft {
+    Scoring(EvaluationId),
+    ProposedScoring {
         id: EvaluationId,
         run: RunId,
         proposal: ProposalId,
     },
 }
 
-/// What the unit with this label is for: the row that refers to it.
-pub(crate) async fn of_unit(
+/// Purpose of a job, from its label and the row that refers to it.
+pub(crate) async fn of_job(
     connection: &mut SqliteConnection,
-    unit: Uuid,
+    job: Uuid,
     label: &str,
 ) -> Result<Purpose> {
-    let purpose = match Kind::ALL.into_iter().find(|kind| kind.label() == label) {
-        Some(Kind::Smoke) => smoke_runs::of_unit(connection, unit)
+    let purpose = match JobKind::ALL.into_iter().find(|kind| kind.label() == label) {
+        Some(JobKind::Validation) => validation_runs::of_job(connection, job)
             .await?
-            .map(Purpose::Smoke),
-        Some(Kind::Game) => games::of_unit(connection, unit).await?.map(Purpose::Game),
-        Some(Kind::Shard) => shards::of_unit(connection, unit)
+            .map(Purpose::Validation),
+        Some(JobKind::Game) => games::of_job(connection, job).await?.map(Purpose::Game),
+        Some(JobKind::Shard) => shards::of_job(connection, job)
             .await?
             .map(|(run, shard)| Purpose::Shard { run, shard }),
-        // Applied, a draft is an evaluation.
-        Some(Kind::Finalise) => match finalisations::of_unit(connection, unit).await? {
-            Some(id) => Some(Purpose::Finalise(id)),
-            None => drafts::of_finalisation(connection, unit)
+        // Once applied, an evaluation of a proposal is an evaluation of its day.
+        Some(JobKind::Scoring) => match scorings::of_job(connection, job).await? {
+            Some(id) => Some(Purpose::Scoring(id)),
+            None => proposed_evaluations::of_job(connection, job)
                 .await?
-                .map(|(id, run, proposal)| Purpose::FinaliseDraft { id, run, proposal }),
+                .map(|(id, run, proposal)| Purpose::ProposedScoring { id, run, proposal }),
         },
         None => None,
     };
     purpose.ok_or_else(|| {
         StoreError::Damaged(format!(
-            "unit {unit}: it is labelled {label:?}, and no such row refers to it"
+            "job {job}: it is labelled {label:?}, but no row of that kind refers to it"
         ))
     })
 }
@@ -140,30 +138,33 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_lane_is_somebodys() {
-        let units = [
-            FINALISE,
-            SMOKE,
+    fn job_filters_cover_each_lane_once() {
+        let jobs = [
+            SCORING,
+            VALIDATION,
             SHARD,
             ABLATION_SHARD,
             PROPOSAL_SHARD,
             ROUND_GAME,
-            FREE_GAME,
+            TEST_OR_FRIENDLY_GAME,
             REPLAY_GAME,
         ];
-        let lanes =
-            |lot: Lot| serde_json::from_str::<Vec<String>>(lot.lanes()).expect("it is JSON");
-        let (all, plays, rest) = (lanes(Lot::All), lanes(Lot::Plays), lanes(Lot::Rest));
+        let lanes = |filter: JobFilter| {
+            serde_json::from_str::<Vec<String>>(filter.lanes()).expect("the lanes are JSON")
+        };
+        let all = lanes(JobFilter::All);
+        let remote = lanes(JobFilter::ShardsAndGames);
+        let local = lanes(JobFilter::ValidationAndScoring);
         assert_eq!(
-            (all.len(), plays.len() + rest.len()),
-            (units.len(), units.len())
+            (all.len(), remote.len() + local.len()),
+            (jobs.len(), jobs.len())
         );
-        for unit in units {
-            let lane = unit.lane.name.to_owned();
+        for job in jobs {
+            let lane = job.lane.name.to_owned();
             assert!(all.contains(&lane), "{lane}");
-            let is_played = matches!(unit.kind, "shard" | "game");
-            assert_eq!(plays.contains(&lane), is_played, "{lane}");
-            assert_eq!(rest.contains(&lane), !is_played, "{lane}");
+            let is_remote = matches!(job.kind, "shard" | "game");
+            assert_eq!(remote.contains(&lane), is_remote, "{lane}");
+            assert_eq!(local.contains(&lane), !is_remote, "{lane}");
         }
     }
 }

@@ -1,4 +1,4 @@
-//! Teams that want to take part, and what the organisers say to it.
+//! Registrations of new teams, and the organisers' decisions on them.
 
 use crate::{
     boxed,
@@ -8,7 +8,7 @@ use crate::{
     store::Store,
     tables::{
         divisions,
-        invitations::InvitedAs,
+        invitations::InvitationRole,
         registrations::{self, Registration, RegistrationState},
         season, teams,
         teams::{Team, TeamProfile},
@@ -18,54 +18,52 @@ use crate::{
 use faceoff_types::{DivisionName, RegistrationId, TeamName};
 use jiff::Timestamp;
 
-/// Registrations that wait at a time: anybody may send one, and each is read by a person.
-pub const MAX_WAITING: i64 = 200;
+/// Limit of pending registrations: sending one needs no account, and an organiser reads each of them.
+pub const MAX_PENDING_REGISTRATIONS: i64 = 200;
 
-/// A team that wants to take part; the code of its link is the caller's.
+/// A registration to be added. The caller makes the code of its link.
 #[derive(Debug, Clone)]
 pub struct NewRegistration {
-    /// Of the code's text.
+    /// Hash of the code's text.
     pub code_hash: [u8; 32],
-    /// What it wants to be called.
     pub team_name: TeamName,
-    /// What it tells of itself.
     pub profile: TeamProfile,
-    /// How the organisers reach it.
+    /// How the organisers can reach the team, free text.
     pub contact: String,
-    /// The version of the terms that it accepts.
+    /// Version of the terms that the team accepts.
     pub accepted_terms: Option<u32>,
 }
 
-/// A registration that nobody has decided about.
-async fn waiting(tx: &mut Tx, id: RegistrationId) -> Result<Registration> {
+/// Finds a pending registration; [`StoreError::Conflict`] if it was decided.
+async fn find_pending(tx: &mut Tx, id: RegistrationId) -> Result<Registration> {
     let registration = registrations::find(tx, id).await?;
     match registration.state {
-        RegistrationState::Waiting => Ok(registration),
+        RegistrationState::Pending => Ok(registration),
         RegistrationState::Approved { at, .. } => Err(StoreError::Conflict(format!(
             "the registration was approved at {at}"
         ))),
         RegistrationState::Refused { at, .. } => Err(StoreError::Conflict(format!(
-            "the registration was refused at {at}; the team may send another one"
+            "the registration was refused at {at}; the team may register again"
         ))),
     }
 }
 
 impl Store {
-    /// A team registers. [`StoreError::Conflict`] if none is taken, too many wait, or something is missing that the
-    /// text names; [`StoreError::TeamNameTaken`] if a team has the name, or one that waits.
+    /// Adds the registration of a team. [`StoreError::Conflict`] if registration is closed, [`MAX_PENDING_REGISTRATIONS`]
+    /// are pending, or a field is missing; [`StoreError::TeamNameTaken`] if a team or a pending registration has the
+    /// name.
     #[boxed]
     pub async fn register(&self, new: NewRegistration, now: Timestamp) -> Result<Registration> {
         self.write(Actor::Visitor, now, async |tx| {
             season::check_open(tx).await?;
-            if !season::read(tx).await?.takes_registrations {
+            if !season::read(tx).await?.registration_open {
                 return Err(StoreError::Conflict(
-                    "registration is closed: teams come by invitation; ask the organisers for one".into(),
+                    "registration is closed: teams join by invitation; ask the organisers for one".into(),
                 ));
             }
-            if registrations::count_waiting(tx).await? >= MAX_WAITING {
+            if registrations::count_pending(tx).await? >= MAX_PENDING_REGISTRATIONS {
                 return Err(StoreError::Conflict(format!(
-                    "{MAX_WAITING} registrations wait for the organisers, and no more than that at a time; try again \
-                     later"
+                    "{MAX_PENDING_REGISTRATIONS} registrations are pending, which is the limit: try again later"
                 )));
             }
             check_terms(tx, new.accepted_terms).await?;
@@ -76,7 +74,7 @@ impl Store {
             let is_taken = teams::all(tx).await?.iter().any(|team| {
                 team.name.as_str().to_lowercase() == new.team_name.as_str().to_lowercase()
             });
-            if is_taken || registrations::waits(tx, &new.team_name).await? {
+            if is_taken || registrations::is_pending(tx, &new.team_name).await? {
                 return Err(StoreError::TeamNameTaken(new.team_name.to_string()));
             }
             let registration = Registration {
@@ -88,7 +86,7 @@ impl Store {
                 contact: new.contact,
                 accepted_terms: new.accepted_terms,
                 created_at: now,
-                state: RegistrationState::Waiting,
+                state: RegistrationState::Pending,
             };
             registrations::insert(tx, &registration, new.code_hash).await?;
             let (id, name) = (registration.id, registration.team_name);
@@ -98,8 +96,8 @@ impl Store {
         .await
     }
 
-    /// Lets a registered team take part: it exists from now on, and the code of its registration is an invitation of
-    /// its first member's, until `expires_at`. [`StoreError::Conflict`] if it was decided about.
+    /// Approves a registration: adds its team. The code of the registration becomes the invitation of the first member
+    /// and is valid until `expires_at`. [`StoreError::Conflict`] if the registration was decided.
     #[boxed]
     pub async fn approve_registration(
         &self,
@@ -110,7 +108,7 @@ impl Store {
     ) -> Result<(Registration, Team)> {
         self.write(actor, now, async |tx| {
             season::check_open(tx).await?;
-            let registration = waiting(tx, id).await?;
+            let registration = find_pending(tx, id).await?;
             let profile = TeamProfile {
                 affiliation: registration.affiliation,
                 link: registration.link,
@@ -119,7 +117,7 @@ impl Store {
             let team = add_team(tx, registration.team_name, profile).await?;
             let invitation = NewInvitation {
                 code_hash: registrations::code_hash(tx, id).await?,
-                invited_as: InvitedAs::Member(team),
+                role: InvitationRole::Member(team),
                 note: registration.contact,
                 expires_at,
             };
@@ -137,7 +135,7 @@ impl Store {
         .await
     }
 
-    /// Refuses a registration. [`StoreError::Conflict`] if it was decided about.
+    /// Refuses a registration. [`StoreError::Conflict`] if it was decided.
     #[boxed]
     pub async fn refuse_registration(
         &self,
@@ -147,7 +145,7 @@ impl Store {
         now: Timestamp,
     ) -> Result<Registration> {
         self.write(actor, now, async |tx| {
-            waiting(tx, id).await?;
+            find_pending(tx, id).await?;
             registrations::set_refused(tx, id, reason, now).await?;
             let reason = reason.to_owned();
             tx.record(
@@ -165,20 +163,20 @@ impl Store {
         registrations::all(&mut *self.database.read.acquire().await?).await
     }
 
-    /// The divisions, in their order.
+    /// The divisions, in display order.
     #[boxed]
     pub async fn divisions(&self) -> Result<Vec<DivisionName>> {
         divisions::all(&mut *self.database.read.acquire().await?).await
     }
 
-    /// Lets anybody register a team, or nobody, and sets the divisions; `None` stays as it is. [`StoreError::Conflict`]
-    /// if a team is in a division that is left out, or one is there twice; [`StoreError::SeasonClosed`] once the season
-    /// is over.
+    /// Opens or closes registration, and sets the divisions; `None` leaves a setting unchanged.
+    /// [`StoreError::Conflict`] if a division with teams is left out, or one is repeated;
+    /// [`StoreError::SeasonClosed`] once the season is over.
     #[boxed]
     pub async fn change_season(
         &self,
         actor: Actor,
-        takes_registrations: Option<bool>,
+        registration_open: Option<bool>,
         divisions: Option<&[DivisionName]>,
         now: Timestamp,
     ) -> Result<()> {
@@ -187,10 +185,10 @@ impl Store {
             if let Some(names) = divisions {
                 set_divisions(tx, names).await?;
             }
-            let takes_now = season::read(tx).await?.takes_registrations;
-            if let Some(takes) = takes_registrations.filter(|takes| *takes != takes_now) {
-                season::set_takes_registrations(tx, takes).await?;
-                let event = match takes {
+            let is_open = season::read(tx).await?.registration_open;
+            if let Some(open) = registration_open.filter(|open| *open != is_open) {
+                season::set_registration_open(tx, open).await?;
+                let event = match open {
                     true => Event::RegistrationOpened,
                     false => Event::RegistrationClosed,
                 };
@@ -210,23 +208,22 @@ async fn set_divisions(tx: &mut Tx, names: &[DivisionName]) -> Result<()> {
             .any(|other| lower(other) == lower(name));
         if is_twice {
             return Err(StoreError::Conflict(format!(
-                "divisions: “{name}” is there twice"
+                "divisions: “{name}” is listed twice"
             )));
         }
     }
     let before = divisions::all(tx).await?;
-    for gone in &before {
-        if names.iter().any(|name| lower(name) == lower(gone)) {
+    for removed in &before {
+        if names.iter().any(|name| lower(name) == lower(removed)) {
             continue;
         }
-        let teams = divisions::teams_in(tx, gone).await?;
+        let teams = divisions::teams_in(tx, removed).await?;
         if teams > 0 {
             return Err(StoreError::Conflict(format!(
-                "divisions: teams are in “{gone}”, {teams} of them; put them into another one first (PATCH \
-                 /api/v1/teams/ID)"
+                "divisions: “{removed}” has {teams} teams; move them to another one first (PATCH /api/v1/teams/ID)"
             )));
         }
-        divisions::remove(tx, gone).await?;
+        divisions::remove(tx, removed).await?;
     }
     for (position, name) in (0..).zip(names) {
         divisions::insert(tx, name, position).await?;

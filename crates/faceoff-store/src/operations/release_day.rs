@@ -1,5 +1,4 @@
-//! When a day's seed, datasets and logs leave the server: when nothing of the day is under way, at once,
-//! and by nobody's request.
+//! Release of a day's seed, datasets and logs: automatic, as soon as no evaluation of the day is open.
 
 use crate::{
     error::Result,
@@ -9,18 +8,18 @@ use crate::{
 };
 use faceoff_types::{EvaluationId, StageDay};
 
-/// Releases the day of an evaluation that has just ended, if it was the last: in the same transaction.
-pub(crate) async fn if_over(tx: &mut Tx, ended: EvaluationId) -> Result<()> {
-    let of = entries::find(tx, ended).await?.of;
-    unless_under_way(tx, of).await
+/// Releases the day of an evaluation that has just ended, if it was the last open one. In the same transaction.
+pub(crate) async fn release_if_over(tx: &mut Tx, ended: EvaluationId) -> Result<()> {
+    let stage_day = entries::find(tx, ended).await?.stage_day;
+    release_unless_open(tx, stage_day).await
 }
 
-/// Releases a day none of whose evaluations is under way.
-pub(crate) async fn unless_under_way(tx: &mut Tx, of: StageDay) -> Result<()> {
-    if evaluations::count_open(tx, Some(of)).await? == 0 {
+/// Releases a day unless an evaluation of it is queued or running.
+pub(crate) async fn release_unless_open(tx: &mut Tx, stage_day: StageDay) -> Result<()> {
+    if evaluations::count_open(tx, Some(stage_day)).await? == 0 {
         let now = tx.now;
-        if days::set_released(tx, of, now).await? {
-            tx.record(Subject::Day(of), Event::DayReleased);
+        if days::set_released(tx, stage_day, now).await? {
+            tx.record(Subject::Day(stage_day), Event::DayReleased);
         }
     }
     Ok(())

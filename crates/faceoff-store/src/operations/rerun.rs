@@ -1,68 +1,68 @@
-//! The same submission on the same day's episodes once more: what we broke by itself, and what an
-//! organiser asks for. What plays stays what was active at the cut.
+//! Reruns of an evaluation: the same submission on the same day's episodes. They are automatic after
+//! platform faults, otherwise on an organiser's request.
 
 use crate::{
     boxed,
     error::{Result, StoreError},
     event::Actor,
-    operations::enter::{Entrant, Turn, enter},
-    reads,
+    operations::new_evaluation::{NewEvaluation, DaySetup, queue_evaluation},
+    queries,
     store::Store,
     tables::{
         days,
         entries::{self, Entry},
         evaluations::{self, Evaluation, EvaluationState},
-        finalised, runs, season, teams,
+        sign_offs, runs, season, teams,
     },
     write::Tx,
 };
 use faceoff_types::EvaluationId;
 use jiff::Timestamp;
 
-/// How long what we broke rests before it is played again by itself, seconds: the first time, the second
-/// time, and then no more. So a day ends whatever is broken.
+/// Pauses before the first and the second automatic rerun after platform faults, seconds. There is no
+/// third, so a day ends even if the fault persists.
 pub const RERUN_PAUSES_S: [u32; 2] = [60, 600];
 
-async fn again(tx: &mut Tx, broken: Entry, rest_s: u32) -> Result<EvaluationId> {
-    let run = runs::find(tx, broken.run).await?;
-    let entrant = Entrant {
+async fn queue_rerun(tx: &mut Tx, failed: Entry, rest_s: u32) -> Result<EvaluationId> {
+    let run = runs::find(tx, failed.run).await?;
+    let new = NewEvaluation {
         id: EvaluationId::new(),
-        submission: broken.submission,
-        team: broken.team,
-        rerun_of: Some(broken.id),
+        submission: failed.submission,
+        team: failed.team,
+        rerun_of: Some(failed.id),
     };
-    let turn = Turn {
-        of: broken.of,
-        revision: broken.revision,
+    let setup = DaySetup {
+        stage_day: failed.stage_day,
+        revision: failed.revision,
         seed: run.seed,
         ruleset: run.ruleset,
         plan: run.plan,
     };
-    let id = enter(tx, entrant, &turn, rest_s).await?;
-    entries::follow_extra(tx, id, broken.id).await?;
+    let id = queue_evaluation(tx, new, &setup, rest_s).await?;
+    entries::copy_extra(tx, id, failed.id).await?;
     Ok(id)
 }
 
-/// Queues what has just ended by our fault again: unless its day is released or past its deadline, or this was
-/// tried often enough.
-pub(crate) async fn after_our_fault(tx: &mut Tx, id: EvaluationId) -> Result<()> {
-    let broken = entries::find(tx, id).await?;
-    let day = days::find(tx, broken.of).await?;
+/// Queues a rerun of an evaluation that has just ended by a platform fault. Does nothing if its day is released or
+/// past its deadline, or after the last automatic rerun.
+pub(crate) async fn rerun_after_platform_fault(tx: &mut Tx, id: EvaluationId) -> Result<()> {
+    let failed = entries::find(tx, id).await?;
+    let day = days::find(tx, failed.stage_day).await?;
     if day.released_at.is_some() || day.deadline_at.is_some_and(|at| at <= tx.now) {
         return Ok(());
     }
-    let times = evaluations::count_broken(tx, broken.team, broken.of).await?;
+    let times = evaluations::count_platform_failed(tx, failed.team, failed.stage_day).await?;
     if let Some(rest_s) = RERUN_PAUSES_S.get(times.saturating_sub(1)) {
-        again(tx, broken, *rest_s).await?;
+        queue_rerun(tx, failed, *rest_s).await?;
     }
     Ok(())
 }
 
 impl Store {
-    /// Plays an evaluation again that was cancelled or voided, not played in time, or that we broke: what was active at the cut, on the
-    /// same episodes, whether the day is released or not. [`StoreError::Conflict`] if it ended otherwise,
-    /// the team has another one of the day that counts, or the stage is signed off; [`StoreError::Disqualified`] if
-    /// it is; [`StoreError::SeasonClosed`] once the season is over.
+    /// Queues a rerun: the same submission on the same episodes, whether the day is released or not. The evaluation must
+    /// have been cancelled, voided, not run in time, or ended by a platform fault. [`StoreError::Conflict`] if it ended
+    /// otherwise, the team has another counting evaluation of the day, or the stage is signed off.
+    /// [`StoreError::Disqualified`] if the team is; [`StoreError::SeasonClosed`] once the season is over.
     #[boxed]
     pub async fn rerun_evaluation(
         &self,
@@ -72,7 +72,7 @@ impl Store {
     ) -> Result<Evaluation> {
         self.write(actor, now, async |tx| {
             season::check_open(tx).await?;
-            let found = reads::evaluations::find(tx, id).await?;
+            let found = queries::evaluations::find(tx, id).await?;
             let ended_without_result = matches!(
                 found.state,
                 EvaluationState::PlatformFailed { .. }
@@ -81,16 +81,16 @@ impl Store {
             );
             if !ended_without_result && found.voided.is_none() {
                 return Err(StoreError::Conflict(
-                    "only an evaluation that was cancelled or voided, that was not played in time, or that failed by \
-                     our fault, is played again"
+                    "only an evaluation that was cancelled or voided, was not run in time, or failed because of a \
+                     platform fault can be rerun"
                         .into(),
                 ));
             }
-            let broken = entries::find(tx, id).await?;
-            finalised::check_not(tx, broken.of.stage).await?;
-            teams::check_may_play(tx, broken.team).await?;
-            let id = again(tx, broken, 0).await?;
-            reads::evaluations::find(tx, id).await
+            let failed = entries::find(tx, id).await?;
+            sign_offs::check_not_signed_off(tx, failed.stage_day.stage).await?;
+            teams::check_may_compete(tx, failed.team).await?;
+            let id = queue_rerun(tx, failed, 0).await?;
+            queries::evaluations::find(tx, id).await
         })
         .await
     }

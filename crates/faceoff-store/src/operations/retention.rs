@@ -1,14 +1,14 @@
-//! What is kept of a stage's large files: said by the organiser, applied by the server by its clock.
+//! Retention of a stage's large files: the organiser sets it, the server applies it automatically.
 
 use crate::{
     boxed,
     error::{Result, StoreError},
     event::{Actor, Event, Subject},
-    operations::tidy::RECORDINGS_KEPT,
+    operations::cleanup::RECORDINGS_KEPT_FOR,
     store::Store,
     tables::{
-        bundles, days, finalised,
-        retentions::{self, Scored},
+        bundles, days, sign_offs,
+        retentions::{self, ScoredEvaluation},
         season,
         stages::{self, Stage, StagePhase},
     },
@@ -19,92 +19,93 @@ use jiff::{SignedDuration, Timestamp};
 use sqlx::SqliteConnection;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// For how long the file of what was removed stays where it is: as [`RECORDINGS_KEPT`], for the backup whose database
-/// still names it.
-pub const FILES_KEPT: SignedDuration = RECORDINGS_KEPT;
+/// Time between the removal of a dataset or bundle and the deletion of its file: as [`RECORDINGS_KEPT_FOR`], for a
+/// backup whose database still refers to it.
+pub const FILES_KEPT_FOR: SignedDuration = RECORDINGS_KEPT_FOR;
 
-/// How much goes, or has gone.
+/// Numbers and sizes of files that a retention removes or has removed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Removed {
+pub struct RemovalSummary {
     pub datasets: u32,
-    /// Of so many teams.
+    /// Teams that these datasets belong to.
     pub teams: u32,
-    /// Archives of submissions that nobody plays any more.
-    pub archives: u32,
-    /// All of them together, as far as they were measured.
+    /// Bundles of submissions that are not used any more.
+    pub bundles: u32,
+    /// Total size of the measured datasets and bundles.
     pub bytes: u64,
-    /// Datasets among them whose size nobody has measured yet.
+    /// Datasets whose size has not been measured yet.
     pub unmeasured: u32,
-    /// Some of it goes only from then on; `None`: nothing of it waits for a date.
-    pub not_before: Option<Timestamp>,
+    /// When the files that are kept until a date are removed; `None` if there are none.
+    pub later_from: Option<Timestamp>,
 }
 
-impl Removed {
+impl RemovalSummary {
     #[must_use]
-    pub const fn is_nothing(&self) -> bool {
-        self.datasets == 0 && self.archives == 0
+    pub const fn is_empty(&self) -> bool {
+        self.datasets == 0 && self.bundles == 0
     }
 }
 
-/// What goes by a retention, and why.
+/// Files that a retention removes, and the reason shown for it.
 #[derive(Debug, Default)]
 struct Plan {
     reason: String,
     datasets: Vec<EvaluationId>,
-    archives: Vec<SubmissionId>,
-    removed: Removed,
+    bundles: Vec<SubmissionId>,
+    removed: RemovalSummary,
 }
 
-/// Until when a stage that was signed off is kept by that, where its retention goes by it.
+/// End of the period after sign-off for which the retention keeps the files of a stage.
 fn kept_after_sign_off(retention: &Retention, stage: &Stage) -> Option<Timestamp> {
-    let at = stage.finalised.as_ref()?.at;
-    let kept = SignedDuration::from_hours(24 * i64::from(retention.days_after_sign_off?));
-    at.saturating_add(kept).ok()
+    let at = stage.sign_off.as_ref()?.at;
+    let period = SignedDuration::from_hours(24 * i64::from(retention.days_after_sign_off?));
+    at.saturating_add(period).ok()
 }
 
-/// Has the time come from which on nothing of a stage is kept?
+/// Whether the retention keeps nothing of the stage any more at `now`.
 fn has_ended(retention: &Retention, stage: &Stage, is_over: bool, now: Timestamp) -> bool {
     let by_date = retention.until.is_some_and(|until| until <= now);
     let by_sign_off = kept_after_sign_off(retention, stage).is_some_and(|until| until <= now);
     by_date && is_over || by_sign_off
 }
 
-/// Does somebody still need all of a stage? While something of it is under way or to be decided, results may change,
-/// and while it is blind no team could have taken its datasets home.
-async fn is_needed(connection: &mut SqliteConnection, stage: &Stage) -> Result<bool> {
+/// Whether all files of a stage are still needed. Results can change while evaluations, days or proposals are open,
+/// and while the stage is blind no team can have downloaded its datasets.
+async fn is_in_use(connection: &mut SqliteConnection, stage: &Stage) -> Result<bool> {
     Ok(stage.settings.blind
-        || finalised::count_open(connection, stage.id).await? > 0
+        || sign_offs::count_open(connection, stage.id).await? > 0
         || !days::unreleased(connection, stage.id).await?.is_empty()
         || retentions::count_proposals(connection, stage.id).await? > 0)
 }
 
-/// Which of a team's, the newest first, are beyond its last so many that count, and not its best by their rules.
-fn beyond_last(of_team: &[Scored], last: u32) -> Vec<&Scored> {
-    let mut best: BTreeMap<u32, &Scored> = BTreeMap::new();
-    for one in of_team.iter().filter(|one| one.counts) {
-        let standing = best.entry(one.revision).or_insert(one);
-        if one.board_order(standing).is_lt() {
-            *standing = one;
+/// Evaluations of a team that are older than its `last` newest counting ones, without its best one of each revision.
+/// `evaluations` has the newest first.
+fn older_than_last(evaluations: &[ScoredEvaluation], last: u32) -> Vec<&ScoredEvaluation> {
+    let mut best: BTreeMap<u32, &ScoredEvaluation> = BTreeMap::new();
+    for one in evaluations.iter().filter(|one| one.counts) {
+        let best_so_far = best.entry(one.revision).or_insert(one);
+        if one.compare_rank(best_so_far).is_lt() {
+            *best_so_far = one;
         }
     }
-    let is_best = |one: &Scored| {
+    let is_best = |one: &ScoredEvaluation| {
         one.counts
             && best
                 .get(&one.revision)
                 .is_some_and(|best| best.id == one.id)
     };
     let mut newer = 0;
-    let mut beyond = Vec::new();
-    for one in of_team {
+    let mut older = Vec::new();
+    for one in evaluations {
         if newer >= last && !is_best(one) {
-            beyond.push(one);
+            older.push(one);
         }
         newer += u32::from(one.counts);
     }
-    beyond
+    older
 }
 
-/// What goes, if nobody needs all of the stage.
+/// Files that the retention removes at `now`, provided that the stage is not [in use](is_in_use).
 async fn plan(
     connection: &mut SqliteConnection,
     stage: &Stage,
@@ -117,41 +118,41 @@ async fn plan(
     let is_over = stage.phase(now) == StagePhase::Closed
         || season::read(connection).await?.closed_at.is_some();
     let ended = has_ended(retention, stage, is_over, now);
-    let scored = retentions::scored(connection, stage.id).await?;
-    let going: Vec<&Scored> = match retention.last {
+    let scored = retentions::scored_evaluations(connection, stage.id).await?;
+    let removable: Vec<&ScoredEvaluation> = match retention.last {
         _ if ended => scored.iter().collect(),
         Some(last) => scored
             .chunk_by(|one, other| one.team == other.team)
-            .flat_map(|of_team| beyond_last(of_team, last))
+            .flat_map(|evaluations| older_than_last(evaluations, last))
             .collect(),
         None => return Ok(Plan::default()),
     };
-    let is_going = |one: &&&Scored| one.is_kept && !one.is_evidence;
-    let going: Vec<&Scored> = going.iter().filter(is_going).copied().collect();
-    let datasets: Vec<EvaluationId> = going.iter().map(|one| one.id).collect();
-    let archives = retentions::idle_archives(connection, stage.id, &datasets).await?;
-    let teams: BTreeSet<TeamId> = going.iter().map(|one| one.team).collect();
+    let is_removable = |one: &&&ScoredEvaluation| one.has_dataset && !one.is_evidence;
+    let removable: Vec<&ScoredEvaluation> = removable.iter().filter(is_removable).copied().collect();
+    let datasets: Vec<EvaluationId> = removable.iter().map(|one| one.id).collect();
+    let bundles = retentions::idle_bundles(connection, stage.id, &datasets).await?;
+    let teams: BTreeSet<TeamId> = removable.iter().map(|one| one.team).collect();
     let count = |len: usize| u32::try_from(len).unwrap_or(u32::MAX);
-    let bytes_of_archives = archives.iter().map(|(_, bytes)| bytes).sum::<u64>();
+    let bundle_bytes = bundles.iter().map(|(_, bytes)| bytes).sum::<u64>();
     Ok(Plan {
         reason: format!(
             "by the retention of the stage {:?}, which keeps {retention}",
             stage.name.as_str()
         ),
-        removed: Removed {
+        removed: RemovalSummary {
             datasets: count(datasets.len()),
             teams: count(teams.len()),
-            archives: count(archives.len()),
-            bytes: going.iter().filter_map(|one| one.bytes).sum::<u64>() + bytes_of_archives,
-            unmeasured: count(going.iter().filter(|one| one.bytes.is_none()).count()),
-            not_before: None,
+            bundles: count(bundles.len()),
+            bytes: removable.iter().filter_map(|one| one.bytes).sum::<u64>() + bundle_bytes,
+            unmeasured: count(removable.iter().filter(|one| one.bytes.is_none()).count()),
+            later_from: None,
         },
         datasets,
-        archives: archives.into_iter().map(|(id, _)| id).collect(),
+        bundles: bundles.into_iter().map(|(id, _)| id).collect(),
     })
 }
 
-/// Gives a stage another retention, also when it is signed off: nothing of its result depends on it.
+/// Changes a stage's retention. Allowed after sign-off too, since no result depends on it.
 pub(super) async fn change(tx: &mut Tx, stage: StageId, retention: Retention) -> Result<()> {
     retention
         .check()
@@ -168,64 +169,63 @@ pub(super) async fn change(tx: &mut Tx, stage: StageId, retention: Retention) ->
 }
 
 impl Store {
-    /// What a stage keeps.
     #[boxed]
     pub async fn stage_retention(&self, stage: StageId) -> Result<Retention> {
         retentions::of_stage(&mut *self.database.read.acquire().await?, stage).await
     }
 
-    /// What would go of a stage if it had this retention, of what is there at `now`: at once or as soon as nothing of it is
-    /// under way, to be decided, or blind; and what goes later by a date that is known.
+    /// Preview, as of `now`, of the files that this retention would remove from a stage. Includes those that go
+    /// immediately (or once nothing of the stage is open, undecided or blind), and those that go on a known date.
     #[boxed]
-    pub async fn would_remove(
+    pub async fn preview_removal(
         &self,
         stage: StageId,
         retention: &Retention,
         now: Timestamp,
-    ) -> Result<Removed> {
+    ) -> Result<RemovalSummary> {
         let mut connection = self.database.read.acquire().await?;
         let stage = stages::find(&mut connection, stage).await?;
-        let at_once = plan(&mut connection, &stage, retention, now).await?.removed;
+        let immediate = plan(&mut connection, &stage, retention, now).await?.removed;
         let dates = [retention.until, kept_after_sign_off(retention, &stage)];
         let Some(later) = dates.into_iter().flatten().filter(|at| *at > now).min() else {
-            return Ok(at_once);
+            return Ok(immediate);
         };
-        let in_all = plan(&mut connection, &stage, retention, later).await?;
-        let not_before = (in_all.removed != at_once).then_some(later);
-        Ok(Removed {
-            not_before,
-            ..in_all.removed
+        let eventual = plan(&mut connection, &stage, retention, later).await?;
+        let later_from = (eventual.removed != immediate).then_some(later);
+        Ok(RemovalSummary {
+            later_from,
+            ..eventual.removed
         })
     }
 
-    /// Has go what the stages' retentions do not keep: first nobody is promised it any more, with the reason, and
-    /// [`FILES_KEPT`] later its files are removed. How much is no longer promised. Run it now and then; a kill half way is
-    /// made up for by the next call.
+    /// Applies the retentions of all stages. Datasets and bundles are first marked as removed, with the reason; their
+    /// files are deleted [`FILES_KEPT_FOR`] later. Returns what was marked. To be called periodically; an interrupted call
+    /// is completed by the next one.
     #[boxed]
-    pub async fn apply_retentions(&self, now: Timestamp) -> Result<Removed> {
-        let mut all = Removed::default();
+    pub async fn apply_retentions(&self, now: Timestamp) -> Result<RemovalSummary> {
+        let mut all = RemovalSummary::default();
         let mut connection = self.database.read.acquire().await?;
-        let bounded = retentions::bounded(&mut connection).await?;
+        let bounded = retentions::stages_with_removals(&mut connection).await?;
         let mut due = Vec::new();
         for id in bounded {
             let stage = stages::find(&mut connection, id).await?;
-            if is_needed(&mut connection, &stage).await? {
+            if is_in_use(&mut connection, &stage).await? {
                 continue;
             }
             let retention = retentions::of_stage(&mut connection, id).await?;
             let plan = plan(&mut connection, &stage, &retention, now).await?;
-            if !plan.removed.is_nothing() {
+            if !plan.removed.is_empty() {
                 due.push(id);
             }
         }
         drop(connection);
         for id in due {
             let removed = self
-                .write(Actor::Server, now, async |tx| take_away(tx, id).await)
+                .write(Actor::Server, now, async |tx| mark_removed(tx, id).await)
                 .await?;
             all.datasets += removed.datasets;
             all.teams += removed.teams;
-            all.archives += removed.archives;
+            all.bundles += removed.bundles;
             all.bytes += removed.bytes;
             all.unmeasured += removed.unmeasured;
         }
@@ -233,41 +233,41 @@ impl Store {
         Ok(all)
     }
 
-    /// Removes the files that nobody has been promised for [`FILES_KEPT`]: datasets that a retention took, archives that
-    /// it or somebody's wish took; none that have become evidence meanwhile. How many.
+    /// Deletes the files of datasets and bundles that were removed at least [`FILES_KEPT_FOR`] ago, by a retention or on
+    /// request. Evidence is kept. Returns how many.
     #[boxed]
     pub async fn remove_files_of_removed(&self, now: Timestamp) -> Result<usize> {
-        let before = now.saturating_sub(FILES_KEPT).unwrap_or(Timestamp::MIN);
+        let before = now.saturating_sub(FILES_KEPT_FOR).unwrap_or(Timestamp::MIN);
         let mut connection = self.database.read.acquire().await?;
-        let datasets = retentions::datasets_going(&mut connection, before).await?;
-        let archives = bundles::going(&mut connection, before).await?;
+        let datasets = retentions::deletable_datasets(&mut connection, before).await?;
+        let bundles = bundles::deletable(&mut connection, before).await?;
         drop(connection);
         for (id, key) in &datasets {
             self.artifacts().delete_dataset(key).await?;
             self.write(Actor::Server, now, async |tx| {
-                retentions::set_dataset_gone(tx, *id).await
+                retentions::set_dataset_file_deleted(tx, *id).await
             })
             .await?;
         }
-        for (id, key) in &archives {
+        for (id, key) in &bundles {
             self.artifacts().delete(key).await?;
             self.write(Actor::Server, now, async |tx| {
-                bundles::set_gone(tx, *id).await
+                bundles::set_file_deleted(tx, *id).await
             })
             .await?;
         }
-        Ok(datasets.len() + archives.len())
+        Ok(datasets.len() + bundles.len())
     }
 
-    /// Measures the datasets that were stored before their sizes were noted. How many.
+    /// Measures datasets stored by versions that did not record sizes. Returns how many.
     #[boxed]
     pub async fn measure_datasets(&self, now: Timestamp) -> Result<usize> {
         let mut connection = self.database.read.acquire().await?;
         let unmeasured = retentions::unmeasured(&mut connection).await?;
         drop(connection);
         for (id, key) in &unmeasured {
-            // One that is lost takes no room.
-            let bytes = self.artifacts().bytes_of(key).await?.unwrap_or(0);
+            // A lost dataset takes no space.
+            let bytes = self.artifacts().size_bytes(key).await?.unwrap_or(0);
             self.write(Actor::Server, now, async |tx| {
                 retentions::set_measured(tx, *id, bytes).await
             })
@@ -277,12 +277,13 @@ impl Store {
     }
 }
 
-/// Marks what is to go as removed. It is looked for again: since the last look something may have changed.
-async fn take_away(tx: &mut Tx, id: StageId) -> Result<Removed> {
+/// Marks datasets and bundles of a stage as removed. The plan is made again, since the stage may have changed
+/// meanwhile.
+async fn mark_removed(tx: &mut Tx, id: StageId) -> Result<RemovalSummary> {
     let now = tx.now;
     let stage = stages::find(tx, id).await?;
-    if is_needed(tx, &stage).await? {
-        return Ok(Removed::default());
+    if is_in_use(tx, &stage).await? {
+        return Ok(RemovalSummary::default());
     }
     let retention = retentions::of_stage(tx, id).await?;
     let plan = plan(tx, &stage, &retention, now).await?;
@@ -292,8 +293,8 @@ async fn take_away(tx: &mut Tx, id: StageId) -> Result<Removed> {
         let reason = reason.clone();
         tx.record(Subject::Evaluation(id), Event::DatasetRemoved { reason });
     }
-    for id in plan.archives {
-        bundles::remove(tx, id, &reason, now).await?;
+    for id in plan.bundles {
+        bundles::set_removed(tx, id, &reason, now).await?;
         let reason = reason.clone();
         tx.record(Subject::Submission(id), Event::ArchiveRemoved { reason });
     }

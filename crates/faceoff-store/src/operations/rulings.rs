@@ -1,27 +1,27 @@
-//! What the organiser decides against results and teams, each at once and with a reason.
+//! Organisers' decisions on results and teams. They take effect at once and have a reason.
 
 use crate::{
     boxed,
     error::{Result, StoreError},
     event::{Actor, Event, Subject},
     operations::{
-        ends,
-        tournament::entrants::{Leaving, leave},
+        completion,
+        tournament::entrants::{DepartureRequest, remove_entrant},
     },
-    reads,
+    queries,
     store::Store,
     tables::{
         days, entrants, entries,
         evaluations::{Evaluation, Failure},
-        finalised,
+        sign_offs,
         rulings::Ruling,
-        standings,
+        counting_evaluations,
         teams::{self, Team},
         tournaments,
     },
     write::Tx,
 };
-use faceoff_types::{EvaluationId, LeftAs, StageDay, TeamId};
+use faceoff_types::{EvaluationId, DepartureKind, StageDay, TeamId};
 use jiff::Timestamp;
 
 pub(crate) async fn void(tx: &mut Tx, id: EvaluationId, reason: &str) -> Result<()> {
@@ -29,7 +29,7 @@ pub(crate) async fn void(tx: &mut Tx, id: EvaluationId, reason: &str) -> Result<
         at: tx.now,
         reason: reason.to_owned(),
     };
-    standings::set_voided(tx, id, &ruling).await?;
+    counting_evaluations::set_voided(tx, id, &ruling).await?;
     let reason = ruling.reason;
     tx.record(Subject::Evaluation(id), Event::EvaluationVoided { reason });
     Ok(())
@@ -37,9 +37,9 @@ pub(crate) async fn void(tx: &mut Tx, id: EvaluationId, reason: &str) -> Result<
 
 /// Disqualifies a team from the tournaments that are not closed.
 async fn leave_tournaments(tx: &mut Tx, team: TeamId, reason: &str) -> Result<()> {
-    let leaving = Leaving {
+    let departure = DepartureRequest {
         team,
-        left_as: LeftAs::Disqualified,
+        kind: DepartureKind::Disqualified,
         from_round: None,
         reason: reason.to_owned(),
     };
@@ -47,17 +47,18 @@ async fn leave_tournaments(tx: &mut Tx, team: TeamId, reason: &str) -> Result<()
         let entrants = entrants::all(tx, tournament.id).await?;
         let is_in = entrants
             .iter()
-            .any(|one| one.team == team && one.left.is_none());
+            .any(|one| one.team == team && one.departure.is_none());
         if tournament.closed_at.is_none() && is_in {
-            leave(tx, tournament.id, &leaving).await?;
+            remove_entrant(tx, tournament.id, &departure).await?;
         }
     }
     Ok(())
 }
 
 impl Store {
-    /// Takes a result off the board, or a failure of the agent off its team's day: it stays to be read, counts no
-    /// more, and can be played again. [`StoreError::Conflict`] unless it has ended by the agent's doing and counts, and once its stage is signed off.
+    /// Voids a result or an agent failure: it stays readable, does not count any more, and can be rerun.
+    /// [`StoreError::Conflict`] unless the evaluation counts and is finished or failed by its agent, and once its stage is
+    /// signed off.
     #[boxed]
     pub async fn void_evaluation(
         &self,
@@ -67,63 +68,62 @@ impl Store {
         now: Timestamp,
     ) -> Result<Evaluation> {
         self.write(actor, now, async |tx| {
-            let of = entries::find(tx, id).await?.of;
-            finalised::check_not(tx, of.stage).await?;
-            let standings = standings::of_day(tx, of).await?;
-            if !standings.iter().any(|standing| standing.id == id && standing.counts) {
+            let stage_day = entries::find(tx, id).await?.stage_day;
+            sign_offs::check_not_signed_off(tx, stage_day.stage).await?;
+            let counting = counting_evaluations::of_day(tx, stage_day).await?;
+            if !counting.iter().any(|evaluation| evaluation.id == id && evaluation.counts) {
                 return Err(StoreError::Conflict(
-                    "only an evaluation that is finished, or that its agent failed, and that counts is voided; \
-                     one that is under way is cancelled"
+                    "only a counting evaluation that is finished, or that its agent failed, can be voided; \
+                     one that is queued or running can be cancelled"
                         .into(),
                 ));
             }
             void(tx, id, reason).await?;
-            reads::evaluations::find(tx, id).await
+            queries::evaluations::find(tx, id).await
         })
         .await
     }
 
-    /// Voids all that has ended of a day and cancels the rest, so that it is released. The evaluations that counted.
-    /// [`StoreError::NotFound`] if the day has had no cut, [`StoreError::Conflict`] if nothing of it counts, or its stage
-    /// is signed off.
+    /// Voids all counting evaluations of a day and cancels the open ones, so that the day is released. Returns the number
+    /// of both. [`StoreError::NotFound`] if the day has had no cutoff, [`StoreError::Conflict`] if none counts or is open,
+    /// or the stage is signed off.
     #[boxed]
     pub async fn void_day(
         &self,
         actor: Actor,
-        of: StageDay,
+        stage_day: StageDay,
         reason: &str,
         now: Timestamp,
     ) -> Result<u32> {
         self.write(actor, now, async |tx| {
-            if !days::exists(tx, of).await? {
+            if !days::exists(tx, stage_day).await? {
                 return Err(StoreError::NotFound("day"));
             }
-            finalised::check_not(tx, of.stage).await?;
+            sign_offs::check_not_signed_off(tx, stage_day.stage).await?;
             let mut count = 0;
-            for standing in standings::of_day(tx, of).await? {
-                if standing.is_open {
+            for evaluation in counting_evaluations::of_day(tx, stage_day).await? {
+                if evaluation.is_open {
                     let cancelled = Failure::Cancelled(reason);
-                    ends::fail_evaluation(tx, standing.id, standing.run, cancelled).await?;
-                } else if standing.counts {
-                    void(tx, standing.id, reason).await?;
+                    completion::fail_evaluation(tx, evaluation.id, evaluation.run, cancelled).await?;
+                } else if evaluation.counts {
+                    void(tx, evaluation.id, reason).await?;
                 } else {
                     continue;
                 }
                 count += 1;
             }
             if count == 0 {
-                return Err(StoreError::Conflict("nothing of that day counts".into()));
+                return Err(StoreError::Conflict("no evaluation of that day counts".into()));
             }
             let reason = reason.to_owned();
-            tx.record(Subject::Day(of), Event::DayVoided { reason });
+            tx.record(Subject::Day(stage_day), Event::DayVoided { reason });
             Ok(count)
         })
         .await
     }
 
-    /// Disqualifies a team at once: what it plays is cancelled, it is on no board, at no cut, and uploads nothing; out of
-    /// tournaments that are not closed it is for good.
-    /// [`StoreError::Conflict`] if it is disqualified.
+    /// Disqualifies a team at once. Its open evaluations are cancelled, it leaves all boards and cannot upload or be
+    /// evaluated. It leaves open tournaments for good. [`StoreError::Conflict`] if it is disqualified already.
     #[boxed]
     pub async fn disqualify_team(
         &self,
@@ -144,8 +144,8 @@ impl Store {
             };
             teams::set_disqualified(tx, id, Some(&ruling)).await?;
             let why = format!("the team is disqualified: {reason}");
-            for (evaluation, run) in standings::open_of_team(tx, id).await? {
-                ends::fail_evaluation(tx, evaluation, run, Failure::Cancelled(&why)).await?;
+            for (evaluation, run) in counting_evaluations::open_of_team(tx, id).await? {
+                completion::fail_evaluation(tx, evaluation, run, Failure::Cancelled(&why)).await?;
             }
             leave_tournaments(tx, id, &why).await?;
             let reason = ruling.reason;
@@ -155,7 +155,7 @@ impl Store {
         .await
     }
 
-    /// Lets a disqualified team play and be ranked again; what was cancelled can be played again.
+    /// Reinstates a disqualified team: it can be evaluated and is ranked again. Cancelled evaluations can be rerun.
     /// [`StoreError::Conflict`] if it is not disqualified.
     #[boxed]
     pub async fn reinstate_team(

@@ -1,11 +1,11 @@
-//! Runs from their cut into shards to their last one: the same for whoever owns them.
+//! Runs: their division into shards, their owners and their stop. The same for all kinds of owners.
 
 use crate::{
     error::{Result, StoreError},
     event::Subject,
-    queue::{self, NewUnit},
+    queue::{self, NewJob},
     tables::{
-        ablations, bundles, drafts, evaluations, runs,
+        ablations, bundles, proposed_evaluations, evaluations, runs,
         runs::Run,
         shards::{self, Shard},
     },
@@ -14,17 +14,15 @@ use crate::{
 use faceoff_types::{AblationId, EvaluationId, ProposalId, RunId, ShardId, SubmissionId, TeamId};
 use sqlx::SqliteConnection;
 
-/// What a run is a part of.
+/// The evaluation or ablation that a run belongs to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum RunOwner {
     Evaluation(EvaluationId),
-    /// One profile of it.
+    /// The run is one profile of the ablation.
     Ablation(AblationId),
-    /// All of one that does not count.
-    Draft {
-        /// Of the evaluation that it becomes.
+    /// An evaluation of a proposal.
+    ProposedEvaluation {
         id: EvaluationId,
-        /// What it is a part of.
         proposal: ProposalId,
     },
 }
@@ -34,51 +32,50 @@ impl RunOwner {
         match self {
             Self::Evaluation(id) => Subject::Evaluation(id),
             Self::Ablation(id) => Subject::Ablation(id),
-            Self::Draft { proposal, .. } => Subject::Proposal(proposal),
+            Self::ProposedEvaluation { proposal, .. } => Subject::Proposal(proposal),
         }
     }
 }
 
-/// What the events of a run's playing are about: of one that was played before it counted, what it was a part of then.
+/// Subjects of a run's progress events. An applied evaluation has those of its proposal, too.
 pub(crate) async fn subjects(
     connection: &mut SqliteConnection,
     run: RunId,
 ) -> Result<Vec<Subject>> {
     let mut subjects = vec![owner(connection, run).await?.subject()];
-    if let Some((id, proposal)) = drafts::of_run(connection, run).await? {
-        subjects.push(RunOwner::Draft { id, proposal }.subject());
+    if let Some((id, proposal)) = proposed_evaluations::of_run(connection, run).await? {
+        subjects.push(RunOwner::ProposedEvaluation { id, proposal }.subject());
     }
     Ok(subjects)
 }
 
-/// What owns a run.
 pub(crate) async fn owner(connection: &mut SqliteConnection, run: RunId) -> Result<RunOwner> {
     if let Some(id) = evaluations::of_run(connection, run).await? {
         return Ok(RunOwner::Evaluation(id));
     }
-    if let Some((id, proposal)) = drafts::of_run(connection, run).await? {
-        return Ok(RunOwner::Draft { id, proposal });
+    if let Some((id, proposal)) = proposed_evaluations::of_run(connection, run).await? {
+        return Ok(RunOwner::ProposedEvaluation { id, proposal });
     }
     ablations::of_run(connection, run)
         .await?
         .map(RunOwner::Ablation)
-        .ok_or_else(|| StoreError::Damaged(format!("run {run}: nothing owns it")))
+        .ok_or_else(|| StoreError::Damaged(format!("run {run}: it has no owner")))
 }
 
-/// Adds a run, cuts it into shards, in (task, first episode) order, and queues them; their slot time is
-/// charged to `team`. [`StoreError::Conflict`] if the archive of a contestant was removed.
-pub(crate) async fn create(
+/// Adds a run, divides it into shards in (task, first episode) order, and queues them. Their slot time is
+/// charged to `team`. [`StoreError::Conflict`] if the bundle of a contestant was removed.
+pub(crate) async fn queue_run(
     tx: &mut Tx,
     run: &Run,
     contestants: &[SubmissionId],
-    unit: NewUnit,
+    new: NewJob,
     team: TeamId,
 ) -> Result<()> {
     for contestant in contestants {
-        bundles::check_kept(tx, *contestant).await?;
+        bundles::check_available(tx, *contestant).await?;
     }
     runs::insert(tx, run, contestants).await?;
-    let account = queue::account(tx, unit.lane, &team.to_string()).await?;
+    let account = queue::account(tx, new.lane, &team.to_string()).await?;
     let mut tasks = run.plan.tasks.clone();
     tasks.sort_unstable();
     let mut position = 0;
@@ -96,8 +93,8 @@ pub(crate) async fn create(
                 end_episode,
                 recording: None,
             };
-            let unit = queue::insert(tx, unit, account).await?;
-            shards::insert(tx, run.id, &shard, position, unit).await?;
+            let job = queue::insert(tx, new, account).await?;
+            shards::insert(tx, run.id, &shard, position, job).await?;
             position += 1;
             first_episode = end_episode;
         }
@@ -105,9 +102,9 @@ pub(crate) async fn create(
     Ok(())
 }
 
-/// Takes what is left of a run out of the queue.
+/// Drops the open jobs of a run from the queue.
 pub(crate) async fn stop(tx: &mut Tx, run: RunId) -> Result<()> {
-    let open = shards::open_units(tx, run).await?;
-    queue::drop_units(tx, &open).await?;
+    let open = shards::open_jobs(tx, run).await?;
+    queue::drop_jobs(tx, &open).await?;
     runs::set_stopped(tx, run).await
 }

@@ -1,16 +1,16 @@
-//! What of a database goes into an archive. It works on a copy, whose triggers are off and whose references are
-//! checked at the end.
+//! Removal of everything from a copied database that its archive must not contain. Triggers are off meanwhile, and
+//! references are checked at the end.
 
 use crate::{
     error::{Result, StoreError},
     event::Event,
-    tables::archived::Edition,
+    tables::archive::Edition,
 };
 use serde_json::Value;
 use sqlx::{AssertSqlSafe, SqliteConnection};
 
-/// Tables of which the public archive holds anything. All others are emptied for it: a new one is, until somebody has
-/// decided what of it is public.
+/// Tables that the public archive has rows of. All others are emptied for it. So a new table is private until it is
+/// added here.
 const PUBLIC_TABLES: [&str; 29] = [
     "_sqlx_migrations",
     "ablation_runs",
@@ -43,115 +43,115 @@ const PUBLIC_TABLES: [&str; 29] = [
     "tournaments",
 ];
 
-/// For whom a step is.
+/// Editions of the archive that a step applies to.
 #[derive(Clone, Copy, PartialEq, Eq)]
-enum For {
+enum Scope {
     Both,
     Public,
 }
 
-/// In this order: first what counts, then what belongs to it.
-const STEPS: &[(For, &str)] = &[
-    // What is open is no result; and of a day that is not released nothing may be known.
-    (For::Both, "DELETE FROM evaluations WHERE state = 'open' OR NOT EXISTS
+/// In this order: first the results, then the rows that belong to removed ones.
+const STEPS: &[(Scope, &str)] = &[
+    // Open evaluations are no results, and days are secret until their release.
+    (Scope::Both, "DELETE FROM evaluations WHERE state = 'open' OR NOT EXISTS
         (SELECT 1 FROM days d WHERE d.stage_id = evaluations.stage_id AND d.day = evaluations.day
            AND d.released_at IS NOT NULL)"),
-    // Scores that nobody may know.
-    (For::Public, "DELETE FROM evaluations WHERE stage_id IN
+    // Hidden scores.
+    (Scope::Public, "DELETE FROM evaluations WHERE stage_id IN
         (SELECT id FROM stages WHERE json_extract(settings, '$.blind'))"),
-    (For::Public, "DELETE FROM archived_seeds WHERE stage_id IN
+    (Scope::Public, "DELETE FROM archived_seeds WHERE stage_id IN
         (SELECT id FROM stages WHERE json_extract(settings, '$.blind'))"),
-    (For::Public, "DELETE FROM evaluations WHERE EXISTS
+    (Scope::Public, "DELETE FROM evaluations WHERE EXISTS
         (SELECT 1 FROM frozen_boards f WHERE f.stage_id = evaluations.stage_id
            AND f.frozen_at < evaluations.finished_at)"),
-    (For::Both, "UPDATE evaluations SET rerun_of = NULL WHERE rerun_of NOT IN (SELECT id FROM evaluations)"),
-    (For::Both, "DELETE FROM finalisations WHERE evaluation_id NOT IN (SELECT id FROM evaluations)"),
-    (For::Both, "DELETE FROM proposals WHERE id IN (SELECT proposal_id FROM drafts WHERE state = 'open')"),
-    (For::Public, "DELETE FROM proposals"),
-    (For::Both, "DELETE FROM drafts WHERE proposal_id NOT IN (SELECT id FROM proposals)"),
-    (For::Both, "UPDATE drafts SET replaces = NULL WHERE replaces NOT IN (SELECT id FROM evaluations)"),
-    (For::Both, "DELETE FROM draft_finalisations WHERE draft_id NOT IN (SELECT id FROM drafts)"),
-    (For::Both, "DELETE FROM ablations WHERE finished_at IS NULL"),
-    (For::Both, "DELETE FROM ablation_runs WHERE ablation_id NOT IN (SELECT id FROM ablations)"),
-    // A game that is open or was called off has no result, and what does not count is its teams' own.
-    (For::Both, "DELETE FROM games WHERE state IN ('queued', 'running')"),
-    (For::Public, "DELETE FROM games WHERE purpose IN ('test', 'friendly')"),
-    (For::Both, "DELETE FROM game_attempts WHERE game_id NOT IN (SELECT id FROM games)"),
-    // Of attempts everybody gets the ones that count, and what went wrong of no other.
-    (For::Public, "DELETE FROM game_attempts WHERE NOT EXISTS
+    (Scope::Both, "UPDATE evaluations SET rerun_of = NULL WHERE rerun_of NOT IN (SELECT id FROM evaluations)"),
+    (Scope::Both, "DELETE FROM finalisations WHERE evaluation_id NOT IN (SELECT id FROM evaluations)"),
+    (Scope::Both, "DELETE FROM proposals WHERE id IN (SELECT proposal_id FROM drafts WHERE state = 'open')"),
+    (Scope::Public, "DELETE FROM proposals"),
+    (Scope::Both, "DELETE FROM drafts WHERE proposal_id NOT IN (SELECT id FROM proposals)"),
+    (Scope::Both, "UPDATE drafts SET replaces = NULL WHERE replaces NOT IN (SELECT id FROM evaluations)"),
+    (Scope::Both, "DELETE FROM draft_finalisations WHERE draft_id NOT IN (SELECT id FROM drafts)"),
+    (Scope::Both, "DELETE FROM ablations WHERE finished_at IS NULL"),
+    (Scope::Both, "DELETE FROM ablation_runs WHERE ablation_id NOT IN (SELECT id FROM ablations)"),
+    // Open games have no result; test and friendly games are visible to their teams only.
+    (Scope::Both, "DELETE FROM games WHERE state IN ('queued', 'running')"),
+    (Scope::Public, "DELETE FROM games WHERE purpose IN ('test', 'friendly')"),
+    (Scope::Both, "DELETE FROM game_attempts WHERE game_id NOT IN (SELECT id FROM games)"),
+    // Only the attempts that count are public, without their failed predecessors.
+    (Scope::Public, "DELETE FROM game_attempts WHERE NOT EXISTS
         (SELECT 1 FROM games g WHERE g.id = game_attempts.game_id AND g.attempt = game_attempts.number)"),
-    (For::Public, "UPDATE game_attempts SET worker = '', home_log = '', away_log = ''"),
-    // With its seed a side's view of a game is everybody's: where that is not published it is zeros.
-    (For::Public, "UPDATE game_attempts SET score = json_set(score, '$.seed', lower(hex(zeroblob(32))))
+    (Scope::Public, "UPDATE game_attempts SET worker = '', home_log = '', away_log = ''"),
+    // A seed reveals each side's observations in a game: it is zeroed where these are not published.
+    (Scope::Public, "UPDATE game_attempts SET score = json_set(score, '$.seed', lower(hex(zeroblob(32))))
         WHERE score ->> '$.seed' IS NOT NULL AND NOT EXISTS
         (SELECT 1 FROM games g JOIN tournaments t ON t.id = g.tournament_id
          LEFT JOIN rounds r ON r.tournament_id = g.tournament_id AND r.number = g.round
          WHERE g.id = game_attempts.game_id AND g.purpose = 'round'
            AND CASE t.settings ->> '$.publishes' WHEN 'at_release' THEN r.over_at IS NOT NULL
                     WHEN 'at_close' THEN t.closed_at IS NOT NULL ELSE 0 END)"),
-    (For::Public, "UPDATE tournaments SET baseline_id = NULL"),
-    (For::Both, "DELETE FROM runs WHERE id NOT IN (SELECT run_id FROM evaluations)
+    (Scope::Public, "UPDATE tournaments SET baseline_id = NULL"),
+    (Scope::Both, "DELETE FROM runs WHERE id NOT IN (SELECT run_id FROM evaluations)
         AND id NOT IN (SELECT run_id FROM drafts) AND id NOT IN (SELECT run_id FROM ablation_runs)"),
-    (For::Both, "DELETE FROM contestants WHERE run_id NOT IN (SELECT id FROM runs)"),
-    (For::Both, "DELETE FROM episode_summaries WHERE run_id NOT IN (SELECT id FROM runs)"),
-    (For::Both, "DELETE FROM shards WHERE run_id NOT IN (SELECT id FROM runs)"),
-    // Single episodes are the datasets' to tell, to those who may have them: everybody gets what they come to.
-    (For::Public, "DELETE FROM shards"),
-    (For::Public, "UPDATE runs SET cleared_at = COALESCE(cleared_at, (SELECT made_at FROM archived))"),
-    // Recordings of shards are not taken along.
-    (For::Both, "UPDATE shards SET recording = NULL"),
-    (For::Both, "UPDATE runs SET recordings_removed_at = COALESCE(recordings_removed_at,
+    (Scope::Both, "DELETE FROM contestants WHERE run_id NOT IN (SELECT id FROM runs)"),
+    (Scope::Both, "DELETE FROM episode_summaries WHERE run_id NOT IN (SELECT id FROM runs)"),
+    (Scope::Both, "DELETE FROM shards WHERE run_id NOT IN (SELECT id FROM runs)"),
+    // Single episodes are in the datasets, whose access is limited; only their summary is public.
+    (Scope::Public, "DELETE FROM shards"),
+    (Scope::Public, "UPDATE runs SET cleared_at = COALESCE(cleared_at, (SELECT made_at FROM archived))"),
+    // Recordings of shards are not archived.
+    (Scope::Both, "UPDATE shards SET recording = NULL"),
+    (Scope::Both, "UPDATE runs SET recordings_removed_at = COALESCE(recordings_removed_at,
         (SELECT made_at FROM archived)) WHERE keeps_recordings = 1"),
-    (For::Both, "DELETE FROM active_submissions WHERE submission_id IN
+    (Scope::Both, "DELETE FROM active_submissions WHERE submission_id IN
         (SELECT id FROM submissions WHERE state = 'validating')"),
-    (For::Both, "DELETE FROM submissions WHERE state = 'validating'"),
-    (For::Public, "DELETE FROM submissions WHERE id NOT IN (SELECT submission_id FROM evaluations)
+    (Scope::Both, "DELETE FROM submissions WHERE state = 'validating'"),
+    (Scope::Public, "DELETE FROM submissions WHERE id NOT IN (SELECT submission_id FROM evaluations)
         AND id NOT IN (SELECT submission_id FROM ablations) AND id NOT IN (SELECT submission_id FROM contestants)
         AND id NOT IN (SELECT submission_id FROM round_submissions)"),
-    (For::Public, "UPDATE submissions SET bundle_key = '', bundle_bytes = 0, bundle_blake3 = '', bundle_file_name = '',
+    (Scope::Public, "UPDATE submissions SET bundle_key = '', bundle_bytes = 0, bundle_blake3 = '', bundle_file_name = '',
         label = NULL, note = NULL, timing = NULL, runtime = NULL, withdrawn_at = NULL, deleted_at = NULL, deleted_by = NULL,
         bundle_removed_at = NULL, bundle_removed_for = NULL, bundle_gone = 0, log = CASE WHEN log IS NOT NULL THEN '' END,
         reason = CASE WHEN reason IS NOT NULL THEN '' END"),
-    (For::Both, "DELETE FROM smoke_runs WHERE submission_id NOT IN (SELECT id FROM submissions)"),
-    (For::Public, "DELETE FROM smoke_runs"),
-    (For::Public, "DELETE FROM finalisations"),
-    (For::Public, "UPDATE games SET unit_id = NULL"),
-    (For::Public, "DELETE FROM questions WHERE public = 0"),
-    (For::Public, "UPDATE questions SET team_id = NULL"),
-    // Who has played or stands on a board; who only wanted to is nobody's business.
-    (For::Public, "DELETE FROM teams WHERE disqualified_at IS NULL AND id NOT IN (SELECT team_id FROM evaluations)
+    (Scope::Both, "DELETE FROM smoke_runs WHERE submission_id NOT IN (SELECT id FROM submissions)"),
+    (Scope::Public, "DELETE FROM smoke_runs"),
+    (Scope::Public, "DELETE FROM finalisations"),
+    (Scope::Public, "UPDATE games SET unit_id = NULL"),
+    (Scope::Public, "DELETE FROM questions WHERE public = 0"),
+    (Scope::Public, "UPDATE questions SET team_id = NULL"),
+    // Only teams that took part are public.
+    (Scope::Public, "DELETE FROM teams WHERE disqualified_at IS NULL AND id NOT IN (SELECT team_id FROM evaluations)
         AND id NOT IN (SELECT team_id FROM submissions) AND id NOT IN (SELECT team_id FROM entrants)
         AND id NOT IN (SELECT e.value FROM stages s JOIN json_each(s.finalised_without) e)"),
-    (For::Public, "UPDATE teams SET retired_by_organiser = 0"),
-    // Nothing of it is to be done any more, and who did it is nobody's business.
-    (For::Both, "DELETE FROM units WHERE id NOT IN (SELECT unit_id FROM shards)
+    (Scope::Public, "UPDATE teams SET retired_by_organiser = 0"),
+    // Jobs are never run in an archive, and the workers that ran them are private.
+    (Scope::Both, "DELETE FROM units WHERE id NOT IN (SELECT unit_id FROM shards)
         AND id NOT IN (SELECT unit_id FROM smoke_runs) AND id NOT IN (SELECT unit_id FROM finalisations)
         AND id NOT IN (SELECT unit_id FROM draft_finalisations) AND id NOT IN (SELECT unit_id FROM games WHERE unit_id IS NOT NULL)"),
-    (For::Both, "UPDATE units SET state = 'dropped', nonce = NULL WHERE state IN ('queued', 'leased')"),
-    (For::Both, "UPDATE units SET nonce = '' WHERE nonce IS NOT NULL"),
-    // The log for everybody: what is public (its kinds are sorted out before), by whom as far as that is.
-    (For::Public, "DELETE FROM events WHERE subject_kind = 'evaluation'
+    (Scope::Both, "UPDATE units SET state = 'dropped', nonce = NULL WHERE state IN ('queued', 'leased')"),
+    (Scope::Both, "UPDATE units SET nonce = '' WHERE nonce IS NOT NULL"),
+    // The public log: events of removed subjects go (private kinds are removed before), and users are anonymised.
+    (Scope::Public, "DELETE FROM events WHERE subject_kind = 'evaluation'
         AND subject_id NOT IN (SELECT id FROM evaluations)"),
-    (For::Public, "DELETE FROM events WHERE subject_kind = 'team' AND subject_id NOT IN (SELECT id FROM teams)"),
-    (For::Public, "UPDATE events SET actor = COALESCE((SELECT 'team:' || p.team_id FROM people p
+    (Scope::Public, "DELETE FROM events WHERE subject_kind = 'team' AND subject_id NOT IN (SELECT id FROM teams)"),
+    (Scope::Public, "UPDATE events SET actor = COALESCE((SELECT 'team:' || p.team_id FROM people p
         WHERE p.team_id IS NOT NULL AND events.actor = 'person:' || p.id), 'organiser')
         WHERE actor LIKE 'person:%'"),
-    // Who has taken a team out of the season is between it and the organisers.
-    (For::Public, "UPDATE events SET actor = 'team:' || subject_id WHERE kind IN ('team_retired', 'team_returned')"),
-    (For::Public, "UPDATE events SET actor = 'server' WHERE actor LIKE 'worker:%'"),
-    (For::Public, "UPDATE stages SET finalised_by = 'organiser' WHERE finalised_by IS NOT NULL"),
-    // Keys of every kind.
-    (For::Both, "DELETE FROM tokens"),
-    (For::Both, "DELETE FROM webhook_deliveries"),
-    (For::Both, "DELETE FROM webhooks"),
-    (For::Both, "DELETE FROM invitations"),
-    (For::Both, "UPDATE people SET password = NULL"),
-    (For::Both, "UPDATE registrations SET code_hash = randomblob(32)"),
-    (For::Both, "UPDATE season SET secret = zeroblob(32) WHERE closed_at IS NULL"),
+    // Whether a team or an organiser withdrew the team is private.
+    (Scope::Public, "UPDATE events SET actor = 'team:' || subject_id WHERE kind IN ('team_retired', 'team_returned')"),
+    (Scope::Public, "UPDATE events SET actor = 'server' WHERE actor LIKE 'worker:%'"),
+    (Scope::Public, "UPDATE stages SET finalised_by = 'organiser' WHERE finalised_by IS NOT NULL"),
+    // Credentials of every kind.
+    (Scope::Both, "DELETE FROM tokens"),
+    (Scope::Both, "DELETE FROM webhook_deliveries"),
+    (Scope::Both, "DELETE FROM webhooks"),
+    (Scope::Both, "DELETE FROM invitations"),
+    (Scope::Both, "UPDATE people SET password = NULL"),
+    (Scope::Both, "UPDATE registrations SET code_hash = randomblob(32)"),
+    (Scope::Both, "UPDATE season SET secret = zeroblob(32) WHERE closed_at IS NULL"),
 ];
 
-/// Takes out of a copy what its edition of the archive does not hold. What is left of it in unused pages stays there:
-/// the file is to be copied once more.
+/// Removes from a copy what its edition of the archive must not contain. Unused pages of the file still hold the
+/// removed data, so it must be copied once more.
 pub(crate) async fn scrub(connection: &mut SqliteConnection, edition: Edition) -> Result<()> {
     let triggers: Vec<(String, String)> =
         sqlx::query_as("SELECT name, sql FROM sqlite_master WHERE type = 'trigger'")
@@ -165,8 +165,8 @@ pub(crate) async fn scrub(connection: &mut SqliteConnection, edition: Edition) -
         forget_lifted_rulings(connection).await?;
         keep_public_events(connection).await?;
     }
-    for (whose, sql) in STEPS {
-        if *whose == For::Both || edition == Edition::Public {
+    for (scope, sql) in STEPS {
+        if *scope == Scope::Both || edition == Edition::Public {
             sqlx::query(*sql).execute(&mut *connection).await?;
         }
     }
@@ -183,7 +183,7 @@ pub(crate) async fn scrub(connection: &mut SqliteConnection, edition: Edition) -
     check_references(connection).await
 }
 
-/// The names of all tables but SQLite's own.
+/// Names of all tables except SQLite's own.
 async fn tables(connection: &mut SqliteConnection) -> Result<Vec<String>> {
     Ok(sqlx::query_scalar(
         "SELECT name FROM sqlite_master WHERE type = 'table' AND name NOT LIKE 'sqlite\\_%' ESCAPE '\\'",
@@ -192,13 +192,13 @@ async fn tables(connection: &mut SqliteConnection) -> Result<Vec<String>> {
     .await?)
 }
 
-/// Runs what names of our own schema were put into.
+/// Runs a statement that was built with names from this program's own schema.
 async fn run(connection: &mut SqliteConnection, sql: String) -> Result<()> {
     sqlx::query(AssertSqlSafe(sql)).execute(connection).await?;
     Ok(())
 }
 
-/// Removes the events whose kind is not for everybody: one of each kind is read to know.
+/// Removes the events whose kind is not public; one event of each kind is parsed to find out.
 async fn keep_public_events(connection: &mut SqliteConnection) -> Result<()> {
     let kinds: Vec<(String, String)> =
         sqlx::query_as("SELECT kind, payload FROM events GROUP BY kind")
@@ -220,9 +220,9 @@ async fn keep_public_events(connection: &mut SqliteConnection) -> Result<()> {
     Ok(())
 }
 
-/// Refuses to take out the episodes of a result whose boards could not be shown without.
+/// Refuses to remove the episodes of a result that has no summary yet: its boards could not be shown without.
 async fn check_summed_up(connection: &mut SqliteConnection) -> Result<()> {
-    let unsummed: u32 = sqlx::query_scalar(
+    let unsummarised: u32 = sqlx::query_scalar(
         "SELECT COUNT(*) FROM runs r
            WHERE r.state = 'played' AND r.cleared_at IS NULL
              AND NOT EXISTS (SELECT 1 FROM episode_summaries s WHERE s.run_id = r.id)
@@ -232,16 +232,15 @@ async fn check_summed_up(connection: &mut SqliteConnection) -> Result<()> {
     )
     .fetch_one(connection)
     .await?;
-    if unsummed > 0 {
+    if unsummarised > 0 {
         return Err(StoreError::Conflict(format!(
-            "{unsummed} results came in while the season was copied, and their episodes are not summed up yet: try again"
+            "{unsummarised} results came in while the season was copied, and their episode summaries are not stored yet: try again"
         )));
     }
     Ok(())
 }
 
-/// Removes the disqualifications that were lifted: everybody knew of them while they held, and that they do no more is no
-/// event for everybody.
+/// Removes disqualifications that were lifted. A disqualification is a public event, a reinstatement is not.
 async fn forget_lifted_rulings(connection: &mut SqliteConnection) -> Result<()> {
     sqlx::query(
         "DELETE FROM events WHERE kind = 'team_disqualified' AND EXISTS
@@ -253,17 +252,17 @@ async fn forget_lifted_rulings(connection: &mut SqliteConnection) -> Result<()> 
     Ok(())
 }
 
-/// Refuses rows that refer to rows which are not there.
+/// Refuses dangling references between rows.
 pub(crate) async fn check_references(connection: &mut SqliteConnection) -> Result<()> {
-    let hanging: Vec<(String, Option<i64>, String, i64)> =
+    let dangling: Vec<(String, Option<i64>, String, i64)> =
         sqlx::query_as("PRAGMA foreign_key_check")
             .fetch_all(connection)
             .await?;
-    match hanging.first() {
+    match dangling.first() {
         None => Ok(()),
         Some((table, _, parent, _)) => Err(StoreError::Damaged(format!(
-            "{} rows refer to what is not there: one of {table} to {parent}",
-            hanging.len()
+            "{} rows refer to missing rows, for example one of {table} to {parent}",
+            dangling.len()
         ))),
     }
 }

@@ -2,14 +2,14 @@ use crate::{
     boxed,
     error::{Result, StoreError},
     event::{Actor, Event, Subject},
-    operations::finalise_stage::final_is_owed,
+    operations::stage_sign_off::is_final_day_pending,
     store::Store,
-    tables::{drafts, evaluations, games, season, stages, tournaments},
+    tables::{proposed_evaluations, evaluations, games, season, stages, tournaments},
 };
 use jiff::Timestamp;
 
 impl Store {
-    /// Names the season. Its name before is no event.
+    /// Renames the season. An event is recorded only if the name changes.
     #[boxed]
     pub async fn name_season(&self, actor: Actor, name: &str, now: Timestamp) -> Result<()> {
         self.write(actor, now, async |tx| {
@@ -22,32 +22,32 @@ impl Store {
         .await
     }
 
-    /// Closes the season for good: nothing more is uploaded or evaluated, and its secret is public.
-    /// [`StoreError::SeasonClosed`] if it is closed already, [`StoreError::Conflict`] while
-    /// evaluations are under way or a stage is blind or waits for its final day.
+    /// Closes the season for good: uploads and evaluations end, and its secret becomes public.
+    /// [`StoreError::SeasonClosed`] if it is closed already. [`StoreError::Conflict`] while evaluations,
+    /// games or a tournament are open, or while a stage is blind or its final day is pending.
     #[boxed]
     pub async fn close_season(&self, actor: Actor, now: Timestamp) -> Result<()> {
         self.write(actor, now, async |tx| {
             season::check_open(tx).await?;
             let under_way = evaluations::count_open(tx, None).await?;
-            let proposed = drafts::count_open(tx, None).await?;
+            let proposed = proposed_evaluations::count_open(tx, None).await?;
             if proposed > 0 {
                 return Err(StoreError::Conflict(format!(
-                    "{proposed} evaluations of trials and proposals are queued or running: wait until they are over, \
-                     or drop them"
+                    "{proposed} evaluations of trials and proposed re-evaluations are queued or running: wait until they \
+                     are over, or drop them"
                 )));
             }
             let games = games::count_open(tx).await?;
             if games > 0 {
                 return Err(StoreError::Conflict(format!(
                     "{games} games are queued or running, and closing the season publishes their seeds: wait until they \
-                     are over, or call them off"
+                     are over, or cancel them"
                 )));
             }
             let open = tournaments::all(tx).await?;
             if let Some(open) = open.iter().find(|one| one.closed_at.is_none()) {
                 return Err(StoreError::Conflict(format!(
-                    "the tournament {:?} is not closed, and no game is played in a closed season: close it first",
+                    "the tournament {:?} is not closed, and a closed season has no games: close it first",
                     open.name.as_str()
                 )));
             }
@@ -60,9 +60,9 @@ impl Store {
             for stage in stages::all(tx).await? {
                 let why = if stage.settings.blind {
                     "is blind, and closing the season publishes the seeds that its scores follow from: open it first"
-                } else if final_is_owed(tx, &stage).await? {
-                    "is decided by a final day that has not been played, and nothing is played in a closed season: start \
-                     it first, or give the stage other standings while it is open"
+                } else if is_final_day_pending(tx, &stage).await? {
+                    "is decided by a final day that has not been evaluated, and a closed season has no evaluations: start \
+                     it first, or change the stage's standings while it is open"
                 } else {
                     continue;
                 };

@@ -1,4 +1,4 @@
-//! A copy of the database for an archive, while the server goes on.
+//! A copy of the database for an archive, made while the server runs.
 
 use crate::{
     boxed,
@@ -6,13 +6,13 @@ use crate::{
     error::{Result, StoreError},
     live::LiveGames,
     operations::scrub::scrub,
-    pulse::Pulse,
-    room::Room,
+    health_probes::HealthProbes,
+    free_space::FreeSpace,
     signals::Signals,
     store::Store,
     tables::{
-        archived::{self, Archived, Edition, KeptArtifact},
-        days, drafts, evaluations, season, stages,
+        archive::{self, ArchivedSeason, Edition, ArchivedArtifact},
+        days, proposed_evaluations, evaluations, season, stages,
     },
     workers::Workers,
 };
@@ -26,21 +26,21 @@ use std::{
     sync::Arc,
 };
 
-/// The season at one moment, as an archive of one edition shows it.
+/// The season at one instant, with the contents of one edition of the archive.
 #[derive(Debug)]
 pub struct Snapshot {
     store: Store,
     file: PathBuf,
-    /// Evaluations, of days and for the organiser of proposals, that were queued or running: they are not in it, nor are their proposals,
-    /// and of a day that is not released nothing is.
+    /// Queued or running evaluations, in the organiser's edition with those of proposals. They are left out, as are
+    /// their proposals and all unreleased days.
     pub under_way: u32,
 }
 
 impl Store {
-    /// Copies the database as it is now into `folder`, without what the edition does not hold: keys and passwords,
-    /// what is under way, the secret of a season that runs; for everybody also people, submissions, logs, and scores
-    /// that are hidden. `program` is noted in it. Takes room and time in proportion to the database; writers go on.
-    /// [`StoreError::Conflict`] where an archive that is public is to become an organiser's.
+    /// Copies the database as it is now into `folder`, without credentials, open jobs and the secret of a running
+    /// season. The public edition also lacks users, bundles, logs, and hidden scores. `program` is recorded in it. Takes
+    /// disk space and time in proportion to the database; writers are not blocked. [`StoreError::Conflict`] if a public
+    /// archive is asked for the organiser's edition.
     #[boxed]
     pub async fn snapshot(
         &self,
@@ -49,12 +49,12 @@ impl Store {
         program: &str,
         now: Timestamp,
     ) -> Result<Snapshot> {
-        if let Some(archived) = &self.archived
+        if let Some(archived) = &self.archive
             && archived.edition == Edition::Public
             && edition == Edition::Organiser
         {
             return Err(StoreError::Conflict(
-                "this is a season's public archive, which has nothing for the organiser alone: ask for the public one"
+                "this is a season's public archive, which has no data for organisers only: ask for the public edition"
                     .into(),
             ));
         }
@@ -63,30 +63,30 @@ impl Store {
         let options = SqliteConnectOptions::new()
             .filename(&file)
             .create_if_missing(false)
-            // while rows go in whatever order; looked at when all are gone
+            // rows are removed in any order; references are checked at the end
             .foreign_keys(false)
-            // after a kill the file is thrown away
+            // the file is discarded after a crash
             .journal_mode(SqliteJournalMode::Off)
             .synchronous(SqliteSynchronous::Off);
         let mut connection = SqliteConnection::connect_with(&options).await?;
         let mut under_way = evaluations::count_open(&mut connection, None).await?;
         if edition == Edition::Organiser {
-            under_way += drafts::count_open(&mut connection, None).await?;
+            under_way += proposed_evaluations::count_open(&mut connection, None).await?;
         }
         mark(&mut connection, edition, program, now).await?;
         scrub(&mut connection, edition).await?;
         connection.close().await?;
         let database = Database::open(&file).await?;
-        let archived = archived::read(&mut *database.read.acquire().await?).await?;
+        let archived = archive::read(&mut *database.read.acquire().await?).await?;
         let store = Self {
             database,
             signals: Arc::new(Signals::new()),
             artifacts: self.artifacts.clone(),
-            room: Arc::new(Room::new(vec![folder.to_owned()], 0)),
-            pulse: Arc::new(Pulse::new()),
+            free_space: Arc::new(FreeSpace::new(vec![folder.to_owned()], 0)),
+            probes: Arc::new(HealthProbes::new()),
             live: LiveGames::default(),
             workers: Workers::default(),
-            archived: archived.map(Arc::new),
+            archive: archived.map(Arc::new),
         };
         Ok(Snapshot {
             store,
@@ -97,19 +97,19 @@ impl Store {
 }
 
 impl Snapshot {
-    /// To be read as any other; its artifacts are the original's.
+    /// A store on the copy; its artifacts are those of the original.
     #[must_use]
     pub const fn store(&self) -> &Store {
         &self.store
     }
 
-    /// What the organiser's archive holds beside the datasets of evaluations.
+    /// Artifacts in the organiser's archive other than the datasets of evaluations.
     #[boxed]
-    pub async fn kept_artifacts(&self) -> Result<Vec<KeptArtifact>> {
-        archived::kept_artifacts(&mut *self.store.database.read.acquire().await?).await
+    pub async fn artifacts_to_archive(&self) -> Result<Vec<ArchivedArtifact>> {
+        archive::artifacts(&mut *self.store.database.read.acquire().await?).await
     }
 
-    /// Writes it to a new file, in which nothing is left of what was taken out, and removes the copy.
+    /// Writes the snapshot to a new file, without remains of the removed data, and deletes the copy.
     #[boxed]
     pub async fn finish(self, file: &Path) -> Result<()> {
         copy(&self.file, file).await?;
@@ -119,7 +119,7 @@ impl Snapshot {
     }
 }
 
-/// Copies a database with all that is committed, and without its unused pages.
+/// Copies a database with everything committed, and without its unused pages.
 pub(crate) async fn copy(from: &Path, to: &Path) -> Result<()> {
     let to = to
         .to_str()
@@ -134,7 +134,7 @@ pub(crate) async fn copy(from: &Path, to: &Path) -> Result<()> {
     Ok(())
 }
 
-/// Has the copy say what it is, and keep what follows from a secret that it will not hold.
+/// Writes the description of the archive, and the seeds of released days, whose secret it will not contain.
 async fn mark(
     connection: &mut SqliteConnection,
     edition: Edition,
@@ -142,32 +142,32 @@ async fn mark(
     now: Timestamp,
 ) -> Result<()> {
     let season = season::read(connection).await?;
-    if let Some(archived) = archived::read(connection).await? {
-        // An archive of an archive shows the same moment.
-        let archived = Archived {
+    if let Some(archived) = archive::read(connection).await? {
+        // An archive of an archive is of the same instant.
+        let archived = ArchivedSeason {
             edition,
             imported_at: None,
             ..archived
         };
-        return archived::put(connection, &archived).await;
+        return archive::put(connection, &archived).await;
     }
-    let archived = Archived {
+    let archived = ArchivedSeason {
         edition,
         made_at: now,
         program: program.to_owned(),
         commitment: season.commitment,
         imported_at: None,
     };
-    archived::put(connection, &archived).await?;
+    archive::put(connection, &archived).await?;
     if season.closed_at.is_some() {
         return Ok(());
     }
     let stages = stages::all(connection).await?;
     for (day, _) in days::all(connection).await? {
-        let stage = stages.iter().find(|stage| stage.id == day.of.stage);
+        let stage = stages.iter().find(|stage| stage.id == day.stage_day.stage);
         if let (Some(stage), Some(_)) = (stage, day.released_at) {
-            let seed = stage.seed_label(day.of.date).seed(&season.secret);
-            archived::put_seed(connection, day.of, &seed).await?;
+            let seed = stage.seed_label(day.stage_day.date).seed(&season.secret);
+            archive::put_seed(connection, day.stage_day, &seed).await?;
         }
     }
     Ok(())

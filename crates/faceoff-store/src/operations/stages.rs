@@ -1,4 +1,4 @@
-//! Stages: made, changed as far as they may be, and told by the configuration.
+//! Stages: creation, permitted changes, and synchronisation with the configuration file.
 
 use crate::{
     boxed,
@@ -7,7 +7,7 @@ use crate::{
     operations::{deadlines, retention},
     store::Store,
     tables::{
-        days, finalised, season,
+        days, sign_offs, season,
         stages::{self, Revision, Stage, StagePhase},
     },
     write::Tx,
@@ -15,43 +15,43 @@ use crate::{
 use faceoff_types::{Retention, StageId, StageName, StageRules, StageSettings, Zone};
 use jiff::Timestamp;
 
-/// A stage to be made.
+/// A stage to be created.
 #[derive(Debug, Clone)]
 pub struct NewStage {
-    /// No two that differ only in case.
+    /// Unique, ignoring case.
     pub name: StageName,
-    /// From when on its days start; one that has passed is now.
+    /// When its first day can start; a time in the past means now.
     pub opens_at: Timestamp,
-    /// Until when; `None`: it has no end yet.
+    /// `None`: it has no end yet.
     pub closes_at: Option<Timestamp>,
-    /// Where its days are dates.
+    /// Time zone of its days' dates.
     pub zone: Zone,
-    /// What scores depend on.
+    /// Rules that scores depend on.
     pub rules: StageRules,
-    /// What they do not depend on.
+    /// Settings that scores do not depend on.
     pub settings: StageSettings,
 }
 
-/// What is to be another; `None` stays as it is.
+/// Changes of a stage; `None` leaves a value unchanged.
 #[derive(Debug, Clone, Default)]
 pub struct StageChange {
     pub name: Option<StageName>,
-    /// While it has not opened.
+    /// Only before the stage has opened.
     pub opens_at: Option<Timestamp>,
-    /// While it has not closed; `Some(None)`: it has no end yet.
+    /// Only before the stage has closed; `Some(None)`: it has no end yet.
     pub closes_at: Option<Option<Timestamp>>,
-    /// While none of its days has had its cut.
+    /// Only before the cutoff of its first day.
     pub zone: Option<Zone>,
-    /// Once it is open this makes another revision.
+    /// In an open stage this creates another revision.
     pub rules: Option<StageRules>,
-    /// What no score depends on.
+    /// Settings that scores do not depend on.
     pub settings: Option<StageSettings>,
-    /// What is kept of its files; also once it is signed off, and when the season is over.
+    /// Also after the stage is signed off or the season is over.
     pub retention: Option<Retention>,
 }
 
 impl StageChange {
-    /// Is anything to be another, beside what is kept?
+    /// Whether anything but the retention differs from `stage`.
     fn changes(&self, stage: &Stage) -> bool {
         fn other<T: PartialEq>(wanted: Option<&T>, is: &T) -> bool {
             wanted.is_some_and(|wanted| wanted != is)
@@ -72,7 +72,7 @@ fn conflict<T>(why: String) -> Result<T> {
     Err(StoreError::Conflict(why))
 }
 
-/// As the database has it, in milliseconds; never later than it is.
+/// Truncated to milliseconds, the resolution of the database.
 fn stored(at: Timestamp) -> Timestamp {
     Timestamp::from_millisecond(at.as_millisecond()).unwrap_or(at)
 }
@@ -83,7 +83,7 @@ fn check_times(opens_at: Timestamp, closes_at: Option<Timestamp>, now: Timestamp
             "closes_at: expected a time after the opening at {opens_at}, got {at}"
         )),
         Some(at) if at <= now => conflict(format!(
-            "closes_at: expected a time in the future, got {at}; what has passed is not changed"
+            "closes_at: expected a time in the future, got {at}; the past cannot be changed"
         )),
         _ => Ok(()),
     }
@@ -109,9 +109,9 @@ async fn create(tx: &mut Tx, stage: &Stage) -> Result<()> {
     Ok(())
 }
 
-/// Is that all that is to be another: that a blind stage is opened, and datasets published sooner?
-fn only_tells_more(stage: &Stage, changed: &Stage) -> bool {
-    let told = Stage {
+/// Whether the change only opens a blind stage, or publishes datasets earlier.
+fn only_increases_visibility(stage: &Stage, changed: &Stage) -> bool {
+    let more_visible = Stage {
         settings: StageSettings {
             blind: changed.settings.blind,
             publishes: changed.settings.publishes,
@@ -119,19 +119,19 @@ fn only_tells_more(stage: &Stage, changed: &Stage) -> bool {
         },
         ..stage.clone()
     };
-    *changed == told
+    *changed == more_visible
         && changed.settings.blind <= stage.settings.blind
         && changed.settings.publishes >= stage.settings.publishes
 }
 
-/// Who changes a stage.
+/// Origin of a change.
 #[derive(Clone, Copy, PartialEq, Eq)]
-enum By {
-    Hand,
+enum ChangeSource {
+    Organiser,
     Configuration,
 }
 
-async fn change(tx: &mut Tx, stage: &Stage, change: StageChange, by: By) -> Result<()> {
+async fn change(tx: &mut Tx, stage: &Stage, change: StageChange, by: ChangeSource) -> Result<()> {
     let now = tx.now;
     let mut changed = Stage {
         name: change.name.unwrap_or_else(|| stage.name.clone()),
@@ -143,12 +143,12 @@ async fn change(tx: &mut Tx, stage: &Stage, change: StageChange, by: By) -> Resu
     };
     let phase = stage.phase(now);
     let rules = change.rules.unwrap_or_else(|| stage.rules.rules.clone());
-    finalised::check_not(tx, stage.id).await?;
-    let tells_more = rules == stage.rules.rules && only_tells_more(stage, &changed);
-    if phase == StagePhase::Closed && !tells_more {
+    sign_offs::check_not_signed_off(tx, stage.id).await?;
+    let increases_visibility = rules == stage.rules.rules && only_increases_visibility(stage, &changed);
+    if phase == StagePhase::Closed && !increases_visibility {
         return conflict(format!(
-            "the stage {:?} closed at {}, and what has closed stays as it was, but for what of it is told: a blind one can be opened, and \
-             its datasets published sooner. Make another stage",
+            "the stage {:?} closed at {}, and a closed stage cannot be changed, except to open a blind one or to publish \
+             datasets earlier. Create another stage",
             stage.name.as_str(),
             stage.closes_at.unwrap_or(now)
         ));
@@ -156,7 +156,8 @@ async fn change(tx: &mut Tx, stage: &Stage, change: StageChange, by: By) -> Resu
     if changed.opens_at != stage.opens_at && (phase == StagePhase::Open || changed.opens_at <= now)
     {
         return conflict(format!(
-            "opens_at: the stage {} at {}; only the opening of one that is to come is moved, to a time in the future",
+            "opens_at: the stage {} at {}; the opening can be moved only before it has passed, and only to a time in the \
+             future",
             if phase == StagePhase::Open {
                 "opened"
             } else {
@@ -170,24 +171,24 @@ async fn change(tx: &mut Tx, stage: &Stage, change: StageChange, by: By) -> Resu
     }
     if changed.zone != stage.zone && days::newest(tx, stage.id).await?.is_some() {
         return conflict(format!(
-            "zone: days are named by their date in {}, and some have been; make another stage",
+            "zone: the stage already has days, named by their date in {}; create another stage",
             stage.zone
         ));
     }
     if changed.settings.blind && !stage.settings.blind {
-        let scored = finalised::count_scored(tx, stage.id).await?;
+        let scored = sign_offs::count_scored(tx, stage.id).await?;
         if scored > 0 {
             return conflict(format!(
-                "blind: {scored} evaluations of the stage {:?} have a score that everybody could read; a stage is \
-                 made blind before that",
+                "blind: {scored} evaluations of the stage {:?} have a score that was visible; a stage can be made blind \
+                 only before its first score",
                 stage.name.as_str()
             ));
         }
     }
     check_rules(&rules, &changed.settings)?;
-    // What a person has changed is not changed back by the next start.
-    let told = (&rules, &changed.settings, &changed.zone);
-    let by_hand = by == By::Hand && told != (&stage.rules.rules, &stage.settings, &stage.zone);
+    // An organiser's change is not reverted by the configuration at the next start.
+    let new_values = (&rules, &changed.settings, &changed.zone);
+    let by_hand = by == ChangeSource::Organiser && new_values != (&stage.rules.rules, &stage.settings, &stage.zone);
     if changed != *stage {
         let event = Event::StageChanged {
             name: changed.name.clone(),
@@ -201,12 +202,12 @@ async fn change(tx: &mut Tx, stage: &Stage, change: StageChange, by: By) -> Resu
     changed.configured = stage.configured && !by_hand;
     stages::update(tx, &changed).await?;
     if changed.settings != stage.settings {
-        deadlines::follow(tx, &changed, by == By::Configuration).await?;
+        deadlines::update_deadlines(tx, &changed, by == ChangeSource::Configuration).await?;
     }
     set_rules(tx, &changed, rules).await
 }
 
-/// Gives a stage other rules: another revision, unless it has not opened.
+/// Sets a stage's rules. Once the stage has opened, this creates another revision.
 async fn set_rules(tx: &mut Tx, stage: &Stage, rules: StageRules) -> Result<()> {
     let is_upcoming = stage.phase(tx.now) == StagePhase::Upcoming;
     let is_new = rules != stage.rules.rules;
@@ -231,17 +232,17 @@ async fn set_rules(tx: &mut Tx, stage: &Stage, rules: StageRules) -> Result<()> 
 }
 
 impl Store {
-    /// Makes a stage. [`StoreError::StageNameTaken`] if another has its name, [`StoreError::Conflict`] if its times
-    /// or its rules cannot be, [`StoreError::SeasonClosed`] once the season is over.
+    /// Creates a stage. [`StoreError::StageNameTaken`] if another one has its name, [`StoreError::Conflict`] if its times
+    /// or rules are invalid, [`StoreError::SeasonClosed`] once the season is over.
     #[boxed]
     pub async fn create_stage(&self, actor: Actor, new: NewStage, now: Timestamp) -> Result<Stage> {
-        self.create_stage_keeping(actor, new, Retention::default(), now)
+        self.create_stage_with_retention(actor, new, Retention::default(), now)
             .await
     }
 
-    /// The same of a stage that does not keep all of its files for ever.
+    /// [`create_stage`](Self::create_stage) with a retention for its files.
     #[boxed]
-    pub async fn create_stage_keeping(
+    pub async fn create_stage_with_retention(
         &self,
         actor: Actor,
         new: NewStage,
@@ -267,7 +268,7 @@ impl Store {
                 },
                 names_seeds: true,
                 configured: false,
-                finalised: None,
+                sign_off: None,
             };
             create(tx, &stage).await?;
             retention::change(tx, stage.id, retention).await?;
@@ -276,8 +277,8 @@ impl Store {
         .await
     }
 
-    /// Changes a stage as far as it may be; other rules of one that is open are another revision.
-    /// [`StoreError::Conflict`] says what may not be changed; [`StoreError::SeasonClosed`] once the season is over.
+    /// Changes a stage within the permitted limits; new rules of an open stage create another revision.
+    /// [`StoreError::Conflict`] names what cannot be changed; [`StoreError::SeasonClosed`] once the season is over.
     #[boxed]
     pub async fn change_stage(
         &self,
@@ -295,15 +296,15 @@ impl Store {
                 }
             }
             season::check_open(tx).await?;
-            change(tx, &stage, wanted, By::Hand).await?;
+            change(tx, &stage, wanted, ChangeSource::Organiser).await?;
             stages::find(tx, id).await
         })
         .await
     }
 
-    /// Gives the season its first stage, or the stage that follows the configuration what that says now: other rules
-    /// are another revision. A stage that was changed by hand, has closed, or belongs to a closed season stays as it
-    /// is. [`StoreError::Conflict`] if the zone is another than that of days that have been.
+    /// Creates the season's first stage from the configuration, or updates the stage that follows it; new rules create
+    /// another revision. A stage that an organiser has changed, that has closed, or whose season is closed stays
+    /// unchanged. [`StoreError::Conflict`] if the zone changes after the first day.
     #[boxed]
     pub async fn configure_stage(
         &self,
@@ -314,7 +315,7 @@ impl Store {
     ) -> Result<()> {
         self.write(Actor::Organiser, now, async |tx| {
             check_rules(&rules, &settings)?;
-            let Some(id) = stages::configured(tx).await? else {
+            let Some(id) = stages::find_configured(tx).await? else {
                 if !stages::all(tx).await?.is_empty() {
                     return Ok(());
                 }
@@ -334,12 +335,12 @@ impl Store {
                     },
                     names_seeds: true,
                     configured: true,
-                    finalised: None,
+                    sign_off: None,
                 };
                 return create(tx, &first).await;
             };
             if stages::revisions(tx, id).await?.is_empty() {
-                // Nothing was played before there were stages.
+                // Databases from before there were stages have no evaluations.
                 let first = Revision {
                     number: 1,
                     since: now,
@@ -358,7 +359,7 @@ impl Store {
                 settings: Some(settings),
                 ..StageChange::default()
             };
-            change(tx, &stage, wanted, By::Configuration).await
+            change(tx, &stage, wanted, ChangeSource::Configuration).await
         })
         .await
     }

@@ -1,14 +1,14 @@
-//! The cut: a day of a stage starts, with what each team has active.
+//! The cutoff: starts a day of a stage with each team's active submission.
 
 use crate::{
     boxed,
     error::{Result, StoreError},
     event::{Actor, Event, Subject},
     operations::{
-        enter::{Entrant, Turn, enter},
+        new_evaluation::{NewEvaluation, DaySetup, queue_evaluation},
         release_day,
     },
-    reads,
+    queries,
     store::Store,
     tables::{
         days,
@@ -35,117 +35,117 @@ pub(crate) fn check_open(stage: &Stage, now: Timestamp) -> Result<()> {
     })
 }
 
-/// Of which date a cut is.
-pub(crate) enum CutOf<'a> {
+/// The date of the day that a cutoff starts.
+pub(crate) enum CutoffDate<'a> {
     Today,
-    /// One that has passed without, and why it is made up for.
+    /// A past date without a cutoff, and the reason for starting its day late.
     Missed {
         date: Date,
         reason: &'a str,
     },
 }
 
-/// Adds a day that is to be played with what is active now.
-async fn insert(tx: &mut Tx, stage: &Stage, of: CutOf<'_>) -> Result<StageDay> {
+/// Adds a day that is evaluated with the submissions active now.
+async fn insert(tx: &mut Tx, stage: &Stage, cutoff: CutoffDate<'_>) -> Result<StageDay> {
     let now = tx.now;
     let today = stage.day(now);
-    match of {
-        CutOf::Today => {
+    match cutoff {
+        CutoffDate::Today => {
             days::insert(tx, today, stage.deadline(today.date, now), now).await?;
             Ok(today)
         }
-        CutOf::Missed { date, reason } => {
+        CutoffDate::Missed { date, reason } => {
             let first = stage.zone.date(stage.opens_at);
             if date >= today.date {
                 return Err(StoreError::Conflict(format!(
-                    "day: {date} has not passed in the stage's zone, where it is {} now; only a day that was missed \
-                     is made up for",
+                    "day: {date} has not passed in the stage's zone, where it is {} now; only a missed day can be \
+                     started late",
                     today.date
                 )));
             }
             if date < first {
                 return Err(StoreError::Conflict(format!(
-                    "day: {date} is not of the stage, whose first is {first}"
+                    "day: {date} is before the stage's first day, {first}"
                 )));
             }
-            let of = StageDay { date, ..today };
-            days::insert_missed(tx, of, stage.deadline(date, now), reason, now).await?;
+            let stage_day = StageDay { date, ..today };
+            days::insert_missed(tx, stage_day, stage.deadline(date, now), reason, now).await?;
             tx.record(
-                Subject::Day(of),
+                Subject::Day(stage_day),
                 Event::MissedDayStarted {
                     reason: reason.to_owned(),
                 },
             );
-            Ok(of)
+            Ok(stage_day)
         }
     }
 }
 
-async fn cut(tx: &mut Tx, stage: StageId, of: CutOf<'_>) -> Result<(StageDay, Vec<Evaluation>)> {
+async fn start_if_open(tx: &mut Tx, stage: StageId, cutoff: CutoffDate<'_>) -> Result<(StageDay, Vec<Evaluation>)> {
     season::check_open(tx).await?;
     let stage = stages::find(tx, stage).await?;
     check_open(&stage, tx.now)?;
-    begin(tx, &stage, of).await
+    start(tx, &stage, cutoff).await
 }
 
-/// A stage's cut, whether it is open or not.
-pub(crate) async fn begin(
+/// Starts a day of a stage, whether the stage is open or not.
+pub(crate) async fn start(
     tx: &mut Tx,
     stage: &Stage,
-    of: CutOf<'_>,
+    cutoff: CutoffDate<'_>,
 ) -> Result<(StageDay, Vec<Evaluation>)> {
     stage.plan().check()?;
-    let of = insert(tx, stage, of).await?;
-    let turn = Turn {
-        of,
+    let stage_day = insert(tx, stage, cutoff).await?;
+    let setup = DaySetup {
+        stage_day,
         revision: stage.rules.number,
-        seed: stage.seed_label(of.date),
+        seed: stage.seed_label(stage_day.date),
         ruleset: stage.rules.rules.ruleset,
         plan: stage.plan(),
     };
     let mut started = Vec::new();
     for submission in submissions::active(tx).await? {
-        if let Err(why) = stage.check_takes(&submission) {
+        if let Err(why) = stage.check_accepts(&submission) {
             let event = Event::SubmissionNotTaken {
-                stage: of.stage,
-                day: of.date,
+                stage: stage_day.stage,
+                day: stage_day.date,
                 reason: why.to_string(),
             };
             tx.record(Subject::Submission(submission.id), event);
             continue;
         }
-        let entrant = Entrant {
+        let new = NewEvaluation {
             id: EvaluationId::new(),
             submission: submission.id,
             team: submission.team,
             rerun_of: None,
         };
-        let id = enter(tx, entrant, &turn, 0).await?;
-        started.push(reads::evaluations::find(tx, id).await?);
+        let id = queue_evaluation(tx, new, &setup, 0).await?;
+        started.push(queries::evaluations::find(tx, id).await?);
     }
     let evaluations = u32::try_from(started.len()).unwrap_or(u32::MAX);
-    tx.record(Subject::Day(of), Event::DayStarted { evaluations });
-    Ok((of, started))
+    tx.record(Subject::Day(stage_day), Event::DayStarted { evaluations });
+    Ok((stage_day, started))
 }
 
-fn unless_empty(started: Vec<Evaluation>) -> Result<Vec<Evaluation>> {
+fn require_evaluations(started: Vec<Evaluation>) -> Result<Vec<Evaluation>> {
     if started.is_empty() {
-        return Err(nobody_plays());
+        return Err(no_valid_submission());
     }
     Ok(started)
 }
 
-pub(crate) fn nobody_plays() -> StoreError {
+pub(crate) fn no_valid_submission() -> StoreError {
     StoreError::Conflict(
-        "no team has a valid submission that the stage takes, so nothing was started, and the day still has its cut"
+        "no team has a valid submission that the stage accepts, so the day was not started and its cutoff is still available"
             .into(),
     )
 }
 
 impl Store {
-    /// The cut of a stage's day at `now`: queues an evaluation of what each team has active that the stage takes, earliest
-    /// upload first. [`StoreError::DayHasCut`] if the day has had it, [`StoreError::StageNotOpen`] before and
-    /// after the stage, [`StoreError::Conflict`] if no team has anything to play (the day keeps its cut),
+    /// Starts a stage's day at `now`: queues an evaluation of each team's active submission that the stage accepts, the
+    /// earliest upload first. [`StoreError::CutoffPassed`] if the day had its cutoff, [`StoreError::StageNotOpen`] if the
+    /// stage is not open, [`StoreError::Conflict`] if no team has a valid submission (the cutoff remains available),
     /// [`StoreError::SeasonClosed`] once the season is over.
     #[boxed]
     pub async fn start_day(
@@ -155,33 +155,33 @@ impl Store {
         now: Timestamp,
     ) -> Result<Vec<Evaluation>> {
         self.write(actor, now, async |tx| {
-            let (_, started) = cut(tx, stage, CutOf::Today).await?;
-            unless_empty(started)
+            let (_, started) = start_if_open(tx, stage, CutoffDate::Today).await?;
+            require_evaluations(started)
         })
         .await
     }
 
-    /// The cut of a day that was missed, on a date of the stage that has passed: as [`start_day`](Self::start_day),
-    /// with what is active at `now`. [`StoreError::DayHasCut`] if the day has had its own, [`StoreError::Conflict`] if
-    /// the date has not passed or is none of the stage's.
+    /// Starts a missed day of the stage late: as [`start_day`](Self::start_day), with the submissions that are active at
+    /// `now`. [`StoreError::CutoffPassed`] if the day had its cutoff, [`StoreError::Conflict`] if the date has not passed
+    /// or is before the stage.
     #[boxed]
     pub async fn start_missed_day(
         &self,
         actor: Actor,
-        of: StageDay,
+        stage_day: StageDay,
         reason: &str,
         now: Timestamp,
     ) -> Result<Vec<Evaluation>> {
-        let date = of.date;
+        let date = stage_day.date;
         self.write(actor, now, async |tx| {
-            let (_, started) = cut(tx, of.stage, CutOf::Missed { date, reason }).await?;
-            unless_empty(started)
+            let (_, started) = start_if_open(tx, stage_day.stage, CutoffDate::Missed { date, reason }).await?;
+            require_evaluations(started)
         })
         .await
     }
 
-    /// The cut of a stage's day at `now` by the schedule, whoever asks and however often: also of a day that
-    /// nobody has anything to play on. `None` if the day has had its cut, or stage or season are not open.
+    /// Starts a stage's day at `now` on behalf of the schedule, even if no team has a valid submission. Safe to call
+    /// repeatedly. `None` if the day had its cutoff, or the stage or season is not open.
     #[boxed]
     pub async fn start_scheduled_day(
         &self,
@@ -189,14 +189,14 @@ impl Store {
         now: Timestamp,
     ) -> Result<Option<Vec<Evaluation>>> {
         let started = self.write(Actor::Schedule, now, async |tx| {
-            let (of, started) = cut(tx, stage, CutOf::Today).await?;
-            release_day::unless_under_way(tx, of).await?;
+            let (stage_day, started) = start_if_open(tx, stage, CutoffDate::Today).await?;
+            release_day::release_unless_open(tx, stage_day).await?;
             Ok(started)
         });
         match started.await {
             Ok(started) => Ok(Some(started)),
             Err(
-                StoreError::DayHasCut { .. }
+                StoreError::CutoffPassed { .. }
                 | StoreError::StageNotOpen { .. }
                 | StoreError::SeasonClosed { .. },
             ) => Ok(None),

@@ -3,17 +3,17 @@ use faceoff_types::RunId;
 use jiff::Timestamp;
 
 impl Store {
-    /// Keeps the episode summary (JSON) of a run, in place of an earlier one. No event tells of it:
-    /// what it is made from was there before.
+    /// Stores the episode summary (JSON) of a run, replacing an earlier one. No event is recorded, since
+    /// it is derived from data that is already there.
     #[boxed]
-    pub async fn keep_episode_summary(
+    pub async fn store_episode_summary(
         &self,
         run: RunId,
         version: u32,
         summary: &str,
         now: Timestamp,
     ) -> Result<()> {
-        self.keep(Actor::Server, now, async |tx| {
+        self.write_even_archived(Actor::Server, now, async |tx| {
             episode_summaries::put(tx, run, version, summary).await
         })
         .await

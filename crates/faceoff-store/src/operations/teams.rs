@@ -4,11 +4,11 @@ use crate::{
     event::{Actor, Event, Subject},
     operations::{
         invitations::add_team,
-        tokens::{NewToken, add, revoke_all},
+        tokens::{NewToken, add_token, revoke_all},
     },
     store::Store,
     tables::{
-        divisions, people, season,
+        divisions, users, season,
         teams::{self, Team, TeamProfile},
         tokens::{TokenKind, TokenOwner},
     },
@@ -17,28 +17,28 @@ use crate::{
 use faceoff_types::{TeamId, TeamName};
 use jiff::Timestamp;
 
-/// The name of a team's token that came with the team.
+/// Name of the token that is created with a team.
 const FIRST: &str = "first";
 
 async fn give_token(tx: &mut Tx, team: TeamId, hash: [u8; 32]) -> Result<()> {
     let token = NewToken {
         hash,
-        kind: TokenKind::Key,
+        kind: TokenKind::ApiToken,
         owner: TokenOwner::Team(team),
         name: FIRST.to_owned(),
         expires_at: None,
     };
-    add(tx, token).await?;
+    add_token(tx, token).await?;
     Ok(())
 }
 
-/// What of a team is to be another; `None` stays as it is.
+/// Changes of a team; `None` leaves a value unchanged.
 #[derive(Debug, Clone, Default)]
 pub struct TeamChange {
     pub name: Option<TeamName>,
-    /// What it tells of itself, all of it.
+    /// Replaces the whole profile.
     pub profile: Option<TeamProfile>,
-    /// Is it a reference agent of the organisers, which no board ranks?
+    /// Whether it is a reference agent of the organisers, which is not ranked.
     pub baseline: Option<bool>,
 }
 
@@ -61,7 +61,7 @@ impl Store {
         .await
     }
 
-    /// Gives a team another token of its own; all that it had are void from now on. Its members' stay.
+    /// Replaces the tokens of a team by a new one: the old ones are revoked. Its members' tokens stay valid.
     #[boxed]
     pub async fn set_team_token(
         &self,
@@ -80,8 +80,9 @@ impl Store {
         .await
     }
 
-    /// Changes a team's name, or what it tells of itself. [`StoreError::TeamNameTaken`] if another has the name,
-    /// [`StoreError::Conflict`] if there is no such division, or a signed-off board would rank it otherwise, [`StoreError::SeasonClosed`] once the season is over.
+    /// Changes a team's name, profile or baseline status. [`StoreError::TeamNameTaken`] if another team has the name,
+    /// [`StoreError::Conflict`] if there is no such division, or the ranks of a signed-off board would change,
+    /// [`StoreError::SeasonClosed`] once the season is over.
     #[boxed]
     pub async fn change_team(
         &self,
@@ -116,10 +117,10 @@ impl Store {
                 }
             }
             if let Some(baseline) = change.baseline.filter(|new| *new != team.is_baseline) {
-                if let Some(stage) = teams::signed_off_with(tx, id).await? {
+                if let Some(stage) = teams::signed_off_stage(tx, id).await? {
                     return Err(StoreError::Conflict(format!(
-                        "the stage {stage:?} is signed off with results of the team, and its ranks would be others: whether \
-                         the team is a baseline stays as it is. Nothing was changed"
+                        "the stage {stage:?} is signed off with results of the team, and its ranks would change: whether \
+                         the team is a baseline cannot be changed any more. Nothing was changed"
                     )));
                 }
                 teams::set_baseline(tx, id, baseline).await?;
@@ -135,15 +136,15 @@ impl Store {
         .await
     }
 
-    /// Takes a team out of all days to come, by its own wish or an organiser's: it neither uploads nor enters a day. What
-    /// had its cut goes on, and its results stay; if it was an organiser's, its files, too.
-    /// [`StoreError::Conflict`] if it has retired.
+    /// Retires a team, on its own or an organiser's request: it cannot upload and is not evaluated on later days.
+    /// Evaluations that were queued continue, and its results stay. If an organiser retires it, its files are kept, too.
+    /// [`StoreError::Conflict`] if it has retired already.
     #[boxed]
     pub async fn retire_team(&self, actor: Actor, id: TeamId, now: Timestamp) -> Result<Team> {
         self.write(actor.clone(), now, async |tx| {
             let by_organiser = match actor {
                 Actor::Organiser => true,
-                Actor::Person(person) => people::find(tx, person).await?.team.is_none(),
+                Actor::User(user) => users::find(tx, user).await?.team.is_none(),
                 _ => false,
             };
             if teams::find(tx, id).await?.retired_at.is_some() {
@@ -156,7 +157,7 @@ impl Store {
         .await
     }
 
-    /// Lets a team that has retired play again. [`StoreError::Conflict`] if it has not.
+    /// Lets a retired team take part again. [`StoreError::Conflict`] if it has not retired.
     #[boxed]
     pub async fn return_team(&self, actor: Actor, id: TeamId, now: Timestamp) -> Result<Team> {
         self.write(actor, now, async |tx| {

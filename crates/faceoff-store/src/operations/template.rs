@@ -17,8 +17,8 @@ impl Store {
     /// Name of the database in a data folder.
     pub const DATABASE_FILE: &'static str = "faceoff.sqlite3";
 
-    /// A database with this program's schema and nothing in it, not even a season, in `folder`: the one that is there,
-    /// else one that is made. A copy of it in a new data folder spares [`Store::open`] the migrations.
+    /// Path of an empty database in `folder` with this program's schema, without even a season. Created if missing. A
+    /// copy of it in a new data folder spares [`Store::open`] the migrations.
     ///
     /// # Errors
     /// [`StoreError::Database`] if it cannot be written.
@@ -31,10 +31,10 @@ impl Store {
         }
         let failed = |error: io::Error| StoreError::Database(sqlx::Error::Io(error));
         fs::create_dir_all(folder).map_err(failed)?;
-        // Several processes may make one at once, and none may find half of it.
+        // Several processes may create it concurrently, and none may see an incomplete file.
         let unfinished = folder.join(format!("{}.sqlite3", Uuid::now_v7()));
         let database = Database::open(&unfinished).await?;
-        // The last connection to close puts what is in the log into the file.
+        // Closing the last connection writes the log back into the file.
         database.close().await;
         fs::rename(&unfinished, &template).map_err(failed)?;
         Ok(template)

@@ -1,4 +1,4 @@
-//! Keys and sessions: who holds which, and what it is worth.
+//! Tokens of API clients and sessions of browsers: creation, verification, rotation and revocation.
 
 use crate::{
     boxed,
@@ -6,7 +6,7 @@ use crate::{
     event::{Actor, Event, Subject},
     store::Store,
     tables::{
-        people::{self, Person},
+        users::{self, User},
         teams::{self, Team},
         tokens::{self, Token, TokenKind, TokenOwner},
     },
@@ -16,64 +16,62 @@ use faceoff_types::TokenId;
 use jiff::{SignedDuration, Timestamp};
 use sqlx::SqliteConnection;
 
-/// Keys and sessions that one team or person may have at a time.
+/// Valid tokens and sessions that one team or user may have at a time.
 pub const MAX_TOKENS: i64 = 50;
-/// How old the time of the last use may be before it is written again.
-pub const LAST_USE: SignedDuration = SignedDuration::from_mins(1);
-/// For how long a session is good.
-pub const SESSION: SignedDuration = SignedDuration::from_hours(14 * 24);
-/// For how long the list of a person's sessions shows one that is worth nothing any more.
-const SESSION_SHOWN: SignedDuration = SignedDuration::from_hours(30 * 24);
+/// Minimum interval between two updates of a token's last use.
+pub const LAST_USE_INTERVAL: SignedDuration = SignedDuration::from_mins(1);
+/// Time from a session's start to its expiry.
+pub const SESSION_LIFETIME: SignedDuration = SignedDuration::from_hours(14 * 24);
+/// Time for which a user's expired or revoked sessions are still listed.
+const SESSION_LISTED_FOR: SignedDuration = SignedDuration::from_hours(30 * 24);
 
-/// Who calls with a token.
+/// A valid token with its principal.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Holder {
+pub struct VerifiedToken {
     pub token: Token,
-    pub who: Who,
+    pub principal: Principal,
 }
 
-/// Whom a good token speaks for.
+/// The user, team or host that a token authenticates.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Who {
-    /// Whoever may read the data folder.
+pub enum Principal {
+    /// The operator with access to the data folder.
     Host,
     Team(Team),
-    Organiser(Person),
-    /// A member of a team.
-    Member(Person, Team),
+    Organiser(User),
+    Member(User, Team),
 }
 
-/// A token to be made; the token itself is the caller's.
+/// A token to be created. The caller makes its text; only the hash is stored.
 #[derive(Debug, Clone)]
 pub struct NewToken {
-    /// Of the token's text.
+    /// Hash of the token's text.
     pub hash: [u8; 32],
     pub kind: TokenKind,
-    /// By whom it speaks.
     pub owner: TokenOwner,
-    /// What its owner calls it.
+    /// Label chosen by the owner.
     pub name: String,
-    /// From then on it is worth nothing; none: it has no end.
+    /// `None`: it does not expire.
     pub expires_at: Option<Timestamp>,
 }
 
-/// The name of the token that the host has in a file of the data folder.
+/// Name of the host token that is kept in a file of the data folder.
 const HOST_FILE: &str = "admin-token";
 
 const fn subject(owner: TokenOwner) -> Subject {
     match owner {
         TokenOwner::Host => Subject::Season,
         TokenOwner::Team(id) => Subject::Team(id),
-        TokenOwner::Person(id) => Subject::Person(id),
+        TokenOwner::User(id) => Subject::User(id),
     }
 }
 
-/// Adds a token. [`StoreError::Conflict`] if its owner has as many as one may have.
-pub(crate) async fn add(tx: &mut Tx, new: NewToken) -> Result<Token> {
+/// Adds a token. [`StoreError::Conflict`] if its owner has [`MAX_TOKENS`].
+pub(crate) async fn add_token(tx: &mut Tx, new: NewToken) -> Result<Token> {
     let now = tx.now;
-    if tokens::count_good(tx, new.owner, now).await? >= MAX_TOKENS {
+    if tokens::count_valid(tx, new.owner, now).await? >= MAX_TOKENS {
         return Err(StoreError::Conflict(format!(
-            "there are {MAX_TOKENS} tokens already, and no more than that at a time: revoke one that is not needed \
+            "there are {MAX_TOKENS} tokens already, which is the limit: revoke one that is not needed \
              (DELETE /api/v1/tokens/ID)"
         )));
     }
@@ -95,7 +93,7 @@ pub(crate) async fn add(tx: &mut Tx, new: NewToken) -> Result<Token> {
     };
     tokens::insert(tx, &token, new.hash).await?;
     let event = match token.kind {
-        TokenKind::Key => Event::TokenCreated {
+        TokenKind::ApiToken => Event::TokenCreated {
             token: token.id,
             name: token.name.clone(),
             expires_at: token.expires_at,
@@ -106,122 +104,120 @@ pub(crate) async fn add(tx: &mut Tx, new: NewToken) -> Result<Token> {
     tokens::find(tx, token.id).await
 }
 
-/// Ends all that an owner has, but one.
+/// Revokes all tokens and sessions of an owner but `except`.
 pub(crate) async fn revoke_all(
     tx: &mut Tx,
     owner: TokenOwner,
-    kept: Option<TokenId>,
+    except: Option<TokenId>,
 ) -> Result<()> {
     let now = tx.now;
-    tokens::revoke_others(tx, owner, kept, now).await
+    tokens::revoke_others(tx, owner, except, now).await
 }
 
-async fn who(connection: &mut SqliteConnection, token: &Token) -> Result<Option<Who>> {
+async fn principal_of(connection: &mut SqliteConnection, token: &Token) -> Result<Option<Principal>> {
     Ok(match token.owner {
-        TokenOwner::Host => Some(Who::Host),
-        TokenOwner::Team(id) => Some(Who::Team(teams::find(connection, id).await?)),
-        TokenOwner::Person(id) => {
-            let person = people::find(connection, id).await?;
-            match person.team {
-                _ if person.left_at.is_some() => None,
-                None => Some(Who::Organiser(person)),
-                Some(team) => Some(Who::Member(person, teams::find(connection, team).await?)),
+        TokenOwner::Host => Some(Principal::Host),
+        TokenOwner::Team(id) => Some(Principal::Team(teams::find(connection, id).await?)),
+        TokenOwner::User(id) => {
+            let user = users::find(connection, id).await?;
+            match user.team {
+                _ if user.left_at.is_some() => None,
+                None => Some(Principal::Organiser(user)),
+                Some(team) => Some(Principal::Member(user, teams::find(connection, team).await?)),
             }
         }
     })
 }
 
-/// A token that came, or what it signed, as of `now`.
-async fn held(
+/// Checks at `now` that a presented token is valid, and finds its principal.
+async fn check_token(
     connection: &mut SqliteConnection,
     token: Token,
     now: Timestamp,
-) -> Result<Result<Holder, Refusal>> {
+) -> Result<Result<VerifiedToken, TokenRejection>> {
     if let Some(at) = token.revoked_at {
-        return Ok(Err(Refusal::Revoked(at)));
+        return Ok(Err(TokenRejection::Revoked(at)));
     }
     match token.expires_at {
-        Some(at) if at <= now => return Ok(Err(Refusal::Expired(at))),
+        Some(at) if at <= now => return Ok(Err(TokenRejection::Expired(at))),
         _ => {}
     }
-    let who = who(connection, &token).await?;
-    Ok(who
-        .map(|who| Holder { token, who })
-        .ok_or(Refusal::Revoked(now)))
+    let principal = principal_of(connection, &token).await?;
+    Ok(principal
+        .map(|principal| VerifiedToken { token, principal })
+        .ok_or(TokenRejection::Revoked(now)))
 }
 
-/// Why a token opens nothing.
+/// Why a token is rejected.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Refusal {
-    /// There is none of this hash.
+pub enum TokenRejection {
+    /// There is no token with this hash.
     Unknown,
-    /// It came the other way: a key as a cookie, or a session in the header.
+    /// A token was sent as a cookie, or a session in the header.
     WrongKind,
-    /// It was revoked then, or its owner left.
+    /// Time of the revocation, or of the check if the owner has left.
     Revoked(Timestamp),
-    /// It was good until then.
+    /// Time of the expiry.
     Expired(Timestamp),
 }
 
 impl Store {
-    /// Who holds the token of this hash, as of `now`: what is revoked or expired is refused from that moment on.
+    /// Verifies the token with this hash at `now`: revoked and expired tokens are rejected at once.
     #[boxed]
-    pub async fn holder(
+    pub async fn verify_token(
         &self,
         hash: [u8; 32],
         kind: TokenKind,
         now: Timestamp,
-    ) -> Result<Result<Holder, Refusal>> {
+    ) -> Result<Result<VerifiedToken, TokenRejection>> {
         let mut connection = self.database.read.acquire().await?;
         let Some(token) = tokens::by_hash(&mut connection, hash).await? else {
-            return Ok(Err(Refusal::Unknown));
+            return Ok(Err(TokenRejection::Unknown));
         };
         if token.kind != kind {
-            return Ok(Err(Refusal::WrongKind));
+            return Ok(Err(TokenRejection::WrongKind));
         }
-        held(&mut connection, token, now).await
+        check_token(&mut connection, token, now).await
     }
 
-    /// Who holds the token with this id, as of `now`, for whoever has something that was signed with its
-    /// [hash](Store::token_hash).
+    /// Verifies the token with this id at `now`, for a request signed with the token's [hash](Store::token_hash).
     #[boxed]
-    pub async fn holder_of(&self, id: TokenId, now: Timestamp) -> Result<Result<Holder, Refusal>> {
+    pub async fn verify_token_id(&self, id: TokenId, now: Timestamp) -> Result<Result<VerifiedToken, TokenRejection>> {
         let mut connection = self.database.read.acquire().await?;
         let token = tokens::find(&mut connection, id).await?;
-        held(&mut connection, token, now).await
+        check_token(&mut connection, token, now).await
     }
 
-    /// The hash of a token's text, which another secret changes. It is a key to sign with: nobody but the server and
-    /// whoever has the token knows it.
+    /// Hash of a token's text; it changes on rotation. Serves as a signing key, since only the server and the token's
+    /// owner know it.
     #[boxed]
     pub async fn token_hash(&self, id: TokenId) -> Result<[u8; 32]> {
         tokens::hash_of(&mut *self.database.read.acquire().await?, id).await
     }
 
-    /// Notes that a token was used. Often enough is once in [`LAST_USE`].
+    /// Records that a token was used. Callers need not call it more often than every [`LAST_USE_INTERVAL`].
     #[boxed]
-    pub async fn token_used(&self, token: &Token, now: Timestamp) -> Result<()> {
-        self.keep(Actor::Server, now, async |tx| {
+    pub async fn record_token_use(&self, token: &Token, now: Timestamp) -> Result<()> {
+        self.write_even_archived(Actor::Server, now, async |tx| {
             tokens::set_last_used(tx, token.id, now).await
         })
         .await
     }
 
-    /// Makes a token. [`StoreError::Conflict`] if its owner has as many as one may have, or it would be worth
-    /// nothing.
+    /// Creates a token. [`StoreError::Conflict`] if its owner has [`MAX_TOKENS`], or it would be expired.
     #[boxed]
     pub async fn create_token(&self, actor: Actor, new: NewToken, now: Timestamp) -> Result<Token> {
         self.write(actor, now, async |tx| {
-            if let Ok(long_ago) = now.checked_sub(SESSION_SHOWN) {
-                tokens::forget(tx, long_ago).await?;
+            if let Ok(long_ago) = now.checked_sub(SESSION_LISTED_FOR) {
+                tokens::delete_old_sessions(tx, long_ago).await?;
             }
-            add(tx, new).await
+            add_token(tx, new).await
         })
         .await
     }
 
-    /// Gives a token another secret; from now on the old one is worth nothing. [`StoreError::Conflict`] if the token
-    /// is not a key, is worth nothing, or is the one of the host's file, which would still have the old secret.
+    /// Replaces the secret of a token; the old one is invalid from now on. [`StoreError::Conflict`] if it is a session,
+    /// is expired or revoked, or is the host's file token, whose file would still have the old secret.
     #[boxed]
     pub async fn rotate_token(
         &self,
@@ -234,20 +230,20 @@ impl Store {
             let token = tokens::find(tx, id).await?;
             if token.kind == TokenKind::Session {
                 return Err(StoreError::Conflict(
-                    "a session has no secret that anybody could use: end it, or sign in again"
+                    "a session has no secret that could be rotated: end it, or sign in again"
                         .into(),
                 ));
             }
             if token.owner == TokenOwner::Host && token.name == HOST_FILE {
                 return Err(StoreError::Conflict(
-                    "the host's token stands in the server's data folder (admin-token), which would keep the old one: \
-                     revoke it, and the next start of the server leaves another there"
+                    "the host's token is a file in the server's data folder (admin-token), which would keep the old one: \
+                     revoke it, and the server writes a new one at its next start"
                         .into(),
                 ));
             }
-            if !token.is_good(now) {
+            if !token.is_valid(now) {
                 return Err(StoreError::Conflict(
-                    "the token is revoked or has expired, and stays so: make another one".into(),
+                    "the token is revoked or has expired, which is final: create another one".into(),
                 ));
             }
             tokens::set_hash(tx, id, hash).await?;
@@ -261,7 +257,7 @@ impl Store {
         .await
     }
 
-    /// Ends a token: from now on it is worth nothing. One that is worth nothing stays as it is.
+    /// Revokes a token, effective at once. A revoked token is left unchanged.
     #[boxed]
     pub async fn revoke_token(&self, actor: Actor, id: TokenId, now: Timestamp) -> Result<Token> {
         self.write(actor, now, async |tx| {
@@ -279,14 +275,14 @@ impl Store {
         .await
     }
 
-    /// Lets the token of this hash be the host's, and none that was the host's file's before. False if it is revoked:
-    /// the host needs another one.
+    /// Makes the token with this hash the host's file token, and revokes the previous one. False if it is revoked or
+    /// expired: the host needs a new one.
     #[boxed]
     pub async fn set_host_token(&self, hash: [u8; 32], now: Timestamp) -> Result<bool> {
-        self.keep(Actor::Server, now, async |tx| {
+        self.write_even_archived(Actor::Server, now, async |tx| {
             let known = tokens::by_hash(tx, hash).await?;
             if let Some(known) = known {
-                return Ok(known.owner == TokenOwner::Host && known.is_good(now));
+                return Ok(known.owner == TokenOwner::Host && known.is_valid(now));
             }
             let before = tokens::all(tx).await?.into_iter().filter(|token| {
                 token.owner == TokenOwner::Host
@@ -300,24 +296,23 @@ impl Store {
             }
             let new = NewToken {
                 hash,
-                kind: TokenKind::Key,
+                kind: TokenKind::ApiToken,
                 owner: TokenOwner::Host,
                 name: HOST_FILE.to_owned(),
                 expires_at: None,
             };
-            add(tx, new).await?;
+            add_token(tx, new).await?;
             Ok(true)
         })
         .await
     }
 
-    /// All keys and sessions, the newest first.
+    /// All tokens and sessions, the newest first.
     #[boxed]
     pub async fn tokens(&self) -> Result<Vec<Token>> {
         tokens::all(&mut *self.database.read.acquire().await?).await
     }
 
-    /// The token with this id.
     #[boxed]
     pub async fn token(&self, id: TokenId) -> Result<Token> {
         tokens::find(&mut *self.database.read.acquire().await?, id).await

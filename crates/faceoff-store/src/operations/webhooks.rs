@@ -1,4 +1,4 @@
-//! Webhooks: who has which, what they are told, and what came of it.
+//! Webhooks with their deliveries and delivery attempts.
 
 use crate::{
     boxed,
@@ -8,74 +8,71 @@ use crate::{
     tables::{
         deliveries::{self, Delivery, DeliveryAttempt, DeliveryState},
         events,
-        webhooks::{self, DeadWebhook, Webhook, WebhookKeys},
+        webhooks::{self, DisabledWebhook, Webhook, WebhookSecrets},
     },
     write::Tx,
 };
 use faceoff_types::{DeliveryId, TeamId, WebhookId};
 use jiff::{SignedDuration, Timestamp};
 
-/// Webhooks of a team at a time.
+/// Webhooks that a team may have.
 pub const MAX_TEAM_WEBHOOKS: i64 = 5;
-/// Webhooks of the organisers at a time.
+/// Webhooks that the organisers may have.
 pub const MAX_ORGANISER_WEBHOOKS: i64 = 20;
-/// Deliveries of a webhook that wait at a time, nearly: what happens meanwhile becomes deliveries later.
-pub const MAX_WAITING_DELIVERIES: u32 = 100;
-/// For how long a secret that was replaced still signs.
-pub const OLD_SECRET: SignedDuration = SignedDuration::from_hours(24);
-/// A webhook that has taken nothing for so long is dead.
-pub const FAILING_FOR: SignedDuration = SignedDuration::from_hours(3 * 24);
-/// For how long deliveries are kept that are over.
-pub const DELIVERIES_KEPT: SignedDuration = SignedDuration::from_hours(14 * 24);
+/// Approximate limit of a webhook's pending deliveries. Later events are turned into deliveries once it falls below.
+pub const MAX_PENDING_DELIVERIES: u32 = 100;
+/// Time for which a replaced secret still signs.
+pub const OLD_SECRET_VALID_FOR: SignedDuration = SignedDuration::from_hours(24);
+/// Time of continuous failure after which a webhook is disabled.
+pub const DISABLED_AFTER: SignedDuration = SignedDuration::from_hours(3 * 24);
+/// Time for which ended deliveries are kept.
+pub const DELIVERIES_KEPT_FOR: SignedDuration = SignedDuration::from_hours(14 * 24);
 
-/// A webhook to be made.
+/// A webhook to be created.
 #[derive(Debug, Clone)]
 pub struct NewWebhook {
-    /// Whose; none: the organisers'.
+    /// `None`: it belongs to the organisers.
     pub team: Option<TeamId>,
-    /// What its owner calls it.
     pub name: String,
-    /// Where it is; whether it may be there is the caller's to say.
+    /// Address of the receiver; the caller has checked that it is allowed.
     pub url: String,
-    /// What it is told of.
+    /// Topics, subjects and event kinds that are sent; empty: all.
     pub about: Vec<String>,
-    /// With what it is signed.
+    /// Key that signs the messages.
     pub secret: [u8; 32],
 }
 
-/// What is to be otherwise; what is `None` stays.
+/// Changes of a webhook; `None` leaves a value unchanged.
 #[derive(Debug, Clone, Default)]
 pub struct WebhookChange {
-    /// What its owner calls it.
     pub name: Option<String>,
     pub url: Option<String>,
-    /// What it is told of.
     pub about: Option<Vec<String>>,
-    /// Is one that is dead told of what happens from now on?
-    pub revived: bool,
+    /// Enables a disabled webhook again, for events from now on.
+    pub enable: bool,
 }
 
-/// What events have become, for one webhook.
+/// Deliveries of one webhook that were made from a range of events.
 #[derive(Debug, Clone)]
 pub struct PlannedDeliveries {
     pub webhook: WebhookId,
-    /// Where it stood when they were planned.
+    /// Last event that the webhook had seen when they were planned.
     pub after: i64,
-    /// All events until this one are dealt with.
+    /// Last event of the range.
     pub until: i64,
-    /// The event's id, what happened, and what is sent.
+    /// Event id, event kind and message body of each delivery.
     pub bodies: Vec<(i64, String, String)>,
 }
 
-/// What an attempt means.
+/// Outcome of a delivery attempt.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum AttemptMeans {
-    Taken,
-    /// It is sent again then; never again, if there is no time.
+pub enum DeliveryOutcome {
+    Accepted,
+    /// Time of the next attempt; `None`: the delivery is given up.
     Failed {
-        again_at: Option<Timestamp>,
+        retry_at: Option<Timestamp>,
     },
-    /// The receiver wants nothing any more.
+    /// The receiver does not want any more messages (410).
     Gone,
 }
 
@@ -86,8 +83,8 @@ const fn subject(webhook: &Webhook) -> Subject {
     }
 }
 
-/// One that is sent at once.
-fn fresh(
+/// A delivery that is due at once.
+fn new_delivery(
     webhook: WebhookId,
     event: Option<i64>,
     kind: String,
@@ -103,15 +100,15 @@ fn fresh(
         created_at: now,
         attempts: 0,
         last: None,
-        state: DeliveryState::Waiting { next_at: now },
+        state: DeliveryState::Pending { next_at: now },
     }
 }
 
-/// Sends nothing more to a webhook.
-async fn die(tx: &mut Tx, mut webhook: Webhook, reason: String) -> Result<()> {
+/// Disables a webhook and gives up its pending deliveries.
+async fn disable(tx: &mut Tx, mut webhook: Webhook, reason: String) -> Result<()> {
     let now = tx.now;
     deliveries::give_up(tx, webhook.id, now).await?;
-    webhook.dead = Some(DeadWebhook {
+    webhook.disabled = Some(DisabledWebhook {
         at: now,
         reason: reason.clone(),
     });
@@ -131,20 +128,18 @@ impl Store {
         webhooks::all(&mut *self.database.read.acquire().await?).await
     }
 
-    /// The webhook with this id.
     #[boxed]
     pub async fn webhook(&self, id: WebhookId) -> Result<Webhook> {
         webhooks::find(&mut *self.database.read.acquire().await?, id).await
     }
 
-    /// With what a webhook is signed at `now`.
+    /// Secrets that sign a webhook's messages at `now`.
     #[boxed]
-    pub async fn webhook_keys(&self, id: WebhookId, now: Timestamp) -> Result<WebhookKeys> {
-        webhooks::keys(&mut *self.database.read.acquire().await?, id, now).await
+    pub async fn webhook_keys(&self, id: WebhookId, now: Timestamp) -> Result<WebhookSecrets> {
+        webhooks::secrets(&mut *self.database.read.acquire().await?, id, now).await
     }
 
-    /// Makes a webhook, which is told of what happens from now on. [`StoreError::Conflict`] if its owner has as many as
-    /// one may have.
+    /// Creates a webhook for events from now on. [`StoreError::Conflict`] if its owner has as many as allowed.
     #[boxed]
     pub async fn create_webhook(
         &self,
@@ -153,13 +148,13 @@ impl Store {
         now: Timestamp,
     ) -> Result<Webhook> {
         self.write(actor, now, async |tx| {
-            let most = match new.team {
+            let limit = match new.team {
                 Some(_) => MAX_TEAM_WEBHOOKS,
                 None => MAX_ORGANISER_WEBHOOKS,
             };
-            if webhooks::count(tx, new.team).await? >= most {
+            if webhooks::count(tx, new.team).await? >= limit {
                 return Err(StoreError::Conflict(format!(
-                    "there are {most} webhooks already, and no more than that at a time: remove one (DELETE \
+                    "there are {limit} webhooks already, which is the limit: remove one (DELETE \
                      /api/v1/webhooks/ID)"
                 )));
             }
@@ -168,11 +163,11 @@ impl Store {
                 team: new.team,
                 name: new.name,
                 url: new.url,
-                about: new.about,
+                topics: new.about,
                 created_at: now,
                 seen: events::newest_id(tx).await?,
                 failing_since: None,
-                dead: None,
+                disabled: None,
                 old_secret_until: None,
             };
             webhooks::insert(tx, &webhook, new.secret).await?;
@@ -186,7 +181,7 @@ impl Store {
         .await
     }
 
-    /// Changes a webhook. One that is revived is told of what happens from now on.
+    /// Changes a webhook.
     #[boxed]
     pub async fn change_webhook(
         &self,
@@ -201,12 +196,12 @@ impl Store {
             webhook.name = change.name.unwrap_or(webhook.name);
             webhook.url = change.url.unwrap_or(webhook.url);
             if webhook.url != before.url {
-                // What another address did not take is not held against this one.
+                // Failures of the old address do not count for the new one.
                 webhook.failing_since = None;
             }
-            webhook.about = change.about.unwrap_or(webhook.about);
-            if change.revived && webhook.dead.is_some() {
-                webhook.dead = None;
+            webhook.topics = change.about.unwrap_or(webhook.topics);
+            if change.enable && webhook.disabled.is_some() {
+                webhook.disabled = None;
                 webhook.failing_since = None;
                 webhook.seen = events::newest_id(tx).await?;
             }
@@ -223,7 +218,7 @@ impl Store {
         .await
     }
 
-    /// Gives a webhook another secret; for [`OLD_SECRET`] the old one signs, too.
+    /// Replaces a webhook's secret; the old one also signs for [`OLD_SECRET_VALID_FOR`].
     #[boxed]
     pub async fn rotate_webhook(
         &self,
@@ -238,7 +233,7 @@ impl Store {
                 tx,
                 id,
                 secret,
-                now.saturating_add(OLD_SECRET).unwrap_or(now),
+                now.saturating_add(OLD_SECRET_VALID_FOR).unwrap_or(now),
             )
             .await?;
             let name = webhook.name.clone();
@@ -267,15 +262,15 @@ impl Store {
         .await
     }
 
-    /// Those that are alive, have not seen what happened last, and have room for deliveries.
+    /// Enabled webhooks that have not seen the newest events and are below the limit of pending deliveries.
     #[boxed]
-    pub async fn webhooks_behind(&self) -> Result<Vec<Webhook>> {
+    pub async fn webhooks_with_new_events(&self) -> Result<Vec<Webhook>> {
         let mut connection = self.database.read.acquire().await?;
         let newest = events::newest_id(&mut connection).await?;
-        webhooks::behind(&mut connection, newest, MAX_WAITING_DELIVERIES).await
+        webhooks::with_new_events(&mut connection, newest, MAX_PENDING_DELIVERIES).await
     }
 
-    /// Notes what events have become; what another has planned meanwhile stays as it is.
+    /// Adds planned deliveries. A plan is skipped if the webhook's events were planned otherwise meanwhile.
     #[boxed]
     pub async fn plan_deliveries(
         &self,
@@ -294,11 +289,11 @@ impl Store {
                     Err(StoreError::NotFound(_)) => continue,
                     found => found?,
                 };
-                if found.seen != after || found.dead.is_some() {
+                if found.seen != after || found.disabled.is_some() {
                     continue;
                 }
                 for (event, kind, body) in bodies {
-                    let delivery = fresh(webhook, Some(event), kind, body, now);
+                    let delivery = new_delivery(webhook, Some(event), kind, body, now);
                     deliveries::insert(tx, &delivery).await?;
                 }
                 webhooks::set_seen(tx, webhook, until).await?;
@@ -308,7 +303,7 @@ impl Store {
         .await
     }
 
-    /// Tells a webhook something that has not happened. [`StoreError::Conflict`] if it is dead, or as much waits as may.
+    /// Queues a test message to a webhook. [`StoreError::Conflict`] if it is disabled, or a test message is pending.
     #[boxed]
     pub async fn test_webhook(
         &self,
@@ -319,83 +314,83 @@ impl Store {
     ) -> Result<Delivery> {
         self.write(Actor::Server, now, async |tx| {
             let webhook = webhooks::find(tx, id).await?;
-            if let Some(dead) = webhook.dead {
+            if let Some(disabled) = webhook.disabled {
                 return Err(StoreError::Conflict(format!(
-                    "nothing is sent there since {} ({}): revive it first (PATCH /api/v1/webhooks/ID with \
+                    "the webhook is disabled since {} ({}): enable it first (PATCH /api/v1/webhooks/ID with \
                      {{\"state\":\"alive\"}})",
-                    dead.at.strftime("%Y-%m-%d %H:%M UTC"),
-                    dead.reason
+                    disabled.at.strftime("%Y-%m-%d %H:%M UTC"),
+                    disabled.reason
                 )));
             }
-            let newest = deliveries::of(tx, id, MAX_WAITING_DELIVERIES).await?;
-            let waits = newest.iter().filter(|one| one.event.is_none()).any(|one| {
-                matches!(one.state, DeliveryState::Waiting { .. })
+            let newest = deliveries::of_webhook(tx, id, MAX_PENDING_DELIVERIES).await?;
+            let is_pending = newest.iter().filter(|one| one.event.is_none()).any(|one| {
+                matches!(one.state, DeliveryState::Pending { .. })
             });
-            if waits {
+            if is_pending {
                 return Err(StoreError::Conflict(
-                    "a test waits to be sent already: GET /api/v1/webhooks/ID/deliveries shows what comes of it".into(),
+                    "a test message is pending already: GET /api/v1/webhooks/ID/deliveries shows its result".into(),
                 ));
             }
-            let delivery = fresh(id, None, kind.to_owned(), body.to_owned(), now);
+            let delivery = new_delivery(id, None, kind.to_owned(), body.to_owned(), now);
             deliveries::insert(tx, &delivery).await?;
-            // Nothing has happened; whoever sends is woken all the same.
-            tx.advanced(Subject::Season);
+            // There is no event, but the deliverer must wake up.
+            tx.record_progress(Subject::Season);
             deliveries::find(tx, delivery.id).await
         })
         .await
     }
 
-    /// Of each webhook what has been due for longest at `now`, the longest first.
+    /// The oldest due delivery of each webhook at `now`, the oldest first.
     #[boxed]
     pub async fn due_deliveries(&self, now: Timestamp) -> Result<Vec<Delivery>> {
         deliveries::due(&mut *self.database.read.acquire().await?, now).await
     }
 
-    /// When something is to be sent next, if anything waits.
+    /// When the next delivery is due; `None` if none is pending.
     #[boxed]
-    pub async fn next_delivery(&self) -> Result<Option<Timestamp>> {
+    pub async fn next_delivery_at(&self) -> Result<Option<Timestamp>> {
         deliveries::next_due(&mut *self.database.read.acquire().await?).await
     }
 
-    /// What a webhook was told, the newest first.
+    /// Deliveries of a webhook, the newest first.
     #[boxed]
     pub async fn deliveries(&self, id: WebhookId, limit: u32) -> Result<Vec<Delivery>> {
-        deliveries::of(&mut *self.database.read.acquire().await?, id, limit).await
+        deliveries::of_webhook(&mut *self.database.read.acquire().await?, id, limit).await
     }
 
-    /// Notes what came of sending something. A webhook that takes nothing for [`FAILING_FOR`], or wants nothing, is dead.
+    /// Records a delivery attempt. A webhook that fails for [`DISABLED_AFTER`], or answers 410, is disabled.
     #[boxed]
-    pub async fn note_attempt(
+    pub async fn record_attempt(
         &self,
         id: DeliveryId,
         attempt: DeliveryAttempt,
-        means: AttemptMeans,
+        outcome: DeliveryOutcome,
     ) -> Result<()> {
         let now = attempt.at;
         self.write(Actor::Server, now, async |tx| {
             let delivery = match deliveries::find(tx, id).await {
-                // Its webhook was removed while it was sent.
+                // The webhook was removed during the attempt.
                 Err(StoreError::NotFound(_)) => return Ok(()),
                 found => found?,
             };
             let mut webhook = webhooks::find(tx, delivery.webhook).await?;
-            let state = match means {
-                AttemptMeans::Taken => DeliveryState::Delivered { at: now },
-                AttemptMeans::Failed {
-                    again_at: Some(next_at),
-                } => DeliveryState::Waiting { next_at },
-                AttemptMeans::Failed { again_at: None } | AttemptMeans::Gone => {
+            let state = match outcome {
+                DeliveryOutcome::Accepted => DeliveryState::Delivered { at: now },
+                DeliveryOutcome::Failed {
+                    retry_at: Some(next_at),
+                } => DeliveryState::Pending { next_at },
+                DeliveryOutcome::Failed { retry_at: None } | DeliveryOutcome::Gone => {
                     DeliveryState::GivenUp { at: now }
                 }
             };
             deliveries::set_attempt(tx, id, &attempt, state).await?;
-            if webhook.dead.is_some() {
+            if webhook.disabled.is_some() {
                 deliveries::give_up(tx, webhook.id, now).await?;
                 return Ok(());
             }
-            let failing_since = match means {
-                AttemptMeans::Taken => None,
-                AttemptMeans::Failed { .. } | AttemptMeans::Gone => {
+            let failing_since = match outcome {
+                DeliveryOutcome::Accepted => None,
+                DeliveryOutcome::Failed { .. } | DeliveryOutcome::Gone => {
                     Some(webhook.failing_since.unwrap_or(now))
                 }
             };
@@ -403,24 +398,24 @@ impl Store {
                 webhook.failing_since = failing_since;
                 webhooks::update(tx, &webhook).await?;
             }
-            match (means, failing_since) {
-                (AttemptMeans::Gone, _) => {
-                    die(
+            match (outcome, failing_since) {
+                (DeliveryOutcome::Gone, _) => {
+                    disable(
                         tx,
                         webhook,
-                        "it answered 410: it wants nothing any more".into(),
+                        "it answered 410: it does not want any more messages".into(),
                     )
                     .await
                 }
-                // By a message that was sent again and again: one that failed once after a quiet time says little.
-                (AttemptMeans::Failed { again_at: None }, Some(since))
-                    if now.duration_since(since) >= FAILING_FOR =>
+                // Only after a message failed in all its attempts: a single failure after a quiet time means little.
+                (DeliveryOutcome::Failed { retry_at: None }, Some(since))
+                    if now.duration_since(since) >= DISABLED_AFTER =>
                 {
                     let why = attempt.error.unwrap_or_default();
-                    let hours = FAILING_FOR.as_hours();
+                    let hours = DISABLED_AFTER.as_hours();
                     let reason =
-                        format!("it has taken nothing for {hours} hours; the last time: {why}");
-                    die(tx, webhook, reason).await
+                        format!("it has accepted no message for {hours} hours; last error: {why}");
+                    disable(tx, webhook, reason).await
                 }
                 _ => Ok(()),
             }
@@ -428,14 +423,14 @@ impl Store {
         .await
     }
 
-    /// Forgets deliveries that were over [`DELIVERIES_KEPT`] ago. How many.
+    /// Deletes deliveries that ended at least [`DELIVERIES_KEPT_FOR`] ago. Returns how many.
     #[boxed]
-    pub async fn forget_deliveries(&self, now: Timestamp) -> Result<u64> {
+    pub async fn delete_old_deliveries(&self, now: Timestamp) -> Result<u64> {
         let before = now
-            .saturating_sub(DELIVERIES_KEPT)
+            .saturating_sub(DELIVERIES_KEPT_FOR)
             .unwrap_or(Timestamp::MIN);
         self.write(Actor::Server, now, async |tx| {
-            deliveries::forget(tx, before).await
+            deliveries::delete_settled(tx, before).await
         })
         .await
     }

@@ -1,4 +1,4 @@
-//! What a team does with its submissions beside choosing one.
+//! Withdrawal of a submission.
 
 use crate::{
     boxed,
@@ -14,9 +14,9 @@ use faceoff_types::SubmissionId;
 use jiff::Timestamp;
 
 impl Store {
-    /// Takes a submission back: it enters no further day. If it was active, nothing of its team is, until that chooses
-    /// one or uploads another. A day that had its cut goes on. [`StoreError::Conflict`] if it could not play, or was
-    /// withdrawn; [`StoreError::SeasonClosed`] once the season is over.
+    /// Withdraws a submission: it is not evaluated on later days. If it was active, its team has no active submission
+    /// until it chooses or uploads another one. Days past their cutoff are not affected. [`StoreError::Conflict`] if the
+    /// submission is not valid, or was withdrawn; [`StoreError::SeasonClosed`] once the season is over.
     #[boxed]
     pub async fn withdraw_submission(
         &self,
@@ -34,7 +34,7 @@ impl Store {
                 SubmissionState::Valid | SubmissionState::Validating => {}
                 SubmissionState::Invalid { .. } | SubmissionState::ValidationError { .. } => {
                     return Err(StoreError::Conflict(
-                        "it plays no day as it is: there is nothing to withdraw".into(),
+                        "it is not valid and never evaluated: there is nothing to withdraw".into(),
                     ));
                 }
             }

@@ -1,10 +1,10 @@
-//! What a worker on another machine did is not believed any more, or again.
+//! Bans of remote workers whose results are not trusted.
 
 use crate::{
     boxed,
     error::{Result, StoreError},
     event::{Actor, Event, Subject},
-    operations::give_back::give_back_all,
+    operations::lease_release::release_all_held,
     queue,
     store::Store,
     tables::{
@@ -16,9 +16,9 @@ use crate::{
 use jiff::Timestamp;
 
 impl Store {
-    /// Takes nothing of a worker any more. What it has under way is given to others at once, and what it played of runs that are not over is
-    /// played again; how many shards that is. What is over stays, to be judged by people ([`played_by`](Self::played_by)).
-    /// [`StoreError::Conflict`] if it is banned already.
+    /// Bans a worker. Its running jobs return to the queue at once, and the shards that it committed in unfinished runs
+    /// are run again; returns the number of those shards. Finished results stay, for organisers to review
+    /// ([`results_of_worker`](Self::results_of_worker)). [`StoreError::Conflict`] if it is banned already.
     #[boxed]
     pub async fn ban_worker(
         &self,
@@ -35,19 +35,19 @@ impl Store {
                 reason: reason.to_owned(),
             },
         );
-        let again = self
+        let discarded = self
             .write(actor, now, async |tx| {
                 if !worker_bans::insert(tx, &ban).await? {
                     return Err(StoreError::Conflict(format!(
                         "the worker {worker} is banned already"
                     )));
                 }
-                // Also of what is just being looked at: it was played by somebody who is not believed.
-                give_back_all(tx, &holder).await?;
-                let played = shards::of_running_by(tx, &holder).await?;
+                // Also pending results: they come from a worker that is not trusted.
+                release_all_held(tx, &holder).await?;
+                let played = shards::committed_by(tx, &holder).await?;
                 for shard in &played {
-                    shards::take_back(tx, shard.id).await?;
-                    queue::queue_again(tx, shard.unit).await?;
+                    shards::clear_result(tx, shard.id).await?;
+                    queue::requeue(tx, shard.job).await?;
                 }
                 let event = Event::WorkerBanned {
                     worker: ban.worker,
@@ -59,17 +59,17 @@ impl Store {
             })
             .await?;
         self.workers().ban(worker.as_str(), reason);
-        let count = u32::try_from(again.len()).unwrap_or(u32::MAX);
-        for key in again.into_iter().filter_map(|shard| shard.recording) {
+        let count = u32::try_from(discarded.len()).unwrap_or(u32::MAX);
+        for key in discarded.into_iter().filter_map(|shard| shard.recording) {
             if let Err(error) = self.artifacts().delete_folder(&key).await {
-                // It goes with its run's.
-                tracing::warn!(key, %error, "a recording that nobody believes is left");
+                // It is deleted together with its run's recordings.
+                tracing::warn!(key, %error, "could not delete a recording of a banned worker");
             }
         }
         Ok(count)
     }
 
-    /// Takes a worker's work again. [`StoreError::Conflict`] if it is not banned.
+    /// Lifts the ban of a worker. [`StoreError::Conflict`] if it is not banned.
     #[boxed]
     pub async fn readmit_worker(
         &self,

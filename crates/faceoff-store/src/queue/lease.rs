@@ -1,4 +1,4 @@
-//! What a worker does with a lease: renew it, hand it back, or turn it into a commit.
+//! Leases of jobs: a worker renews, releases or completes them.
 
 use crate::{column::Instant, error::Result, write::Tx};
 use jiff::{SignedDuration, Timestamp};
@@ -7,32 +7,32 @@ use uuid::Uuid;
 
 /// Proof of a lease.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Claim {
-    pub unit: Uuid,
-    /// Drawn for this lease alone.
+pub struct JobClaim {
+    pub job: Uuid,
+    /// Unique to this lease.
     pub nonce: Uuid,
-    /// To whom; the events of what is done under the lease name it.
+    /// The lease holder; events of changes under the lease name it as their actor.
     pub worker: String,
-    /// When the lease ended, had it not been renewed.
+    /// When the lease expires unless it is renewed.
     pub lease_until: Timestamp,
 }
 
-/// How a claim stands.
-pub(crate) enum Hold {
-    /// It is the unit's lease. Its time may be over: as long as nobody else took the unit, its
-    /// holder's work is as good as ever.
-    Held {
+/// State of a claim.
+pub(crate) enum ClaimState {
+    /// The job is leased under this claim. The lease may have expired: until another worker claims the job, its result is
+    /// accepted.
+    Leased {
         kind: String,
     },
-    /// Under this lease the unit was done.
-    DoneBefore,
-    /// The unit is another's, queued again or dropped.
+    /// The job was completed under this claim.
+    AlreadyDone,
+    /// The job was claimed by another worker, queued again or dropped.
     Lost,
 }
 
-/// How a claim stands, within a transaction.
-pub(crate) async fn hold(connection: &mut SqliteConnection, claim: &Claim) -> Result<Hold> {
-    let (id, nonce) = (Text(claim.unit), Text(claim.nonce));
+/// Reads the state of a claim, within a transaction.
+pub(crate) async fn claim_state(connection: &mut SqliteConnection, claim: &JobClaim) -> Result<ClaimState> {
+    let (id, nonce) = (Text(claim.job), Text(claim.nonce));
     let row = sqlx::query!(
         "SELECT kind, state = 'leased' AS held FROM units WHERE id = ? AND nonce = ?",
         id,
@@ -41,25 +41,25 @@ pub(crate) async fn hold(connection: &mut SqliteConnection, claim: &Claim) -> Re
     .fetch_optional(connection)
     .await?;
     Ok(match row {
-        Some(row) if row.held == 1 => Hold::Held { kind: row.kind },
-        Some(_) => Hold::DoneBefore,
-        None => Hold::Lost,
+        Some(row) if row.held == 1 => ClaimState::Leased { kind: row.kind },
+        Some(_) => ClaimState::AlreadyDone,
+        None => ClaimState::Lost,
     })
 }
 
-/// Extends the lease to `lease_s` seconds from now and stores the progress; the unit's kind, or
-/// `None` if the lease is lost. What it is extended by is charged.
+/// Extends the lease to `lease_s` seconds from now and stores the progress. Returns the job's kind, or
+/// `None` if the lease is lost. The extension is charged.
 pub(crate) async fn renew(
     connection: &mut SqliteConnection,
-    claim: &Claim,
+    claim: &JobClaim,
     progress: u32,
     lease_s: u32,
     now: Timestamp,
 ) -> Result<Option<String>> {
     let (id, nonce, until) = (
-        Text(claim.unit),
+        Text(claim.job),
         Text(claim.nonce),
-        Instant(after(now, lease_s)),
+        Instant(seconds_later(now, lease_s)),
     );
     Ok(sqlx::query_scalar!(
         r#"UPDATE units SET charged_ms = MAX(0, charged_ms + ?1 - claimable_at), claimable_at = ?1,
@@ -74,16 +74,16 @@ pub(crate) async fn renew(
     .await?)
 }
 
-/// Is the unit leased under this nonce?
+/// Is the job leased under this nonce?
 pub(crate) async fn is_leased(
     connection: &mut SqliteConnection,
-    unit: Uuid,
+    job: Uuid,
     nonce: Uuid,
 ) -> Result<bool> {
-    let (unit, nonce) = (Text(unit), Text(nonce));
+    let (job, nonce) = (Text(job), Text(nonce));
     let held = sqlx::query_scalar!(
         r#"SELECT state = 'leased' AS "held!: bool" FROM units WHERE id = ? AND nonce = ?"#,
-        unit,
+        job,
         nonce,
     )
     .fetch_optional(connection)
@@ -91,9 +91,9 @@ pub(crate) async fn is_leased(
     Ok(held.unwrap_or_default())
 }
 
-/// Is the lease `claim.worker`'s, and nobody's whom it was handed to?
-pub(crate) async fn is_holder(connection: &mut SqliteConnection, claim: &Claim) -> Result<bool> {
-    let (id, nonce) = (Text(claim.unit), Text(claim.nonce));
+/// Is `claim.worker` still the lease holder, so that the lease was not transferred?
+pub(crate) async fn is_holder(connection: &mut SqliteConnection, claim: &JobClaim) -> Result<bool> {
+    let (id, nonce) = (Text(claim.job), Text(claim.nonce));
     let found = sqlx::query_scalar!(
         r#"SELECT worker = ? AS "is_holder!: bool" FROM units WHERE id = ? AND nonce = ? AND state = 'leased'"#,
         claim.worker,
@@ -105,24 +105,24 @@ pub(crate) async fn is_holder(connection: &mut SqliteConnection, claim: &Claim) 
     Ok(found.unwrap_or_default())
 }
 
-/// Whose the unit's lease is, if it is leased under this nonce.
-pub(crate) async fn holder_of(
+/// The lease holder of the job, if it is leased under this nonce.
+pub(crate) async fn lease_holder(
     connection: &mut SqliteConnection,
-    unit: Uuid,
+    job: Uuid,
     nonce: Uuid,
 ) -> Result<Option<String>> {
-    let (unit, nonce) = (Text(unit), Text(nonce));
+    let (job, nonce) = (Text(job), Text(nonce));
     Ok(sqlx::query_scalar!(
         r#"SELECT worker AS "worker!" FROM units WHERE id = ? AND nonce = ? AND state = 'leased'"#,
-        unit,
+        job,
         nonce,
     )
     .fetch_optional(connection)
     .await?)
 }
 
-/// All leases of `holder` and of every name `holder/…`, with their units' labels.
-pub(crate) async fn leases_of(tx: &mut Tx, holder: &str) -> Result<Vec<(Claim, String)>> {
+/// All leases of `holder` and of every name `holder/…`, with the kinds of their jobs.
+pub(crate) async fn leases(tx: &mut Tx, holder: &str) -> Result<Vec<(JobClaim, String)>> {
     let rows = sqlx::query!(
         r#"SELECT id AS "id!: Text<Uuid>", kind, worker AS "worker!", nonce AS "nonce!: Text<Uuid>",
                   claimable_at AS "lease_until: Instant"
@@ -134,8 +134,8 @@ pub(crate) async fn leases_of(tx: &mut Tx, holder: &str) -> Result<Vec<(Claim, S
     .fetch_all(&mut **tx)
     .await?;
     let leases = rows.into_iter().map(|row| {
-        let claim = Claim {
-            unit: row.id.0,
+        let claim = JobClaim {
+            job: row.id.0,
             nonce: row.nonce.0,
             worker: row.worker,
             lease_until: row.lease_until.0,
@@ -145,14 +145,14 @@ pub(crate) async fn leases_of(tx: &mut Tx, holder: &str) -> Result<Vec<(Claim, S
     Ok(leases.collect())
 }
 
-/// Names another as the lease's holder; false if it is neither `claim.worker`'s any more nor the other's already.
-pub(crate) async fn hand_over(
+/// Transfers the lease to another holder. False if neither `claim.worker` nor the other holds it.
+pub(crate) async fn transfer(
     connection: &mut SqliteConnection,
-    claim: &Claim,
+    claim: &JobClaim,
     to: &str,
 ) -> Result<bool> {
-    let (id, nonce) = (Text(claim.unit), Text(claim.nonce));
-    let handed = sqlx::query!(
+    let (id, nonce) = (Text(claim.job), Text(claim.nonce));
+    let transferred = sqlx::query!(
         "UPDATE units SET worker = ?1
          WHERE id = ?2 AND nonce = ?3 AND worker IN (?4, ?1) AND state = 'leased'",
         to,
@@ -162,12 +162,12 @@ pub(crate) async fn hand_over(
     )
     .execute(connection)
     .await?;
-    Ok(handed.rows_affected() == 1)
+    Ok(transferred.rows_affected() == 1)
 }
 
-/// Gives the leases of `holder`, and of every name `holder/…`, at least `lease_s` seconds from now.
-pub(crate) async fn renew_of(tx: &mut Tx, holder: &str, lease_s: u32) -> Result<u64> {
-    let until = Instant(after(tx.now, lease_s));
+/// Extends the leases of `holder`, and of every name `holder/…`, to at least `lease_s` seconds from now.
+pub(crate) async fn renew_leases(tx: &mut Tx, holder: &str, lease_s: u32) -> Result<u64> {
+    let until = Instant(seconds_later(tx.now, lease_s));
     let renewed = sqlx::query!(
         "UPDATE units SET claimable_at = ?1
          WHERE state IN ('queued', 'leased') AND state = 'leased' AND claimable_at < ?1
@@ -180,10 +180,10 @@ pub(crate) async fn renew_of(tx: &mut Tx, holder: &str, lease_s: u32) -> Result<
     Ok(renewed.rows_affected())
 }
 
-/// Takes a held unit out of the queue. What is left of its lease is given back to its account, and what
-/// it took beyond the lease is charged.
-pub(crate) async fn mark_done(tx: &mut Tx, claim: &Claim, progress: u32) -> Result<()> {
-    let (id, now) = (Text(claim.unit), Instant(tx.now));
+/// Completes a leased job. The unused rest of its lease is credited to its account, and time beyond the
+/// lease is charged.
+pub(crate) async fn mark_done(tx: &mut Tx, claim: &JobClaim, progress: u32) -> Result<()> {
+    let (id, now) = (Text(claim.job), Instant(tx.now));
     sqlx::query!(
         "UPDATE units SET state = 'done', progress = ?,
                           charged_ms = MAX(0, charged_ms + ? - claimable_at)
@@ -197,15 +197,15 @@ pub(crate) async fn mark_done(tx: &mut Tx, claim: &Claim, progress: u32) -> Resu
     Ok(())
 }
 
-/// Counts a failure of a held unit and queues it again, to rest for a while that grows with the
-/// failures; how many there were. No worker is woken: there is nothing to claim yet. Slot time that we
-/// wasted is charged to nobody.
+/// Counts a failure of a leased job and queues it again, with a delay that grows with the failures.
+/// Returns their number. No worker is woken: there is nothing to claim yet. Slot time lost by a platform
+/// fault is not charged.
 pub(crate) async fn requeue_failed(
     connection: &mut SqliteConnection,
-    claim: &Claim,
+    claim: &JobClaim,
     now: Timestamp,
 ) -> Result<u32> {
-    let id = Text(claim.unit);
+    let id = Text(claim.job);
     let failures = sqlx::query_scalar!(
         r#"UPDATE units SET state = 'queued', worker = NULL, nonce = NULL, progress = 0,
                             charged_ms = 0, failures = failures + 1
@@ -214,7 +214,7 @@ pub(crate) async fn requeue_failed(
     )
     .fetch_one(&mut *connection)
     .await?;
-    let again_at = Instant(after(now, backoff_s(failures)));
+    let again_at = Instant(seconds_later(now, backoff_s(failures)));
     sqlx::query!(
         "UPDATE units SET claimable_at = ? WHERE id = ?",
         again_at,
@@ -225,15 +225,15 @@ pub(crate) async fn requeue_failed(
     Ok(failures)
 }
 
-/// Gives all leases a new time of `lease_s` seconds, whether it had run out or not.
-pub(crate) async fn renew_all(
+/// Extends all leases to at least `lease_s` seconds from now, expired ones included.
+pub(crate) async fn renew_all_leases(
     connection: &mut SqliteConnection,
     lease_s: u32,
     now: Timestamp,
 ) -> Result<()> {
-    let until = Instant(after(now, lease_s));
+    let until = Instant(seconds_later(now, lease_s));
     sqlx::query!(
-        // both conditions on the state: by the first SQLite sees that the index of open units serves
+        // two conditions on the state: the first one lets SQLite use the index of open jobs
         "UPDATE units SET claimable_at = ?1
          WHERE state IN ('queued', 'leased') AND state = 'leased' AND claimable_at < ?1",
         until,
@@ -243,15 +243,15 @@ pub(crate) async fn renew_all(
     Ok(())
 }
 
-/// Queues a held unit again, claimable after a rest; neither the attempt nor its slot time counts. Whether it
-/// found no room where there should be enough does.
+/// Queues a leased job again, claimable after a delay. Neither the attempt nor its slot time counts. It does count if the
+/// job ran out of disk space although enough was free.
 pub(crate) async fn release(
     tx: &mut Tx,
-    claim: &Claim,
+    claim: &JobClaim,
     rest_s: u32,
     without_room: bool,
 ) -> Result<()> {
-    let (id, from) = (Text(claim.unit), Instant(after(tx.now, rest_s)));
+    let (id, from) = (Text(claim.job), Instant(seconds_later(tx.now, rest_s)));
     sqlx::query!(
         "UPDATE units SET state = 'queued', worker = NULL, nonce = NULL, progress = 0,
                           charged_ms = 0, attempts = attempts - 1, claimable_at = ?,
@@ -263,14 +263,14 @@ pub(crate) async fn release(
     )
     .execute(&mut **tx)
     .await?;
-    tx.work_added();
+    tx.job_added();
     Ok(())
 }
 
-/// A unit just claimed is not to be begun: it waits until it is [unparked](unpark), and neither the attempt nor its slot
-/// time counts.
-pub(crate) async fn park(tx: &mut Tx, unit: Uuid) -> Result<()> {
-    let id = Text(unit);
+/// Parks a job that was just claimed: it cannot be claimed until it is [unparked](unpark). Neither the attempt nor its
+/// slot time counts.
+pub(crate) async fn park(tx: &mut Tx, job: Uuid) -> Result<()> {
+    let id = Text(job);
     sqlx::query!(
         "UPDATE units SET state = 'queued', worker = NULL, nonce = NULL, progress = 0, charged_ms = 0,
                           attempts = attempts - 1, claimable_at = ?
@@ -283,9 +283,9 @@ pub(crate) async fn park(tx: &mut Tx, unit: Uuid) -> Result<()> {
     Ok(())
 }
 
-/// A unit can be claimed from now on, if it waits.
-pub(crate) async fn unpark(tx: &mut Tx, unit: Uuid) -> Result<()> {
-    let (id, now) = (Text(unit), Instant(tx.now));
+/// Makes a parked job claimable.
+pub(crate) async fn unpark(tx: &mut Tx, job: Uuid) -> Result<()> {
+    let (id, now) = (Text(job), Instant(tx.now));
     sqlx::query!(
         "UPDATE units SET claimable_at = ? WHERE id = ? AND state = 'queued' AND claimable_at = ?",
         now,
@@ -294,20 +294,20 @@ pub(crate) async fn unpark(tx: &mut Tx, unit: Uuid) -> Result<()> {
     )
     .execute(&mut **tx)
     .await?;
-    tx.work_added();
+    tx.job_added();
     Ok(())
 }
 
-/// When what is parked could be claimed: long after everybody.
+/// Claimable time of parked jobs: the year 9999, in milliseconds since 1970.
 const PARKED: i64 = 253_402_207_200_000;
 
 /// An instant some seconds later.
-pub(crate) fn after(now: Timestamp, seconds: u32) -> Timestamp {
+pub(crate) fn seconds_later(now: Timestamp, seconds: u32) -> Timestamp {
     now.saturating_add(SignedDuration::from_secs(seconds.into()))
         .unwrap_or(Timestamp::MAX)
 }
 
-/// How long a unit rests after its n-th failure, seconds: a full disk is not freed by trying at once.
+/// Delay after the n-th failure of a job, in seconds: a full disk, for example, is not freed at once.
 const fn backoff_s(failures: u32) -> u32 {
     let doubled = if failures < 6 { 1 << failures } else { 60 };
     if doubled < 60 { doubled } else { 60 }

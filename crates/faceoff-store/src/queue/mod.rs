@@ -1,19 +1,19 @@
-//! The queue of work: units that are claimed by a lease of seconds, renewed, handed back or done.
-//! What a unit is for is written in the tables that refer to it; its kind is a label that the queue
-//! hands through, and so is whoever its slot time is charged to.
+//! The job queue. A job is claimed with a lease of seconds, which is renewed until the job is released or
+//! done. The purpose of a job is in the tables that refer to it. To the queue, its kind and the owner of
+//! its account are opaque labels.
 
 pub(crate) mod forecast;
 mod lease;
 mod shares;
-mod units;
+mod jobs;
 
-pub use lease::Claim;
+pub use lease::JobClaim;
 pub(crate) use lease::{
-    Hold, hand_over, hold, holder_of, is_holder, is_leased, leases_of, mark_done, park, release,
-    renew, renew_all, renew_of, requeue_failed, unpark,
+    ClaimState, transfer, claim_state, lease_holder, is_holder, is_leased, leases, mark_done, park, release,
+    renew, renew_all_leases, renew_leases, requeue_failed, unpark,
 };
 pub(crate) use shares::{Account, Lane, account};
-pub(crate) use units::{
-    Leased, NewUnit, Standing, claim_next, drop_units, end_leases_of, goes_on, insert, queue_again,
-    standing,
+pub(crate) use jobs::{
+    LeasedJob, NewJob, QueueGauges, claim_next, drop_jobs, end_leases, gauges, insert, requeue,
+    resume,
 };

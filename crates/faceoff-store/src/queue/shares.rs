@@ -1,28 +1,27 @@
-//! Who is served next: the lane that was served least, in it the smallest batch, and of that the account that was
-//! served least. What a lease takes of a
-//! slot is charged to both by the database (`slot_time_is_charged`), whatever becomes of the unit.
+//! Fair shares of the slots. The least served lane comes first, in it the smallest batch, and of that the least served
+//! account. The database charges the slot time of a lease to both (`slot_time_is_charged`), however the job ends.
 
 use crate::{column::Instant, error::Result, write::Tx};
 
-/// Work that waits for work of its own sort only. Slot time is divided equally among the lanes of one
-/// urgency in which something waits.
+/// A share of the queue. Slot time is divided equally among the lanes of one urgency that have waiting
+/// jobs.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Lane {
     pub(crate) name: &'static str,
-    /// The smaller is served first, whatever was served before.
+    /// Lanes with a smaller value are always served first.
     pub(crate) urgency: u32,
-    /// Of two lanes that were served alike, the smaller is served first.
+    /// Of two equally served lanes, the one with the smaller value is served first.
     pub(crate) rank: u32,
 }
 
-/// In one lane, whoever units are done for; slot time of a lane is divided equally among those that wait.
+/// The owner of jobs in one lane. Slot time of a lane is divided equally among the accounts with waiting jobs.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Account(pub(crate) i64);
 
-/// The account of `holder` in `lane`, to queue units of. Who comes back after a pause starts beside the
-/// least served that waits, or beside the most served if nobody does: neither what it left unused
-/// counts for it, nor what it had while nobody else wanted it against it. The same holds for lanes. What is
-/// charged of leases that still run is not used yet.
+/// Opens the account of `holder` in `lane`, to queue jobs. An account that returns after a pause starts level with the
+/// least served one that has waiting jobs, or else with the most served one. So unused time is no credit, and time used
+/// while no other account waited is no debt. The same holds for lanes. The charged rest of a running lease does not
+/// count as used.
 pub(crate) async fn account(tx: &mut Tx, lane: Lane, holder: &str) -> Result<Account> {
     let now = Instant(tx.now);
     sqlx::query!(

@@ -7,41 +7,39 @@ use jiff::Timestamp;
 use sqlx::{SqliteConnection, types::Text};
 use std::collections::BTreeMap;
 
-/// A submission under each perturbation alone: one run per profile, on the same episodes.
+/// An ablation evaluates a submission with each perturbation alone: one run per profile, on the same episodes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Ablation {
-    /// Drawn when it was ordered.
     pub id: AblationId,
     pub submission: SubmissionId,
-    /// One for each of [`Profile::ABLATION`], all of the same plan otherwise.
+    /// One run for each of [`Profile::ABLATION`], with otherwise the same plan.
     pub runs: BTreeMap<Profile, RunId>,
     /// Episodes of each task and profile.
     pub episodes_per_task: u32,
-    /// When it was ordered.
+    /// When it was requested.
     pub created_at: Timestamp,
-    /// How far it is.
     pub state: AblationState,
 }
 
 #[derive(Debug, Clone, PartialEq)]
 pub enum AblationState {
-    /// It waits, or is being played.
+    /// Queued or running.
     Open {
-        /// As far as the workers have told.
+        /// As reported by the workers.
         episodes_done: u32,
         /// Episodes over all profiles and tasks.
         episodes_total: u32,
     },
-    /// All profiles are played.
+    /// The runs of all profiles are complete.
     Finished {
         /// When the last shard was committed.
         finished_at: Timestamp,
     },
-    /// It ended without a result.
+    /// The ablation ended without a result.
     Failed {
         /// When it was given up.
         finished_at: Timestamp,
-        /// Whose fault it was and which.
+        /// The fault, and whether it is the agent's or the platform's.
         reason: String,
     },
 }
@@ -73,7 +71,6 @@ pub(crate) async fn newest(
     .await?)
 }
 
-/// An ablation by its id.
 pub(crate) async fn find(connection: &mut SqliteConnection, id: AblationId) -> Result<AblationRow> {
     let id = Text(id);
     sqlx::query_as!(
@@ -103,7 +100,6 @@ pub(crate) async fn of_run(
     Ok(found.map(|id| id.0))
 }
 
-/// The runs of an ablation.
 pub(crate) async fn runs(connection: &mut SqliteConnection, id: AblationId) -> Result<Vec<RunId>> {
     let id = Text(id);
     let runs = sqlx::query_scalar!(
@@ -115,7 +111,7 @@ pub(crate) async fn runs(connection: &mut SqliteConnection, id: AblationId) -> R
     Ok(runs.into_iter().map(|id| id.0).collect())
 }
 
-/// [`StoreError::Conflict`] while another one of the submission is open.
+/// Adds an ablation. [`StoreError::Conflict`] while another ablation of the submission is open.
 pub(crate) async fn insert(
     connection: &mut SqliteConnection,
     id: AblationId,
@@ -134,7 +130,7 @@ pub(crate) async fn insert(
     .map_err(|error| {
         if StoreError::is_duplicate(&error, "ablations.submission_id") {
             StoreError::Conflict(
-                "an ablation of this submission is under way: wait for its end".into(),
+                "an ablation of this submission is running: wait for its end".into(),
             )
         } else {
             error.into()
@@ -160,7 +156,7 @@ pub(crate) async fn insert_run(
 }
 
 /// Ends an ablation, without a result if there is a `reason`.
-pub(crate) async fn set_over(
+pub(crate) async fn set_ended(
     connection: &mut SqliteConnection,
     id: AblationId,
     reason: Option<&str>,
@@ -178,8 +174,8 @@ pub(crate) async fn set_over(
     Ok(())
 }
 
-/// Is every run of the ablation played?
-pub(crate) async fn all_played(connection: &mut SqliteConnection, id: AblationId) -> Result<bool> {
+/// Is every run of the ablation complete?
+pub(crate) async fn all_complete(connection: &mut SqliteConnection, id: AblationId) -> Result<bool> {
     let id = Text(id);
     Ok(sqlx::query_scalar!(
         r#"SELECT NOT EXISTS (SELECT 1 FROM ablation_runs a JOIN runs r ON r.id = a.run_id

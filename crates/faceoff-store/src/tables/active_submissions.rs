@@ -1,12 +1,12 @@
-//! What each team enters at the next cut.
+//! The active submission of each team, which is evaluated at the next cutoff.
 
 use crate::{column::Instant, error::Result};
 use faceoff_types::{SubmissionId, TeamId};
 use jiff::Timestamp;
 use sqlx::{SqliteConnection, types::Text};
 
-/// Makes a submission that turned valid its team's active one. False if that has a newer one, or has
-/// chosen one since this was uploaded.
+/// Makes a submission that passed its validation its team's active one. Returns false if the team has a newer
+/// one, or has chosen one since this upload.
 pub(crate) async fn put_newest(
     connection: &mut SqliteConnection,
     team: TeamId,
@@ -27,7 +27,7 @@ pub(crate) async fn put_newest(
     Ok(put.rows_affected() > 0)
 }
 
-/// Makes a submission its team's active one by choice: what is uploaded from now on takes its place.
+/// Makes a submission its team's active one by choice. Later uploads replace it.
 pub(crate) async fn choose(
     connection: &mut SqliteConnection,
     team: TeamId,
@@ -46,7 +46,7 @@ pub(crate) async fn choose(
     Ok(())
 }
 
-/// Its team has none active any more, if it was this one.
+/// Makes a submission inactive, if it was active.
 pub(crate) async fn remove(
     connection: &mut SqliteConnection,
     submission: SubmissionId,

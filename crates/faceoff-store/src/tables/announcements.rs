@@ -3,7 +3,7 @@ use faceoff_types::AnnouncementId;
 use jiff::Timestamp;
 use sqlx::{SqliteConnection, types::Text};
 
-/// What the organisers tell everybody.
+/// A public announcement of the organisers.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Announcement {
     pub id: AnnouncementId,
@@ -12,7 +12,7 @@ pub struct Announcement {
     pub text: String,
 }
 
-/// The newest first, at most so many.
+/// The newest announcements, the newest first.
 pub(crate) async fn newest(
     connection: &mut SqliteConnection,
     limit: u32,

@@ -1,5 +1,5 @@
-//! What is kept of uploads: whose archives take how much room, and which are nobody's any more. They are
-//! columns of the submissions.
+//! Stored bundles: quotas of the teams, and bundles that can be deleted. The data are columns of the
+//! submissions.
 
 use crate::{
     column::Instant,
@@ -12,12 +12,12 @@ use jiff::Timestamp;
 use sqlx::{SqliteConnection, types::Text};
 use std::collections::HashSet;
 
-/// How much a team may upload and keep, in bytes.
+/// Upload and storage quota of a team, in bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct UploadQuota {
-    /// Of a UTC day.
+    /// Limit of uploads per UTC day.
     pub day_bytes: u64,
-    /// Kept at the same time.
+    /// Limit of bundles stored at the same time.
     pub stored_bytes: u64,
 }
 
@@ -30,32 +30,32 @@ impl Default for UploadQuota {
     }
 }
 
-/// What a team has used of its quota, in bytes.
+/// A team's use of its quota, in bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct UploadUsage {
-    /// Uploaded on the UTC day, what was refused included; not what we failed to check.
+    /// Uploaded on the UTC day. Rejected bundles count; those whose validation ended by a platform fault do not.
     pub day_bytes: u64,
-    /// The archives that are kept.
+    /// Bundles that are stored.
     pub stored_bytes: u64,
 }
 
 impl UploadQuota {
-    /// May a team that has used so much upload this many bytes more?
+    /// Checks whether a team with this usage may upload another bundle.
     ///
     /// # Errors
-    /// [`StoreError::DayQuotaSpent`] or [`StoreError::StoredQuotaSpent`].
+    /// [`StoreError::DailyQuotaExceeded`] or [`StoreError::StorageQuotaExceeded`].
     pub fn check(&self, used: UploadUsage, bundle_bytes: u64) -> Result<()> {
-        let spent =
+        let exceeds =
             |used: u64, limit: u64| used.checked_add(bundle_bytes).is_none_or(|sum| sum > limit);
-        if spent(used.day_bytes, self.day_bytes) {
-            return Err(StoreError::DayQuotaSpent {
+        if exceeds(used.day_bytes, self.day_bytes) {
+            return Err(StoreError::DailyQuotaExceeded {
                 limit_bytes: self.day_bytes,
                 used_bytes: used.day_bytes,
                 bundle_bytes,
             });
         }
-        if spent(used.stored_bytes, self.stored_bytes) {
-            return Err(StoreError::StoredQuotaSpent {
+        if exceeds(used.stored_bytes, self.stored_bytes) {
+            return Err(StoreError::StorageQuotaExceeded {
                 limit_bytes: self.stored_bytes,
                 used_bytes: used.stored_bytes,
                 bundle_bytes,
@@ -64,15 +64,15 @@ impl UploadQuota {
         Ok(())
     }
 
-    /// How large the team's next bundle may be.
+    /// Maximum size of the team's next bundle, in bytes.
     #[must_use]
-    pub fn left(&self, used: UploadUsage) -> u64 {
-        let of_day = self.day_bytes.saturating_sub(used.day_bytes);
-        of_day.min(self.stored_bytes.saturating_sub(used.stored_bytes))
+    pub fn remaining(&self, used: UploadUsage) -> u64 {
+        let remaining_today = self.day_bytes.saturating_sub(used.day_bytes);
+        remaining_today.min(self.stored_bytes.saturating_sub(used.stored_bytes))
     }
 }
 
-/// What a team has used, of the day that began at `day`.
+/// A team's use of its quota on the UTC day that began at `day`.
 pub(crate) async fn usage(
     connection: &mut SqliteConnection,
     team: TeamId,
@@ -99,8 +99,9 @@ pub(crate) async fn usage(
     })
 }
 
-/// Refused uploads whose archives are kept, with their keys: what is invalid, and what we failed to check
-/// if it came at `before` or earlier. Nothing that a run names, no key of an upload that may play, and no evidence.
+/// Rejected submissions whose bundles are stored, with their keys. These are invalid ones, and those uploaded until
+/// `before` whose validation ended by a platform fault. Bundles of runs, of usable submissions and of teams under
+/// investigation are left out.
 pub(crate) async fn refused(
     connection: &mut SqliteConnection,
     before: Timestamp,
@@ -126,7 +127,7 @@ pub(crate) async fn refused(
         .collect())
 }
 
-pub(crate) async fn set_removed(
+pub(crate) async fn set_refused_removed(
     connection: &mut SqliteConnection,
     id: SubmissionId,
     now: Timestamp,
@@ -143,16 +144,16 @@ pub(crate) async fn set_removed(
     Ok(())
 }
 
-/// The keys of all archives whose files have not gone.
-pub(crate) async fn kept(connection: &mut SqliteConnection) -> Result<HashSet<String>> {
+/// The keys of all bundles whose files exist.
+pub(crate) async fn keys_in_use(connection: &mut SqliteConnection) -> Result<HashSet<String>> {
     let keys = sqlx::query_scalar!("SELECT bundle_key FROM submissions WHERE bundle_gone = 0")
         .fetch_all(connection)
         .await?;
     Ok(keys.into_iter().collect())
 }
 
-/// From now on nobody is promised the archive of a submission.
-pub(crate) async fn remove(
+/// Marks a submission's bundle as removed; its file is deleted later.
+pub(crate) async fn set_removed(
     connection: &mut SqliteConnection,
     id: SubmissionId,
     reason: &str,
@@ -170,7 +171,7 @@ pub(crate) async fn remove(
     Ok(())
 }
 
-/// Somebody wished it away.
+/// Notes who requested the removal of a submission's bundle.
 pub(crate) async fn set_deleted(
     connection: &mut SqliteConnection,
     id: SubmissionId,
@@ -189,9 +190,9 @@ pub(crate) async fn set_deleted(
     Ok(())
 }
 
-/// The archives whose files are there although nobody is promised them since `before`, with their keys; none that
-/// another submission has, too, and none that has become evidence.
-pub(crate) async fn going(
+/// Bundles that were marked as removed until `before` and whose files still exist, with their keys. Bundles that another
+/// submission shares, and those that are evidence, are left out.
+pub(crate) async fn deletable(
     connection: &mut SqliteConnection,
     before: Timestamp,
 ) -> Result<Vec<(SubmissionId, String)>> {
@@ -214,8 +215,8 @@ pub(crate) async fn going(
         .collect())
 }
 
-/// The file of a removed archive has gone.
-pub(crate) async fn set_gone(connection: &mut SqliteConnection, id: SubmissionId) -> Result<()> {
+/// Notes that the file of a removed bundle was deleted.
+pub(crate) async fn set_file_deleted(connection: &mut SqliteConnection, id: SubmissionId) -> Result<()> {
     let id = Text(id);
     sqlx::query!("UPDATE submissions SET bundle_gone = 1 WHERE id = ?", id)
         .execute(connection)
@@ -223,8 +224,8 @@ pub(crate) async fn set_gone(connection: &mut SqliteConnection, id: SubmissionId
     Ok(())
 }
 
-/// Refuses to have a submission play whose archive was removed.
-pub(crate) async fn check_kept(connection: &mut SqliteConnection, id: SubmissionId) -> Result<()> {
+/// Refuses a submission whose bundle was removed.
+pub(crate) async fn check_available(connection: &mut SqliteConnection, id: SubmissionId) -> Result<()> {
     let text = Text(id);
     let removed = sqlx::query!(
         r#"SELECT bundle_removed_at AS "at!: Instant", bundle_removed_for AS reason FROM submissions
@@ -236,30 +237,30 @@ pub(crate) async fn check_kept(connection: &mut SqliteConnection, id: Submission
     match removed {
         None => Ok(()),
         Some(row) => Err(StoreError::Conflict(format!(
-            "the archive of the submission {id} was removed on {} {}, so it cannot be played again",
+            "the bundle of the submission {id} was removed on {} {}, so it cannot be evaluated again",
             row.at.0.strftime("%Y-%m-%d at %H:%M:%S UTC"),
             row.reason.as_deref().unwrap_or(REFUSED),
         ))),
     }
 }
 
-/// What a submission's archive is needed for.
+/// Why a submission's bundle is still needed.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Needs {
-    /// It enters the next cut.
+pub(crate) struct BundleUses {
+    /// It is the team's active submission.
     pub(crate) is_active: bool,
-    /// Evaluations, and an ablation, that are not over.
+    /// Number of its open evaluations and ablations.
     pub(crate) open: u32,
-    /// Its evaluations of days that are not released.
+    /// Number of its evaluations on unreleased days.
     pub(crate) unreleased: u32,
-    /// Trials and proposals with it that are neither applied nor dropped.
+    /// Number of trials and proposals with it that are neither applied nor dropped.
     pub(crate) proposed: u32,
 }
 
-pub(crate) async fn needs(connection: &mut SqliteConnection, id: SubmissionId) -> Result<Needs> {
+pub(crate) async fn uses(connection: &mut SqliteConnection, id: SubmissionId) -> Result<BundleUses> {
     let id = Text(id);
     Ok(sqlx::query_as!(
-        Needs,
+        BundleUses,
         r#"SELECT EXISTS (SELECT 1 FROM active_submissions WHERE submission_id = ?1) AS "is_active!: bool",
                   (SELECT COUNT(*) FROM evaluations WHERE submission_id = ?1 AND state = 'open')
                   + (SELECT COUNT(*) FROM ablations WHERE submission_id = ?1 AND finished_at IS NULL)

@@ -6,21 +6,21 @@ use faceoff_types::{StageDay, StageId};
 use jiff::{Timestamp, civil::Date};
 use sqlx::{SqliteConnection, types::Text};
 
-/// A day of a stage, from its cut on.
+/// An evaluation day of a stage, from its cutoff on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Day {
-    /// Whose, and whose label its seed has. An evaluation may outlast the date.
-    pub of: StageDay,
-    /// What the teams had active then plays the day, and nothing else.
-    pub cut_at: Timestamp,
-    /// What is not played by then is ended; `None`: however long it takes.
+    /// Stage and date; the day's seed derives from them. Evaluations may end after the date.
+    pub stage_day: StageDay,
+    /// The cutoff: the teams' active submissions at this time are evaluated.
+    pub cutoff_at: Timestamp,
+    /// Evaluations that are incomplete at this time are ended; `None`: no deadline.
     pub deadline_at: Option<Timestamp>,
-    /// When its last evaluation had ended: its seed is public from then on, its datasets and logs are
-    /// their teams'. `None` before.
+    /// When the day was released after its last evaluation. Since then its seed is public, and the teams
+    /// can download their datasets and logs. `None` before.
     pub released_at: Option<Timestamp>,
 }
 
-/// Why each of the days that were missed was played later than on its date.
+/// The days that were started later than on their date, each with the reason.
 pub(crate) async fn missed(connection: &mut SqliteConnection) -> Result<Vec<(StageDay, String)>> {
     let rows = sqlx::query!(
         r#"SELECT stage_id AS "stage: Text<StageId>", day AS "day: Text<Date>", missed_for AS "reason!"
@@ -28,17 +28,17 @@ pub(crate) async fn missed(connection: &mut SqliteConnection) -> Result<Vec<(Sta
     )
     .fetch_all(connection)
     .await?;
-    let of = |stage: Text<StageId>, day: Text<Date>| StageDay {
+    let stage_day = |stage: Text<StageId>, day: Text<Date>| StageDay {
         stage: stage.0,
         date: day.0,
     };
     Ok(rows
         .into_iter()
-        .map(|row| (of(row.stage, row.day), row.reason))
+        .map(|row| (stage_day(row.stage, row.day), row.reason))
         .collect())
 }
 
-/// All days, the newest cut first, each with how many of its evaluations are finished.
+/// All days, the newest cutoff first, each with the number of its finished evaluations.
 pub(crate) async fn all(connection: &mut SqliteConnection) -> Result<Vec<(Day, u32)>> {
     let rows = sqlx::query!(
         r#"SELECT d.stage_id AS "stage: Text<StageId>", d.day AS "day: Text<Date>", d.cut_at AS "cut_at: Instant",
@@ -54,11 +54,11 @@ pub(crate) async fn all(connection: &mut SqliteConnection) -> Result<Vec<(Day, u
         .into_iter()
         .map(|row| {
             let day = Day {
-                of: StageDay {
+                stage_day: StageDay {
                     stage: row.stage.0,
                     date: row.day.0,
                 },
-                cut_at: row.cut_at.0,
+                cutoff_at: row.cut_at.0,
                 deadline_at: row.deadline_at.map(|at| at.0),
                 released_at: row.released_at.map(|at| at.0),
             };
@@ -67,7 +67,7 @@ pub(crate) async fn all(connection: &mut SqliteConnection) -> Result<Vec<(Day, u
         .collect())
 }
 
-/// The last day of a stage that had its cut.
+/// The newest day of a stage.
 pub(crate) async fn newest(
     connection: &mut SqliteConnection,
     stage: StageId,
@@ -82,19 +82,19 @@ pub(crate) async fn newest(
     .fetch_optional(connection)
     .await?;
     Ok(row.map(|row| Day {
-        of: StageDay {
+        stage_day: StageDay {
             stage,
             date: row.day.0,
         },
-        cut_at: row.cut_at.0,
+        cutoff_at: row.cut_at.0,
         deadline_at: row.deadline_at.map(|at| at.0),
         released_at: row.released_at.map(|at| at.0),
     }))
 }
 
-/// A day that had its cut; [`StoreError::NotFound`] if it had none.
-pub(crate) async fn find(connection: &mut SqliteConnection, of: StageDay) -> Result<Day> {
-    let (stage, day) = (Text(of.stage), Text(of.date));
+/// [`StoreError::NotFound`] if the day's cutoff has not passed.
+pub(crate) async fn find(connection: &mut SqliteConnection, stage_day: StageDay) -> Result<Day> {
+    let (stage, day) = (Text(stage_day.stage), Text(stage_day.date));
     let row = sqlx::query!(
         r#"SELECT cut_at AS "cut_at: Instant", deadline_at AS "deadline_at: Instant",
                   released_at AS "released_at: Instant"
@@ -106,14 +106,14 @@ pub(crate) async fn find(connection: &mut SqliteConnection, of: StageDay) -> Res
     .await?
     .ok_or(StoreError::NotFound("day"))?;
     Ok(Day {
-        of,
-        cut_at: row.cut_at.0,
+        stage_day,
+        cutoff_at: row.cut_at.0,
         deadline_at: row.deadline_at.map(|at| at.0),
         released_at: row.released_at.map(|at| at.0),
     })
 }
 
-/// The days of a stage that had their cut and are not released, the earliest cut first.
+/// The unreleased days of a stage, the earliest cutoff first.
 pub(crate) async fn unreleased(
     connection: &mut SqliteConnection,
     stage: StageId,
@@ -130,18 +130,18 @@ pub(crate) async fn unreleased(
     Ok(rows
         .into_iter()
         .map(|row| Day {
-            of: StageDay {
+            stage_day: StageDay {
                 stage,
                 date: row.day.0,
             },
-            cut_at: row.cut_at.0,
+            cutoff_at: row.cut_at.0,
             deadline_at: row.deadline_at.map(|at| at.0),
             released_at: None,
         })
         .collect())
 }
 
-/// The days that are past their deadline while something of them is neither played nor over.
+/// The days with incomplete evaluations whose deadline has passed.
 pub(crate) async fn overdue(
     connection: &mut SqliteConnection,
     now: Timestamp,
@@ -170,10 +170,10 @@ pub(crate) async fn overdue(
 /// Moves the deadline of a day.
 pub(crate) async fn set_deadline(
     connection: &mut SqliteConnection,
-    of: StageDay,
+    stage_day: StageDay,
     deadline_at: Option<Timestamp>,
 ) -> Result<()> {
-    let (stage, day, at) = (Text(of.stage), Text(of.date), deadline_at.map(Instant));
+    let (stage, day, at) = (Text(stage_day.stage), Text(stage_day.date), deadline_at.map(Instant));
     sqlx::query!(
         "UPDATE days SET deadline_at = ? WHERE stage_id = ? AND day = ?",
         at,
@@ -185,9 +185,9 @@ pub(crate) async fn set_deadline(
     Ok(())
 }
 
-/// Has the day had its cut?
-pub(crate) async fn exists(connection: &mut SqliteConnection, of: StageDay) -> Result<bool> {
-    let (stage, day) = (Text(of.stage), Text(of.date));
+/// Has the day's cutoff passed?
+pub(crate) async fn exists(connection: &mut SqliteConnection, stage_day: StageDay) -> Result<bool> {
+    let (stage, day) = (Text(stage_day.stage), Text(stage_day.date));
     Ok(sqlx::query_scalar!(
         r#"SELECT EXISTS (SELECT 1 FROM days WHERE stage_id = ? AND day = ?) AS "exists!: bool""#,
         stage,
@@ -197,23 +197,23 @@ pub(crate) async fn exists(connection: &mut SqliteConnection, of: StageDay) -> R
     .await?)
 }
 
-/// Adds a day with its cut and its deadline. [`StoreError::DayHasCut`] if it has had it, or a later day has: a clock
-/// that was set back starts nothing.
+/// Adds a day whose cutoff is now. [`StoreError::CutoffPassed`] if the day, or a later one, exists, so that a clock that
+/// was set back starts nothing.
 pub(crate) async fn insert(
     connection: &mut SqliteConnection,
-    of: StageDay,
+    stage_day: StageDay,
     deadline_at: Option<Timestamp>,
     now: Timestamp,
 ) -> Result<()> {
-    if let Some(newest) = newest(connection, of.stage).await?
-        && newest.of.date >= of.date
+    if let Some(newest) = newest(connection, stage_day.stage).await?
+        && newest.stage_day.date >= stage_day.date
     {
-        return Err(StoreError::DayHasCut {
-            day: newest.of.date,
-            cut_at: newest.cut_at,
+        return Err(StoreError::CutoffPassed {
+            day: newest.stage_day.date,
+            cutoff_at: newest.cutoff_at,
         });
     }
-    let (stage, day, now) = (Text(of.stage), Text(of.date), Instant(now));
+    let (stage, day, now) = (Text(stage_day.stage), Text(stage_day.date), Instant(now));
     let deadline_at = deadline_at.map(Instant);
     sqlx::query!(
         "INSERT INTO days (stage_id, day, cut_at, deadline_at) VALUES (?, ?, ?, ?)",
@@ -227,25 +227,25 @@ pub(crate) async fn insert(
     Ok(())
 }
 
-/// Adds a missed day with its cut, on whatever date. [`StoreError::DayHasCut`] if it has had it.
+/// Adds a missed day of any date, whose cutoff is now. [`StoreError::CutoffPassed`] if the day exists.
 pub(crate) async fn insert_missed(
     connection: &mut SqliteConnection,
-    of: StageDay,
+    stage_day: StageDay,
     deadline_at: Option<Timestamp>,
     reason: &str,
     now: Timestamp,
 ) -> Result<()> {
-    match find(connection, of).await {
+    match find(connection, stage_day).await {
         Err(StoreError::NotFound(_)) => {}
         Ok(day) => {
-            return Err(StoreError::DayHasCut {
-                day: of.date,
-                cut_at: day.cut_at,
+            return Err(StoreError::CutoffPassed {
+                day: stage_day.date,
+                cutoff_at: day.cutoff_at,
             });
         }
         Err(error) => return Err(error),
     }
-    let (stage, day, now) = (Text(of.stage), Text(of.date), Instant(now));
+    let (stage, day, now) = (Text(stage_day.stage), Text(stage_day.date), Instant(now));
     let deadline_at = deadline_at.map(Instant);
     sqlx::query!(
         "INSERT INTO days (stage_id, day, cut_at, deadline_at, missed_for) VALUES (?, ?, ?, ?, ?)",
@@ -263,10 +263,10 @@ pub(crate) async fn insert_missed(
 /// Releases a day; false if it was released before.
 pub(crate) async fn set_released(
     connection: &mut SqliteConnection,
-    of: StageDay,
+    stage_day: StageDay,
     now: Timestamp,
 ) -> Result<bool> {
-    let (stage, day, now) = (Text(of.stage), Text(of.date), Instant(now));
+    let (stage, day, now) = (Text(stage_day.stage), Text(stage_day.date), Instant(now));
     let released = sqlx::query!(
         "UPDATE days SET released_at = ? WHERE stage_id = ? AND day = ? AND released_at IS NULL",
         now,

@@ -1,4 +1,4 @@
-//! What webhooks are told, and what came of it.
+//! Deliveries of events to webhooks, with their attempts.
 
 use crate::{
     column::Instant,
@@ -8,49 +8,48 @@ use faceoff_types::{DeliveryId, WebhookId};
 use jiff::Timestamp;
 use sqlx::{SqliteConnection, types::Text};
 
-/// One thing told to one webhook.
+/// A message to a webhook.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Delivery {
-    /// As the receiver reads it, however often it is sent.
+    /// Sent to the receiver; the same in all attempts.
     pub id: DeliveryId,
     pub webhook: WebhookId,
-    /// Of which event; none: a test.
+    /// Id of the event; `None` for a test delivery.
     pub event: Option<i64>,
-    /// What happened, by name.
+    /// Kind of the event.
     pub kind: String,
     pub body: String,
-    /// When it was noted.
     pub created_at: Timestamp,
-    /// So often it was sent.
+    /// Number of attempts so far.
     pub attempts: u32,
-    /// What came of the last time.
+    /// Result of the last attempt.
     pub last: Option<DeliveryAttempt>,
     pub state: DeliveryState,
 }
 
-/// How a delivery stands.
+/// State of a delivery.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum DeliveryState {
-    /// It is sent, again.
-    Waiting {
+    /// It will be sent, or sent again.
+    Pending {
         next_at: Timestamp,
     },
     Delivered {
         at: Timestamp,
     },
-    /// It is not sent any more.
+    /// It will not be sent any more.
     GivenUp {
         at: Timestamp,
     },
 }
 
-/// What came of an attempt.
+/// Result of a delivery attempt.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct DeliveryAttempt {
     pub at: Timestamp,
-    /// The status that was answered, if there was an answer.
+    /// HTTP status of the response, if there was one.
     pub status: Option<u16>,
-    /// What was wrong, in words; none: nothing.
+    /// What failed, as text; `None` if the attempt succeeded.
     pub error: Option<String>,
 }
 
@@ -75,12 +74,12 @@ impl TryFrom<Row> for Delivery {
 
     fn try_from(row: Row) -> Result<Self> {
         let state = match (row.next_at, row.settled_at) {
-            (Some(next_at), None) => DeliveryState::Waiting { next_at: next_at.0 },
+            (Some(next_at), None) => DeliveryState::Pending { next_at: next_at.0 },
             (None, Some(at)) if row.is_delivered => DeliveryState::Delivered { at: at.0 },
             (None, Some(at)) => DeliveryState::GivenUp { at: at.0 },
             _ => {
-                let what = format!("delivery {}: neither waiting nor settled", row.id.0);
-                return Err(StoreError::Damaged(what));
+                let message = format!("delivery {}: neither waiting nor settled", row.id.0);
+                return Err(StoreError::Damaged(message));
             }
         };
         Ok(Self {
@@ -101,7 +100,7 @@ impl TryFrom<Row> for Delivery {
     }
 }
 
-/// `SELECT` of whole deliveries; the argument is what follows `FROM webhook_deliveries`.
+/// `SELECT` of whole deliveries; the argument is the SQL after `FROM webhook_deliveries`.
 macro_rules! select_deliveries {
     ($tail:literal $(, $argument:expr)*) => {
         sqlx::query_as!(
@@ -120,7 +119,7 @@ fn all_of(rows: Vec<Row>) -> Result<Vec<Delivery>> {
     rows.into_iter().map(Delivery::try_from).collect()
 }
 
-/// Of each webhook that is alive what has been due for longest at `now`, the longest first.
+/// The longest due delivery of each enabled webhook, the longest due first.
 pub(crate) async fn due(
     connection: &mut SqliteConnection,
     now: Timestamp,
@@ -137,7 +136,7 @@ pub(crate) async fn due(
     all_of(rows.fetch_all(connection).await?)
 }
 
-/// When the next one is to be sent, if one waits.
+/// When the next waiting delivery is due.
 pub(crate) async fn next_due(connection: &mut SqliteConnection) -> Result<Option<Timestamp>> {
     let next = sqlx::query_scalar!(
         r#"SELECT next_at AS "next_at!: Instant" FROM webhook_deliveries
@@ -147,8 +146,8 @@ pub(crate) async fn next_due(connection: &mut SqliteConnection) -> Result<Option
     Ok(next.fetch_optional(connection).await?.map(|at| at.0))
 }
 
-/// A webhook's, the newest first.
-pub(crate) async fn of(
+/// The deliveries of a webhook, the newest first.
+pub(crate) async fn of_webhook(
     connection: &mut SqliteConnection,
     webhook: WebhookId,
     limit: u32,
@@ -170,7 +169,7 @@ pub(crate) async fn find(connection: &mut SqliteConnection, id: DeliveryId) -> R
     row.ok_or(StoreError::NotFound("delivery"))?.try_into()
 }
 
-/// One to be sent at once.
+/// Adds a delivery that is due at once.
 pub(crate) async fn insert(connection: &mut SqliteConnection, delivery: &Delivery) -> Result<()> {
     let (id, webhook, at) = (
         Text(delivery.id),
@@ -192,7 +191,7 @@ pub(crate) async fn insert(connection: &mut SqliteConnection, delivery: &Deliver
     Ok(())
 }
 
-/// Notes what came of an attempt, and how it stands then.
+/// Stores the result of an attempt and the delivery's new state.
 pub(crate) async fn set_attempt(
     connection: &mut SqliteConnection,
     id: DeliveryId,
@@ -201,7 +200,7 @@ pub(crate) async fn set_attempt(
 ) -> Result<()> {
     let (id, at) = (Text(id), Instant(attempt.at));
     let (name, next_at, settled_at) = match state {
-        DeliveryState::Waiting { next_at } => ("waiting", Some(Instant(next_at)), None),
+        DeliveryState::Pending { next_at } => ("waiting", Some(Instant(next_at)), None),
         DeliveryState::Delivered { at } => ("delivered", None, Some(Instant(at))),
         DeliveryState::GivenUp { at } => ("given_up", None, Some(Instant(at))),
     };
@@ -221,7 +220,7 @@ pub(crate) async fn set_attempt(
     Ok(())
 }
 
-/// Gives up what waits of a webhook.
+/// Gives up all waiting deliveries of a webhook.
 pub(crate) async fn give_up(
     connection: &mut SqliteConnection,
     webhook: WebhookId,
@@ -239,14 +238,14 @@ pub(crate) async fn give_up(
     Ok(())
 }
 
-/// Forgets what was settled before; how many.
-pub(crate) async fn forget(connection: &mut SqliteConnection, before: Timestamp) -> Result<u64> {
+/// Deletes the deliveries that were settled before an instant, and returns their number.
+pub(crate) async fn delete_settled(connection: &mut SqliteConnection, before: Timestamp) -> Result<u64> {
     let before = Instant(before);
-    let gone = sqlx::query!(
+    let deleted = sqlx::query!(
         "DELETE FROM webhook_deliveries WHERE state <> 'waiting' AND settled_at < ?",
         before
     )
     .execute(connection)
     .await?;
-    Ok(gone.rows_affected())
+    Ok(deleted.rows_affected())
 }

@@ -2,7 +2,7 @@ use crate::error::{Result, StoreError};
 use faceoff_types::DivisionName;
 use sqlx::{SqliteConnection, types::Text};
 
-/// In the organisers' order.
+/// All divisions, in the organisers' order.
 pub(crate) async fn all(connection: &mut SqliteConnection) -> Result<Vec<DivisionName>> {
     let names = sqlx::query_scalar!(
         r#"SELECT name AS "name: Text<DivisionName>" FROM divisions ORDER BY position"#
@@ -12,7 +12,7 @@ pub(crate) async fn all(connection: &mut SqliteConnection) -> Result<Vec<Divisio
     Ok(names.into_iter().map(|name| name.0).collect())
 }
 
-/// A division as the organisers wrote it. [`StoreError::Conflict`] if there is none of this name.
+/// The division of this name, with the organisers' spelling. [`StoreError::Conflict`] if there is none.
 pub(crate) async fn check(
     connection: &mut SqliteConnection,
     name: &DivisionName,
@@ -31,7 +31,7 @@ pub(crate) async fn check(
     })
 }
 
-/// How many teams are in it.
+/// Number of teams in the division.
 pub(crate) async fn teams_in(
     connection: &mut SqliteConnection,
     name: &DivisionName,

@@ -4,7 +4,7 @@ use crate::{
     column::Instant,
     error::{Result, StoreError},
 };
-use faceoff_types::{LeftAs, RoundNumber, TeamId, TeamName, TournamentId};
+use faceoff_types::{DepartureKind, RoundNumber, TeamId, TeamName, TournamentId};
 use jiff::Timestamp;
 use sqlx::{SqliteConnection, types::Text};
 
@@ -12,33 +12,32 @@ use sqlx::{SqliteConnection, types::Text};
 #[derive(Debug, Clone, PartialEq)]
 pub struct Entrant {
     pub team: TeamId,
-    /// As it is called now.
+    /// The team's current name.
     pub name: TeamName,
-    /// Since when it is in it.
     pub entered_at: Timestamp,
-    /// It plays no more in it, if so.
-    pub left: Option<Leave>,
+    /// Set if the team has left the running tournament.
+    pub departure: Option<Departure>,
 }
 
-/// A team left in the middle.
+/// A team's departure from a running tournament.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Leave {
-    pub left_as: LeftAs,
-    /// The first round whose games with it do not count.
+pub struct Departure {
+    pub kind: DepartureKind,
+    /// The first round in which its games do not count.
     pub from_round: RoundNumber,
     pub at: Timestamp,
-    /// As everybody may read it.
+    /// Public.
     pub reason: String,
 }
 
-const fn word(left_as: LeftAs) -> &'static str {
-    match left_as {
-        LeftAs::Withdrawn => "withdrawn",
-        LeftAs::Disqualified => "disqualified",
+const fn label(kind: DepartureKind) -> &'static str {
+    match kind {
+        DepartureKind::Withdrawn => "withdrawn",
+        DepartureKind::Disqualified => "disqualified",
     }
 }
 
-/// All of a tournament, by name.
+/// All teams of a tournament, by name.
 pub(crate) async fn all(
     connection: &mut SqliteConnection,
     tournament: TournamentId,
@@ -56,7 +55,7 @@ pub(crate) async fn all(
     rows.into_iter()
         .map(|row| {
             let team = row.team.0;
-            let left = match (
+            let departure = match (
                 row.left_as.as_deref(),
                 row.from_round,
                 row.left_at,
@@ -69,28 +68,32 @@ pub(crate) async fn all(
                             "entrant {team}: left as {left_as:?} from round {from_round}"
                         ))
                     };
-                    let known = [LeftAs::Withdrawn, LeftAs::Disqualified];
-                    let left_as = known.into_iter().find(|one| word(*one) == left_as);
-                    Some(Leave {
-                        left_as: left_as.ok_or_else(damaged)?,
+                    let known = [DepartureKind::Withdrawn, DepartureKind::Disqualified];
+                    let left_as = known.into_iter().find(|one| label(*one) == left_as);
+                    Some(Departure {
+                        kind: left_as.ok_or_else(damaged)?,
                         from_round: from_round.try_into().map_err(|_| damaged())?,
                         at: at.0,
                         reason,
                     })
                 }
-                _ => return Err(StoreError::Damaged(format!("entrant {team}: left in part"))),
+                _ => {
+                    return Err(StoreError::Damaged(format!(
+                        "entrant {team}: its departure is incomplete"
+                    )));
+                }
             };
             Ok(Entrant {
                 team,
                 name: row.name.0,
                 entered_at: row.entered_at.0,
-                left,
+                departure,
             })
         })
         .collect()
 }
 
-/// A team is not in it, and never was.
+/// Removes a team from a tournament that has not begun.
 pub(crate) async fn remove(
     connection: &mut SqliteConnection,
     tournament: TournamentId,
@@ -125,21 +128,21 @@ pub(crate) async fn put(
     Ok(())
 }
 
-pub(crate) async fn set_left(
+pub(crate) async fn set_departure(
     connection: &mut SqliteConnection,
     tournament: TournamentId,
     team: TeamId,
-    leave: &Leave,
+    departure: &Departure,
 ) -> Result<()> {
-    let (tournament, team, at) = (Text(tournament), Text(team), Instant(leave.at));
-    let (left_as, from_round) = (word(leave.left_as), leave.from_round.get());
+    let (tournament, team, at) = (Text(tournament), Text(team), Instant(departure.at));
+    let (left_as, from_round) = (label(departure.kind), departure.from_round.get());
     sqlx::query!(
         "UPDATE entrants SET left_as = ?, from_round = ?, left_at = ?, left_for = ?
          WHERE tournament_id = ? AND team_id = ?",
         left_as,
         from_round,
         at,
-        leave.reason,
+        departure.reason,
         tournament,
         team,
     )

@@ -1,4 +1,4 @@
-//! Evaluations as they are entered: who plays which day, whatever comes of it.
+//! Entries of evaluations: which team is evaluated on which day, regardless of the result.
 
 use crate::{
     column::Instant,
@@ -8,13 +8,13 @@ use faceoff_types::{EvaluationId, RunId, StageDay, StageId, SubmissionId, TeamId
 use jiff::{Timestamp, civil::Date};
 use sqlx::{SqliteConnection, types::Text};
 
-/// What an evaluation is, whatever became of it.
+/// The fixed data of an evaluation, without its state.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Entry {
     pub(crate) id: EvaluationId,
     pub(crate) submission: SubmissionId,
     pub(crate) team: TeamId,
-    pub(crate) of: StageDay,
+    pub(crate) stage_day: StageDay,
     pub(crate) revision: u32,
     pub(crate) run: RunId,
     pub(crate) rerun_of: Option<EvaluationId>,
@@ -38,7 +38,7 @@ pub(crate) async fn find(connection: &mut SqliteConnection, id: EvaluationId) ->
         id,
         submission: row.submission.0,
         team: row.team.0,
-        of: StageDay {
+        stage_day: StageDay {
             stage: row.stage.0,
             date: row.day.0,
         },
@@ -48,15 +48,14 @@ pub(crate) async fn find(connection: &mut SqliteConnection, id: EvaluationId) ->
     })
 }
 
-/// Adds an evaluation that nobody has begun; [`StoreError::Conflict`] if the team has one of the day
-/// that counts.
+/// Adds a queued evaluation. [`StoreError::Conflict`] if the team has another one on the day that counts.
 pub(crate) async fn insert(
     connection: &mut SqliteConnection,
     new: &Entry,
     now: Timestamp,
 ) -> Result<()> {
     let (id, submission, team) = (Text(new.id), Text(new.submission), Text(new.team));
-    let (stage, day) = (Text(new.of.stage), Text(new.of.date));
+    let (stage, day) = (Text(new.stage_day.stage), Text(new.stage_day.date));
     let (run, now, rerun_of) = (Text(new.run), Instant(now), new.rerun_of.map(Text));
     sqlx::query!(
         "INSERT INTO evaluations (id, submission_id, team_id, stage_id, day, revision, run_id, created_at, state,
@@ -77,8 +76,8 @@ pub(crate) async fn insert(
     .map_err(|error| {
         if StoreError::is_duplicate(&error, "evaluations.day") {
             StoreError::Conflict(format!(
-                "the team has another evaluation of {} that counts, or that is under way",
-                new.of.date
+                "the team has another evaluation on {} that counts or is running",
+                new.stage_day.date
             ))
         } else {
             error.into()
@@ -87,7 +86,7 @@ pub(crate) async fn insert(
     Ok(())
 }
 
-/// Marks it as a turn beside the day's own.
+/// Marks an evaluation as an extra one, beside the team's regular one of the day.
 pub(crate) async fn set_extra(
     connection: &mut SqliteConnection,
     id: EvaluationId,
@@ -104,16 +103,16 @@ pub(crate) async fn set_extra(
     Ok(())
 }
 
-/// What plays an extra turn again is one, too.
-pub(crate) async fn follow_extra(
+/// Marks an evaluation as an extra one if the evaluation that it repeats is one.
+pub(crate) async fn copy_extra(
     connection: &mut SqliteConnection,
     id: EvaluationId,
-    of: EvaluationId,
+    original: EvaluationId,
 ) -> Result<()> {
-    let (id, of) = (Text(id), Text(of));
+    let (id, original) = (Text(id), Text(original));
     sqlx::query!(
         "UPDATE evaluations SET extra_for = (SELECT o.extra_for FROM evaluations o WHERE o.id = ?) WHERE id = ?",
-        of,
+        original,
         id
     )
     .execute(connection)

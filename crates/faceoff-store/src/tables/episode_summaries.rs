@@ -1,4 +1,4 @@
-//! What boards and comparisons need of a run's episodes. Derived data, which may be made again.
+//! Summaries of runs' episodes, for boards and comparisons. They are derived data and can be recomputed.
 
 use crate::{column::Json, error::Result};
 use faceoff_types::RunId;
@@ -29,7 +29,7 @@ pub(crate) async fn of_runs(
         .collect())
 }
 
-/// Keeps a summary in place of an earlier one.
+/// Stores a summary, replacing an earlier one.
 pub(crate) async fn put(
     connection: &mut SqliteConnection,
     run: RunId,

@@ -10,52 +10,49 @@ use faceoff_types::{
 use jiff::{Timestamp, civil::Date};
 use sqlx::{SqliteConnection, types::Text};
 
-/// A submission's run that counts: its team's of a day.
+/// An evaluation: a team's run of all tasks on an evaluation day.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Evaluation {
     /// Part of its URLs.
     pub id: EvaluationId,
     pub submission: SubmissionId,
     pub team: TeamId,
-    /// The day whose seed it takes.
-    pub of: StageDay,
-    /// By which of the stage's rules it is played: its board shows no others.
+    /// Stage and date of the day; its seed derives from them.
+    pub stage_day: StageDay,
+    /// Revision of the stage's rules; a board shows one revision only.
     pub revision: u32,
-    /// When the day was released; `None` while nothing may be told of its episodes.
+    /// When the day was released; `None` while its episodes are secret.
     pub released_at: Option<Timestamp>,
-    /// Until when the day may be played; `None`: however long it takes.
+    /// Deadline of the day; `None`: there is none.
     pub deadline_at: Option<Timestamp>,
-    /// The evaluation that it plays again: one that we broke, or that was cancelled.
+    /// The earlier evaluation that it repeats after a platform fault or a cancellation.
     pub rerun_of: Option<EvaluationId>,
-    /// Its episodes and shards.
     pub run: RunId,
-    /// What the run plays.
     pub plan: RunPlan,
     /// When it was queued.
     pub created_at: Timestamp,
-    /// Why it is a turn beside the day's own; `None` if it is the day's.
+    /// The reason of an extra evaluation; `None` for the team's regular one of the day.
     pub extra_for: Option<String>,
-    /// It does not count, if it was.
+    /// Set if it was voided and does not count.
     pub voided: Option<Ruling>,
-    /// When its team made its dataset public, if it did.
+    /// When its team published its dataset.
     pub published_at: Option<Timestamp>,
-    /// Its dataset was removed, if it was: by which retention.
+    /// Set if its dataset was removed; the reason names the retention.
     pub dataset_removed: Option<Ruling>,
-    /// How far it is.
     pub state: EvaluationState,
 }
 
-/// An evaluation's way from the queue to the board.
+/// State of an evaluation, from the queue to its result.
 #[derive(Debug, Clone, PartialEq)]
 pub enum EvaluationState {
-    /// No shard was begun.
+    /// No shard has started.
     Queued,
     Running {
-        /// As far as the workers have told.
+        /// As reported by the workers.
         episodes_done: u32,
         episodes_total: u32,
     },
-    /// All shards are in, the score is being computed.
+    /// All shards are committed, the score is being computed.
     Finalising,
     Finished {
         /// When score and dataset were stored.
@@ -63,39 +60,37 @@ pub enum EvaluationState {
         result: Box<EvaluationResult>,
         /// Artifact key of the dataset archive.
         dataset: String,
-        /// BLAKE3 of the archive, 64 hexadecimal digits; unknown of those that older programs made.
+        /// BLAKE3 of the archive, 64 hexadecimal digits; `None` for datasets of older versions.
         dataset_blake3: Option<String>,
     },
-    /// Too many agent faults; no score. They and the log are read by themselves
-    /// ([`Store::run_faults`](crate::Store::run_faults)).
+    /// Ended without a score after too many agent faults. [`Store::run_faults`](crate::Store::run_faults) reads the
+    /// faults and the log.
     AgentFailed {
-        /// When the fault was committed that was one too many.
+        /// When the fault that exceeded the limit was committed.
         finished_at: Timestamp,
     },
-    /// Our fault; the day does not count for the team unless it is played again.
+    /// Ended without a score after platform faults; an organiser may repeat it.
     PlatformFailed {
         /// When it was given up.
         finished_at: Timestamp,
         reason: String,
     },
-    /// Its day's deadline came before it was played: our capacity. The turn is given back.
+    /// Incomplete at its day's deadline, for lack of server capacity.
     NotPlayed {
-        /// When it was ended.
         finished_at: Timestamp,
-        /// As told to the team.
+        /// Shown to the team.
         reason: String,
     },
-    /// Stopped by an organiser, who may have it played again.
+    /// Cancelled by an organiser, who may repeat it.
     Cancelled {
-        /// When it was stopped.
         finished_at: Timestamp,
-        /// As told to the team.
+        /// Shown to the team.
         reason: String,
     },
 }
 
 impl EvaluationState {
-    /// Has it come to an end, whichever?
+    /// Has the evaluation ended, with or without a result?
     #[must_use]
     pub const fn is_over(&self) -> bool {
         !matches!(self, Self::Queued | Self::Running { .. } | Self::Finalising)
@@ -139,14 +134,14 @@ pub(crate) struct EvaluationRow {
 }
 
 impl EvaluationRow {
-    /// The run, if its progress is part of the evaluation's state.
+    /// The run, if it is running: its progress is part of the evaluation's state.
     pub(crate) fn run_under_way(&self) -> Option<RunId> {
         (self.state == "open" && self.run_state == RunState::Running).then_some(self.run_id.0)
     }
 
     pub(crate) fn into_evaluation(self, episodes_done: u32) -> Result<Evaluation> {
-        let damaged = |what: &str| {
-            StoreError::Damaged(format!("evaluation {}: {} {what}", self.id.0, self.state))
+        let damaged = |problem: &str| {
+            StoreError::Damaged(format!("evaluation {}: {} {problem}", self.id.0, self.state))
         };
         let plan = RunPlan {
             profile: self.profile.0,
@@ -177,7 +172,7 @@ impl EvaluationRow {
                 episodes_done: episodes_done.min(episodes_total),
                 episodes_total,
             },
-            ("open", RunState::Played) => EvaluationState::Finalising,
+            ("open", RunState::Complete) => EvaluationState::Finalising,
             ("finished", _) => EvaluationState::Finished {
                 finished_at: finished_at()?,
                 result: match self.result {
@@ -211,7 +206,7 @@ impl EvaluationRow {
             id: self.id.0,
             submission: self.submission_id.0,
             team: self.team_id.0,
-            of: StageDay {
+            stage_day: StageDay {
                 stage: self.stage_id.0,
                 date: self.day.0,
             },
@@ -223,15 +218,15 @@ impl EvaluationRow {
             plan,
             created_at: self.created_at.0,
             extra_for: self.extra_for,
-            voided: Ruling::of(self.voided_at, self.voided_for),
+            voided: Ruling::from_columns(self.voided_at, self.voided_for),
             published_at: self.published_at.map(|at| at.0),
-            dataset_removed: Ruling::of(self.dataset_removed_at, self.dataset_removed_for),
+            dataset_removed: Ruling::from_columns(self.dataset_removed_at, self.dataset_removed_for),
             state,
         })
     }
 }
 
-/// `SELECT` of evaluations `e` with their runs `r`; the argument is what follows `FROM`'s tables.
+/// `SELECT` of evaluations `e` with their runs `r`; the argument is the SQL after the tables.
 macro_rules! select_evaluations {
     ($tail:literal $(, $argument:expr)*) => {
         sqlx::query_as!(
@@ -272,7 +267,7 @@ pub(crate) async fn find(
         .ok_or(StoreError::NotFound("evaluation"))
 }
 
-/// A team's evaluations, newest first.
+/// A team's evaluations, the newest first.
 pub(crate) async fn of_team(
     connection: &mut SqliteConnection,
     team: TeamId,
@@ -286,7 +281,7 @@ pub(crate) async fn of_team(
     .await?)
 }
 
-/// When an evaluation was queued, if there is one of this id.
+/// When the evaluation was queued; `None` if the id is unknown.
 pub(crate) async fn created_at(
     connection: &mut SqliteConnection,
     id: EvaluationId,
@@ -299,7 +294,7 @@ pub(crate) async fn created_at(
     Ok(at.fetch_optional(connection).await?.map(|at| at.0))
 }
 
-/// Some of a team's evaluations, of one date or of all, newest first: those behind one of this time and id.
+/// One page of a team's evaluations, on one date or on all, the newest first. It follows the given time and id.
 pub(crate) async fn of_team_after(
     connection: &mut SqliteConnection,
     team: TeamId,
@@ -322,7 +317,7 @@ pub(crate) async fn of_team_after(
     .await?)
 }
 
-/// Some of the evaluations of all stages on a date, in the order in which they were queued: those behind one of this time
+/// One page of the evaluations of all stages on a date, in the order in which they were queued. It follows the given time
 /// and id.
 pub(crate) async fn on_date_after(
     connection: &mut SqliteConnection,
@@ -343,12 +338,12 @@ pub(crate) async fn on_date_after(
     .await?)
 }
 
-/// The evaluations of a stage's day, in the order in which they were queued.
+/// The evaluations of a stage on one day, in the order in which they were queued.
 pub(crate) async fn of_day(
     connection: &mut SqliteConnection,
-    of: StageDay,
+    stage_day: StageDay,
 ) -> Result<Vec<EvaluationRow>> {
-    let (stage, day) = (Text(of.stage), Text(of.date));
+    let (stage, day) = (Text(stage_day.stage), Text(stage_day.date));
     Ok(select_evaluations!(
         "WHERE e.stage_id = ? AND e.day = ? ORDER BY e.created_at, e.id",
         stage,
@@ -373,7 +368,6 @@ pub(crate) async fn of_run(
     Ok(found.map(|id| id.0))
 }
 
-/// The run that an evaluation owns.
 pub(crate) async fn run_of(connection: &mut SqliteConnection, id: EvaluationId) -> Result<RunId> {
     let id = Text(id);
     sqlx::query_scalar!(
@@ -386,13 +380,13 @@ pub(crate) async fn run_of(connection: &mut SqliteConnection, id: EvaluationId) 
     .ok_or(StoreError::NotFound("evaluation"))
 }
 
-/// How many evaluations of a team and day ended by our fault.
-pub(crate) async fn count_broken(
+/// Number of a team's evaluations on a day that ended by a platform fault.
+pub(crate) async fn count_platform_failed(
     connection: &mut SqliteConnection,
     team: TeamId,
-    of: StageDay,
+    stage_day: StageDay,
 ) -> Result<usize> {
-    let (team, stage, day) = (Text(team), Text(of.stage), Text(of.date));
+    let (team, stage, day) = (Text(team), Text(stage_day.stage), Text(stage_day.date));
     let count = sqlx::query_scalar!(
         r#"SELECT COUNT(*) AS "count!: u32" FROM evaluations
            WHERE team_id = ? AND stage_id = ? AND day = ? AND state = 'platform_failed'"#,
@@ -414,7 +408,7 @@ pub(crate) async fn set_finished(
     now: Timestamp,
 ) -> Result<()> {
     let (id, result, now) = (Text(id), Json(result), Instant(now));
-    // Of a proposal that was looked at for days the run was cleared: what is left is no measurement.
+    // An old proposal's run may have been cleared before it was applied: then its slot time is unknown.
     sqlx::query!(
         "UPDATE evaluations SET state = 'finished', finished_at = ?, result = ?, dataset = ?, dataset_blake3 = ?,
                                 slot_ms = (SELECT SUM(u.charged_ms) FROM shards s JOIN units u ON u.id = s.unit_id
@@ -432,14 +426,15 @@ pub(crate) async fn set_finished(
     Ok(())
 }
 
-/// How an evaluation ends without a score.
+/// Why an evaluation ended without a score.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Failure<'a> {
     Agent,
-    /// With what went wrong.
+    /// By platform faults; with the cause.
     Platform(&'a str),
+    /// By an organiser; with the reason.
     Cancelled(&'a str),
-    /// By its day's deadline, in words for the team.
+    /// By its day's deadline; with a text for the team.
     NotPlayed(&'a str),
 }
 
@@ -469,12 +464,15 @@ pub(crate) async fn set_failed(
     Ok(())
 }
 
-/// How many are not over, of one day or of all.
+/// Number of open evaluations, of one day or of all.
 pub(crate) async fn count_open(
     connection: &mut SqliteConnection,
-    of: Option<StageDay>,
+    stage_day: Option<StageDay>,
 ) -> Result<u32> {
-    let (stage, day) = (of.map(|of| Text(of.stage)), of.map(|of| Text(of.date)));
+    let (stage, day) = (
+        stage_day.map(|day| Text(day.stage)),
+        stage_day.map(|day| Text(day.date)),
+    );
     Ok(sqlx::query_scalar!(
         r#"SELECT COUNT(*) AS "count!: u32" FROM evaluations
            WHERE state = 'open' AND (?1 IS NULL OR stage_id = ?1 AND day = ?2)"#,

@@ -1,5 +1,5 @@
-//! What happened. Rows are added by [`write`](crate::write) alone, and never changed; what was told of a run while it
-//! was played goes with its shards.
+//! The events table. Only [`write`](crate::write) adds rows, and rows are never changed. Events about the progress of a
+//! run are deleted with its shards.
 
 use crate::{
     column::{Instant, Json},
@@ -10,16 +10,15 @@ use faceoff_types::RunId;
 use serde_json::{Map, Value};
 use sqlx::{SqliteConnection, types::Text};
 
-/// Which events are looked for; `None` allows any.
+/// Selects events; `None` matches any.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct EventFilter {
-    /// Only those before the one with this id.
+    /// Only events before the one with this id.
     pub before: Option<i64>,
-    /// Who caused it, as [`Actor`] is written; or all of a kind, as `team`.
+    /// The text of an [`Actor`], or a kind of actors, such as `team`.
     pub actor: Option<String>,
-    /// What it is about.
     pub subject: Option<Subject>,
-    /// The name of what happened, as `team_created`.
+    /// The event kind, such as `team_created`.
     pub kind: Option<String>,
 }
 
@@ -54,7 +53,7 @@ impl TryFrom<Row> for EventRecord {
     }
 }
 
-/// The events after the one with id `after`, the oldest first, `limit` at most.
+/// The events after the one with id `after`, the oldest first, at most `limit`.
 pub(crate) async fn after(
     connection: &mut SqliteConnection,
     after: i64,
@@ -73,7 +72,7 @@ pub(crate) async fn after(
     rows.into_iter().map(EventRecord::try_from).collect()
 }
 
-/// The id of the newest event that does not tell of a run's progress; 0 before the first.
+/// The id of the newest event that does not only report a run's progress; 0 if there is none.
 pub(crate) async fn newest_change(connection: &mut SqliteConnection) -> Result<i64> {
     let newest = sqlx::query_scalar!(
         r#"SELECT id AS "id!" FROM events WHERE kind NOT IN ('shard_committed', 'unit_given_back')
@@ -82,14 +81,14 @@ pub(crate) async fn newest_change(connection: &mut SqliteConnection) -> Result<i
     Ok(newest.fetch_optional(connection).await?.unwrap_or_default())
 }
 
-/// The id of the newest event; 0 before the first. None that is gone was newer: a run's progress goes after its end, which
-/// is told.
+/// The id of the newest event; 0 if there is none. No deleted event was newer: a run's progress is deleted after the event
+/// of the run's end.
 pub(crate) async fn newest_id(connection: &mut SqliteConnection) -> Result<i64> {
     let newest = sqlx::query_scalar!(r#"SELECT id AS "id!" FROM events ORDER BY id DESC LIMIT 1"#);
     Ok(newest.fetch_optional(connection).await?.unwrap_or_default())
 }
 
-/// Removes what was told of a run while it was played.
+/// Deletes the events about a run's progress.
 pub(crate) async fn remove_progress(
     connection: &mut SqliteConnection,
     subject: &Subject,
@@ -109,7 +108,7 @@ pub(crate) async fn remove_progress(
     Ok(())
 }
 
-/// The newest events that the filter lets through, the newest first, `limit` at most.
+/// The newest events that match the filter, the newest first, at most `limit`.
 pub(crate) async fn newest(
     connection: &mut SqliteConnection,
     filter: &EventFilter,
@@ -122,7 +121,7 @@ pub(crate) async fn newest(
         kind,
     } = filter;
     let before = before.unwrap_or(i64::MAX);
-    // Two statements, since each goes by an index of its own.
+    // Two statements, because each uses a different index.
     let rows = match subject {
         Some(subject) => {
             let (subject_kind, subject_id) = subject.columns();

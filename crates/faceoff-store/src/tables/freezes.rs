@@ -1,10 +1,10 @@
-//! Which boards stand still.
+//! Frozen boards.
 
 use crate::{column::Instant, error::Result, tables::rulings::Ruling};
 use faceoff_types::StageId;
 use sqlx::{SqliteConnection, types::Text};
 
-/// Since when the boards of a stage stand still, and why; `None` if they do not.
+/// Time and reason of the freeze of a stage's boards; `None` if they are not frozen.
 pub(crate) async fn find(
     connection: &mut SqliteConnection,
     stage: StageId,
@@ -22,7 +22,7 @@ pub(crate) async fn find(
     }))
 }
 
-/// All stages whose boards stand still.
+/// All stages with frozen boards.
 pub(crate) async fn all(connection: &mut SqliteConnection) -> Result<Vec<(StageId, Ruling)>> {
     let rows = sqlx::query!(
         r#"SELECT stage_id AS "stage: Text<StageId>", frozen_at AS "at: Instant", reason FROM frozen_boards"#

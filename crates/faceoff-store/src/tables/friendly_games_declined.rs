@@ -1,11 +1,11 @@
-//! The teams that play no friendly games which others ask for.
+//! The teams that decline friendly games requested by other teams.
 
 use crate::error::Result;
 use faceoff_types::TeamId;
 use sqlx::{SqliteConnection, types::Text};
 
-/// Does a team play none?
-pub(crate) async fn has(connection: &mut SqliteConnection, team: TeamId) -> Result<bool> {
+/// Does the team decline friendly games?
+pub(crate) async fn declines(connection: &mut SqliteConnection, team: TeamId) -> Result<bool> {
     let team = Text(team);
     Ok(sqlx::query_scalar!(
         r#"SELECT EXISTS (SELECT 1 FROM friendly_games_declined WHERE team_id = ?) AS "declines!: bool""#,

@@ -1,111 +1,108 @@
-//! A game on the server: what it is for, how it stands, and what it came to.
+//! Types of games: purpose, state and result.
 
-use faceoff_types::{GameId, GameSeed, RoundNumber, SubmissionId, TeamId, TournamentId};
+use faceoff_types::{GameId, GameSeedLabel, RoundNumber, SubmissionId, TeamId, TournamentId};
 use jiff::Timestamp;
 use serde_json::Value;
 
-/// Two submissions at one table. Pairs are the home side's first, which moves the first robot.
+/// A game between two submissions. Pairs have the home side first, which controls the first robot.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Game {
     /// Part of its URLs.
     pub id: GameId,
     pub tournament: TournamentId,
-    /// What it is for.
     pub purpose: GamePurpose,
     pub teams: [TeamId; 2],
     pub submissions: [SubmissionId; 2],
-    /// What its seed follows from.
-    pub seed: GameSeed,
-    /// When it was queued first.
+    /// Label from which its seed derives.
+    pub seed: GameSeedLabel,
+    /// When it was first queued.
     pub created_at: Timestamp,
     pub state: GameState,
 }
 
-/// What a game is for.
+/// The purpose of a game.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum GamePurpose {
-    Round(Meeting),
-    /// Against the organisers' baseline, which is away.
+    Round(ScheduleEntry),
+    /// A test game against the organisers' baseline, which is the away side.
     Test {
-        /// Who asked for it; none: an organiser.
+        /// The team that requested it; `None`: an organiser.
         asked_by: Option<TeamId>,
     },
-    /// Two teams, before or between rounds.
+    /// A friendly game of two teams, before or between rounds.
     Friendly {
-        /// Who asked for it, and whose quota it takes.
+        /// The team that requested it; it counts towards this team's quota.
         asked_by: TeamId,
     },
-    /// The schedule played again: how sure is its champion?
+    /// A game of a replay of the schedule, which measures how certain the champion is.
     Replay {
-        /// Which time, from 1.
+        /// Number of the replay, from 1.
         replay: u32,
-        /// The game that is played again.
-        of: Meeting,
+        /// The game that is repeated.
+        original: ScheduleEntry,
     },
 }
 
-/// The place of a game in its tournament.
+/// The place of a game in its tournament's schedule.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Meeting {
+pub struct ScheduleEntry {
     pub round: RoundNumber,
     /// From 1.
     pub matchday: u32,
-    /// From 1, in the order in which the round was drawn.
-    pub meeting: u32,
-    /// Is it the second game of a mirrored pair, with sides swapped?
+    /// Number of the pairing, from 1, in the order in which the round was drawn.
+    pub pairing: u32,
+    /// True for the second game of a mirrored pair, with sides swapped.
     pub second_half: bool,
 }
 
-/// How a game stands.
+/// State of a game.
 #[derive(Debug, Clone, PartialEq)]
 pub enum GameState {
-    /// No slot has it.
     Queued,
-    /// A slot plays it.
     Running {
-        /// Which attempt, from 1.
+        /// From 1.
         attempt: u32,
         since: Timestamp,
     },
-    /// It has a result.
+    /// The game has a result.
     Played(Box<GameResultRow>),
-    /// Our fault, given up: it has no result until it is played again.
-    Broken {
+    /// Given up after platform faults: it has no result until it is repeated.
+    PlatformFailed {
         at: Timestamp,
         reason: String,
     },
-    /// It had a result that counts no more: it has none until it is played again.
+    /// Its result was voided: it has none until it is repeated.
     Void {
         at: Timestamp,
-        /// As everybody may read it.
+        /// Public.
         reason: String,
     },
-    /// It is not played: a side left, or it does not count and was called off.
+    /// It is not played: a team left the tournament, or it does not count and was cancelled.
     Cancelled {
         at: Timestamp,
-        /// As everybody may read it.
+        /// Public.
         reason: String,
     },
 }
 
 impl GameState {
-    /// Does it wait for a slot, or is it played?
+    /// Is the game queued or running?
     #[must_use]
     pub const fn is_open(&self) -> bool {
         matches!(self, Self::Queued | Self::Running { .. })
     }
 }
 
-/// What a game came to.
+/// The stored result of a game.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GameResultRow {
     /// The attempt that counts, from 1.
     pub attempt: u32,
     /// When it was committed.
     pub at: Timestamp,
-    /// The scoring's: a game's `results.json`.
+    /// A game's `results.json`, as computed by the scoring.
     pub score: Value,
-    /// Where its files are; none of a replay of the schedule.
+    /// Its stored files; `None` for a replay of the schedule.
     pub recording: Option<GameRecording>,
 }
 
@@ -116,23 +113,23 @@ pub struct GameRecording {
     pub key: String,
     /// BLAKE3 of `game.zip`, 64 hexadecimal digits.
     pub game_blake3: String,
-    /// Of the sides' own files, the home side's first.
+    /// BLAKE3 of `side-1.zip` and `side-2.zip`; the home side is the first.
     pub side_blake3: [String; 2],
 }
 
-/// What playing a game yields.
+/// The result of playing a game, as committed by a worker.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GameCommit {
-    /// The scoring's: a game's `results.json`.
+    /// A game's `results.json`, as computed by the scoring.
     pub score: Value,
-    /// Uploaded before; none exactly of a replay of the schedule.
+    /// Files that were uploaded before; `None` exactly for a replay of the schedule.
     pub recording: Option<GameRecording>,
-    /// The ends of both agents' standard errors, with their faults.
+    /// The tails of both agents' standard errors, with their faults.
     pub logs: [String; 2],
 }
 
 impl GamePurpose {
-    pub(super) const fn word(self) -> &'static str {
+    pub(super) const fn label(self) -> &'static str {
         match self {
             Self::Round(_) => "round",
             Self::Test { .. } => "test",
@@ -141,16 +138,16 @@ impl GamePurpose {
         }
     }
 
-    /// Its place in the schedule, if it has one.
+    /// The game's place in the schedule; `None` for test games and friendly games.
     #[must_use]
-    pub const fn meeting(self) -> Option<Meeting> {
+    pub const fn schedule_entry(self) -> Option<ScheduleEntry> {
         match self {
-            Self::Round(meeting) | Self::Replay { of: meeting, .. } => Some(meeting),
+            Self::Round(meeting) | Self::Replay { original: meeting, .. } => Some(meeting),
             Self::Test { .. } | Self::Friendly { .. } => None,
         }
     }
 
-    /// Is its recording stored?
+    /// Is the game's recording stored?
     #[must_use]
     pub const fn keeps_recording(self) -> bool {
         !matches!(self, Self::Replay { .. })

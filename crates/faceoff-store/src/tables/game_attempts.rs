@@ -1,4 +1,4 @@
-//! Every time that a slot began a game, whatever came of it: kept apart from results.
+//! Attempts at games, including those without a result.
 
 use crate::{
     column::{Instant, Json},
@@ -9,43 +9,46 @@ use faceoff_types::{GameId, Side};
 use jiff::Timestamp;
 use sqlx::{SqliteConnection, types::Text};
 
-/// A time that a slot began a game.
+/// An attempt of a slot at a game.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct GameAttempt {
     /// From 1.
     pub number: u32,
     pub worker: String,
     pub begun_at: Timestamp,
-    /// What came of it; none: it is under way.
+    /// `None` while the attempt is running.
     pub end: Option<AttemptEnd>,
 }
 
-/// What came of an attempt.
+/// The end of an attempt.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct AttemptEnd {
     pub at: Timestamp,
-    pub how: AttemptOutcome,
-    /// What went wrong, or why it was called off or its result voided; in words for the teams.
+    pub outcome: AttemptOutcome,
+    /// Why it failed, was cancelled or its result voided; a text for the teams.
     pub reason: Option<String>,
 }
 
-/// What came of an attempt.
+/// Outcome of an attempt.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, sqlx::Type)]
 #[sqlx(rename_all = "snake_case")]
 pub enum AttemptOutcome {
-    /// A result, which counts unless it was voided.
+    /// It has a result, which counts unless it was voided.
     Played,
-    /// A fault of ours.
-    Broken,
-    /// The slot was asked to end, or found no room; the attempt does not count against the game.
-    GivenBack,
-    /// The slot died: its lease ran out, or was ended.
+    /// It ended by a platform fault.
+    #[sqlx(rename = "broken")]
+    PlatformFailed,
+    /// The slot was stopped, or ran out of disk space; the attempt does not count against the game.
+    #[sqlx(rename = "given_back")]
+    Released,
+    /// The slot died: its lease expired or was ended.
     Lost,
-    /// The game was called off meanwhile.
-    CalledOff,
+    /// The game was cancelled meanwhile.
+    #[sqlx(rename = "called_off")]
+    Cancelled,
 }
 
-/// All of a game, in order.
+/// All attempts at a game, in order.
 pub(crate) async fn all(
     connection: &mut SqliteConnection,
     game: GameId,
@@ -67,14 +70,14 @@ pub(crate) async fn all(
             begun_at: row.begun_at.0,
             end: row.ended_at.zip(row.outcome).map(|(at, how)| AttemptEnd {
                 at: at.0,
-                how,
+                outcome: how,
                 reason: row.reason,
             }),
         })
         .collect())
 }
 
-/// A slot begins a game; the number of the attempt.
+/// Adds an attempt of a slot that starts a game, and returns its number.
 pub(crate) async fn begin(
     connection: &mut SqliteConnection,
     game: GameId,
@@ -94,8 +97,8 @@ pub(crate) async fn begin(
     .await?)
 }
 
-/// Another slot plays the attempt that is under way than the one that it was given out by.
-pub(crate) async fn hand_over(
+/// Names another slot as the worker of the running attempt.
+pub(crate) async fn transfer(
     connection: &mut SqliteConnection,
     game: GameId,
     worker: &str,
@@ -111,7 +114,7 @@ pub(crate) async fn hand_over(
     Ok(())
 }
 
-/// Ends the attempt of a game that is under way, if one is.
+/// Ends the running attempt at a game, if there is one.
 pub(crate) async fn end(
     connection: &mut SqliteConnection,
     game: GameId,
@@ -132,7 +135,7 @@ pub(crate) async fn end(
     Ok(())
 }
 
-/// Says why the result of an attempt counts no more.
+/// Notes why the result of an attempt was voided.
 pub(crate) async fn set_voided(
     connection: &mut SqliteConnection,
     game: GameId,
@@ -151,7 +154,7 @@ pub(crate) async fn set_voided(
     Ok(())
 }
 
-/// Ends the attempt of a game that is under way with a result; its number.
+/// Ends the running attempt at a game with a result, and returns its number.
 pub(crate) async fn commit(
     connection: &mut SqliteConnection,
     game: GameId,
@@ -161,10 +164,10 @@ pub(crate) async fn commit(
     let (id, now, score) = (Text(game), Instant(now), Json(&commit.score));
     let recording = commit.recording.as_ref();
     let (key, whole) = (
-        recording.map(|of| &of.key),
-        recording.map(|of| &of.game_blake3),
+        recording.map(|recording| &recording.key),
+        recording.map(|recording| &recording.game_blake3),
     );
-    let [home, away] = [0, 1].map(|side| recording.map(|of| &of.side_blake3[side]));
+    let [home, away] = [0, 1].map(|side| recording.map(|recording| &recording.side_blake3[side]));
     let [home_log, away_log] = &commit.logs;
     sqlx::query_scalar!(
         r#"UPDATE game_attempts
@@ -183,10 +186,10 @@ pub(crate) async fn commit(
     )
     .fetch_optional(connection)
     .await?
-    .ok_or_else(|| StoreError::Damaged(format!("game {game}: no attempt is under way")))
+    .ok_or_else(|| StoreError::Damaged(format!("game {game}: no attempt is running")))
 }
 
-/// The end of an agent's standard error in the attempt that counts.
+/// The tail of an agent's standard error in the attempt that counts.
 pub(crate) async fn log(
     connection: &mut SqliteConnection,
     game: GameId,

@@ -1,4 +1,4 @@
-//! How games go from one state to the next.
+//! State transitions of games.
 
 use crate::{column::Instant, error::Result};
 use faceoff_types::GameId;
@@ -6,16 +6,16 @@ use jiff::Timestamp;
 use sqlx::{SqliteConnection, types::Text};
 use uuid::Uuid;
 
-/// Another unit is to play it.
-pub(crate) async fn set_queued_again(
+/// Queues a game again, with a new job.
+pub(crate) async fn requeue(
     connection: &mut SqliteConnection,
     id: GameId,
-    unit: Uuid,
+    job: Uuid,
 ) -> Result<()> {
-    let (id, unit) = (Text(id), Text(unit));
+    let (id, job) = (Text(id), Text(job));
     sqlx::query!(
         "UPDATE games SET state = 'queued', unit_id = ?, attempt = NULL, ended_at = NULL, reason = NULL WHERE id = ?",
-        unit,
+        job,
         id,
     )
     .execute(connection)
@@ -23,7 +23,7 @@ pub(crate) async fn set_queued_again(
     Ok(())
 }
 
-/// Its unit waits for a slot again.
+/// Marks a running game as queued: its job waits for a slot again.
 pub(crate) async fn set_waiting(connection: &mut SqliteConnection, id: GameId) -> Result<()> {
     let id = Text(id);
     sqlx::query!(
@@ -35,7 +35,6 @@ pub(crate) async fn set_waiting(connection: &mut SqliteConnection, id: GameId) -
     Ok(())
 }
 
-/// A slot plays it.
 pub(crate) async fn set_running(
     connection: &mut SqliteConnection,
     id: GameId,
@@ -52,7 +51,7 @@ pub(crate) async fn set_running(
     Ok(())
 }
 
-/// The result of this attempt counts.
+/// Marks a game as played: the result of this attempt counts.
 pub(crate) async fn set_played(
     connection: &mut SqliteConnection,
     id: GameId,
@@ -74,12 +73,12 @@ pub(crate) async fn set_played(
 /// Why a game has no result.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum NoResult {
-    Broken,
+    PlatformFailed,
     Void,
     Cancelled,
 }
 
-/// It has no result.
+/// Ends a game without a result.
 pub(crate) async fn set_without_result(
     connection: &mut SqliteConnection,
     id: GameId,
@@ -88,7 +87,7 @@ pub(crate) async fn set_without_result(
     now: Timestamp,
 ) -> Result<()> {
     let state = match why {
-        NoResult::Broken => "broken",
+        NoResult::PlatformFailed => "broken",
         NoResult::Void => "void",
         NoResult::Cancelled => "cancelled",
     };

@@ -1,13 +1,13 @@
-//! The table of games: how they stand, and which there are.
+//! The table of games.
 
 pub use super::game::{
-    Game, GameCommit, GamePurpose, GameRecording, GameResultRow, GameState, Meeting,
+    Game, GameCommit, GamePurpose, GameRecording, GameResultRow, GameState, ScheduleEntry,
 };
 use crate::{
     column::{Instant, Json},
     error::{Result, StoreError},
 };
-use faceoff_types::{GameId, GameSeed, RoundNumber, SubmissionId, TeamId, TournamentId};
+use faceoff_types::{GameId, GameSeedLabel, RoundNumber, SubmissionId, TeamId, TournamentId};
 use jiff::Timestamp;
 use serde_json::Value;
 use sqlx::{SqliteConnection, types::Text};
@@ -27,7 +27,7 @@ struct Row {
     away_team: Text<TeamId>,
     home_submission: Text<SubmissionId>,
     away_submission: Text<SubmissionId>,
-    seed: Text<GameSeed>,
+    seed: Text<GameSeedLabel>,
     created_at: Instant,
     state: String,
     attempt: Option<u32>,
@@ -45,10 +45,10 @@ impl Row {
     fn purpose(&self) -> Option<GamePurpose> {
         let asked_by = self.asked_by.as_ref().map(|team| team.0);
         let meeting = || {
-            Some(Meeting {
+            Some(ScheduleEntry {
                 round: RoundNumber::try_from(self.round?).ok()?,
                 matchday: self.matchday?,
-                meeting: self.meeting?,
+                pairing: self.meeting?,
                 second_half: self.second_half?,
             })
         };
@@ -60,7 +60,7 @@ impl Row {
             },
             "replay" => GamePurpose::Replay {
                 replay: self.replay?,
-                of: meeting()?,
+                original: meeting()?,
             },
             _ => return None,
         })
@@ -96,7 +96,7 @@ impl Row {
             state => {
                 let (at, reason) = (ended_at?, self.reason.take()?);
                 match state {
-                    "broken" => GameState::Broken { at, reason },
+                    "broken" => GameState::PlatformFailed { at, reason },
                     "void" => GameState::Void { at, reason },
                     "cancelled" => GameState::Cancelled { at, reason },
                     _ => return None,
@@ -110,8 +110,8 @@ impl TryFrom<Row> for Game {
     type Error = StoreError;
 
     fn try_from(mut row: Row) -> Result<Self> {
-        let damaged = |row: &Row, what| {
-            StoreError::Damaged(format!("game {}: {what} {:?}", row.id.0, row.state))
+        let damaged = |row: &Row, field| {
+            StoreError::Damaged(format!("game {}: {field} {:?}", row.id.0, row.state))
         };
         let purpose = row.purpose().ok_or_else(|| damaged(&row, "purpose"))?;
         let state = row.state().ok_or_else(|| damaged(&row, "state"))?;
@@ -128,7 +128,7 @@ impl TryFrom<Row> for Game {
     }
 }
 
-/// `SELECT` of games `g` with the attempt that plays or counts; the argument is what follows the tables.
+/// `SELECT` of games `g` with the attempt that runs or counts; the argument is the SQL after the tables.
 macro_rules! select_games {
     ($tail:literal $(, $argument:expr)*) => {
         sqlx::query_as!(
@@ -140,7 +140,7 @@ macro_rules! select_games {
                       g.home_team_id AS "home_team: Text<TeamId>", g.away_team_id AS "away_team: Text<TeamId>",
                       g.home_submission_id AS "home_submission: Text<SubmissionId>",
                       g.away_submission_id AS "away_submission: Text<SubmissionId>",
-                      g.seed AS "seed: Text<GameSeed>", g.created_at AS "created_at: Instant", g.state,
+                      g.seed AS "seed: Text<GameSeedLabel>", g.created_at AS "created_at: Instant", g.state,
                       g.attempt AS "attempt: u32", g.ended_at AS "ended_at: Instant", g.reason,
                       a.begun_at AS "begun_at?: Instant", a.score AS "score?: Json<Value>", a.recording AS "recording?",
                       a.game_blake3 AS "game_blake3?", a.home_blake3 AS "home_blake3?", a.away_blake3 AS "away_blake3?"
@@ -163,7 +163,7 @@ pub(crate) async fn find(connection: &mut SqliteConnection, id: GameId) -> Resul
         .try_into()
 }
 
-/// Those of all rounds, in the order of play.
+/// The games of all rounds, in the order of play.
 pub(crate) async fn of_rounds(
     connection: &mut SqliteConnection,
     tournament: TournamentId,
@@ -176,18 +176,18 @@ pub(crate) async fn of_rounds(
     games(rows.fetch_all(connection).await?)
 }
 
-/// A game of a round that has no result and can still get one: neither of its teams has left.
+/// A game of a round that has no result and can still get one, because neither team has left.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Owed {
+pub(crate) struct PendingGame {
     pub game: GameId,
     pub round: RoundNumber,
 }
 
-/// The owed games of all rounds, in the order of play.
-pub(crate) async fn owed(
+/// The pending games of all rounds, in the order of play.
+pub(crate) async fn pending(
     connection: &mut SqliteConnection,
     tournament: TournamentId,
-) -> Result<Vec<Owed>> {
+) -> Result<Vec<PendingGame>> {
     let id = Text(tournament);
     let rows = sqlx::query!(
         r#"SELECT g.id AS "game: Text<GameId>", g.round AS "round!: u32"
@@ -199,18 +199,18 @@ pub(crate) async fn owed(
            ORDER BY g.round, g.meeting, g.second_half"#,
         id
     );
-    let owed = rows.fetch_all(connection).await?.into_iter().map(|row| {
+    let pending = rows.fetch_all(connection).await?.into_iter().map(|row| {
         let round = RoundNumber::try_from(row.round)
             .map_err(|error| StoreError::Damaged(format!("game {}: {error}", row.game.0)))?;
-        Ok(Owed {
+        Ok(PendingGame {
             game: row.game.0,
             round,
         })
     });
-    owed.collect()
+    pending.collect()
 }
 
-/// Those of the schedule played again, in order.
+/// The games of the schedule's replays, in order.
 pub(crate) async fn of_replays(
     connection: &mut SqliteConnection,
     tournament: TournamentId,
@@ -224,8 +224,8 @@ pub(crate) async fn of_replays(
     games(rows.fetch_all(connection).await?)
 }
 
-/// Those that do not count, the newest first; of one team if it is given.
-pub(crate) async fn free(
+/// Test games and friendly games, the newest first; of one team or of all.
+pub(crate) async fn test_and_friendly(
     connection: &mut SqliteConnection,
     tournament: TournamentId,
     team: Option<TeamId>,
@@ -241,7 +241,7 @@ pub(crate) async fn free(
     games(rows.fetch_all(connection).await?)
 }
 
-/// Those that wait or are played, of all purposes.
+/// All queued and running games.
 pub(crate) async fn open(
     connection: &mut SqliteConnection,
     tournament: TournamentId,
@@ -254,23 +254,23 @@ pub(crate) async fn open(
     games(rows.fetch_all(connection).await?)
 }
 
-/// Which game a unit of work plays.
-pub(crate) async fn of_unit(
+/// The game that a job plays.
+pub(crate) async fn of_job(
     connection: &mut SqliteConnection,
-    unit: Uuid,
+    job: Uuid,
 ) -> Result<Option<GameId>> {
-    let unit = Text(unit);
+    let job = Text(job);
     let found = sqlx::query_scalar!(
         r#"SELECT id AS "id: Text<GameId>" FROM games WHERE unit_id = ?"#,
-        unit
+        job
     )
     .fetch_optional(connection)
     .await?;
     Ok(found.map(|id| id.0))
 }
 
-/// What plays a game, or played it last.
-pub(crate) async fn unit_of(connection: &mut SqliteConnection, id: GameId) -> Result<Uuid> {
+/// The job that plays a game, or played it last.
+pub(crate) async fn job_of(connection: &mut SqliteConnection, id: GameId) -> Result<Uuid> {
     let id = Text(id);
     let found = sqlx::query_scalar!(
         r#"SELECT unit_id AS "unit: Text<Uuid>" FROM games WHERE id = ?"#,
@@ -280,23 +280,23 @@ pub(crate) async fn unit_of(connection: &mut SqliteConnection, id: GameId) -> Re
     .await?;
     found
         .flatten()
-        .map(|unit| unit.0)
+        .map(|job| job.0)
         .ok_or(StoreError::NotFound("game"))
 }
 
-/// Adds a game that `unit` is to play.
+/// Adds a game with the job that plays it.
 pub(crate) async fn insert(
     connection: &mut SqliteConnection,
     game: &Game,
-    unit: Uuid,
+    job: Uuid,
 ) -> Result<()> {
-    let (id, tournament, purpose) = (Text(game.id), Text(game.tournament), game.purpose.word());
-    let (round, matchday, meeting, second_half) = match game.purpose.meeting() {
+    let (id, tournament, purpose) = (Text(game.id), Text(game.tournament), game.purpose.label());
+    let (round, matchday, meeting, second_half) = match game.purpose.schedule_entry() {
         None => (None, None, None, None),
         Some(place) => (
             Some(place.round.get()),
             Some(place.matchday),
-            Some(place.meeting),
+            Some(place.pairing),
             Some(place.second_half),
         ),
     };
@@ -308,7 +308,7 @@ pub(crate) async fn insert(
     };
     let [home, away] = game.teams.map(Text);
     let [home_submission, away_submission] = game.submissions.map(Text);
-    let (seed, created_at, unit) = (Text(game.seed), Instant(game.created_at), Text(unit));
+    let (seed, created_at, job) = (Text(game.seed), Instant(game.created_at), Text(job));
     sqlx::query!(
         "INSERT INTO games (id, tournament_id, purpose, round, matchday, meeting, second_half, replay, asked_by,
                             home_team_id, away_team_id, home_submission_id, away_submission_id, seed, created_at,
@@ -329,16 +329,16 @@ pub(crate) async fn insert(
         away_submission,
         seed,
         created_at,
-        unit,
+        job,
     )
     .execute(connection)
     .await?;
     Ok(())
 }
 
-/// How many that do not count a team has asked for since an instant, called-off ones included: each is a row, and a
-/// unit.
-pub(crate) async fn count_asked(
+/// Number of test games and friendly games that a team has requested since an instant. Cancelled ones are included,
+/// because each one is a row and a job.
+pub(crate) async fn count_requested(
     connection: &mut SqliteConnection,
     team: TeamId,
     since: Timestamp,
@@ -354,7 +354,7 @@ pub(crate) async fn count_asked(
     .await?)
 }
 
-/// The last time that the schedule is, or was, to be played again; 0: never.
+/// Number of the newest replay of the schedule; 0 if there is none.
 pub(crate) async fn last_replay(
     connection: &mut SqliteConnection,
     tournament: TournamentId,
@@ -368,7 +368,7 @@ pub(crate) async fn last_replay(
     .await?)
 }
 
-/// How many of all tournaments wait or are played.
+/// Number of queued and running games of all tournaments.
 pub(crate) async fn count_open(connection: &mut SqliteConnection) -> Result<u32> {
     Ok(sqlx::query_scalar!(
         r#"SELECT COUNT(*) AS "count!: u32" FROM games WHERE state IN ('queued', 'running')"#
@@ -377,9 +377,8 @@ pub(crate) async fn count_open(connection: &mut SqliteConnection) -> Result<u32>
     .await?)
 }
 
-/// May a submission still play in a tournament that is not closed: in an open game, in one that is played again, or
-/// as its baseline?
-pub(crate) async fn needs(
+/// Is the submission still needed by a tournament that is not closed: for a round, an open game, or as the baseline?
+pub(crate) async fn needs_submission(
     connection: &mut SqliteConnection,
     submission: SubmissionId,
 ) -> Result<bool> {

@@ -2,73 +2,70 @@ use crate::{
     column::{Bytes32, Instant},
     error::{Result, StoreError},
 };
-use faceoff_types::{InvitationId, PersonId, TeamId};
+use faceoff_types::{InvitationId, UserId, TeamId};
 use jiff::Timestamp;
 use sqlx::{SqliteConnection, types::Text};
 
-/// What whoever follows the link becomes.
+/// The role of the user who accepts an invitation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum InvitedAs {
-    /// One of the organisers.
+pub enum InvitationRole {
     Organiser,
     /// A member of this team.
     Member(TeamId),
-    /// The first member of a team that they name.
+    /// The first member of a new team.
     Founder,
-    /// The person that they are, with a new password or key.
-    Return(PersonId),
+    /// An existing user, who sets a new password or gets a new token; stored as `return`.
+    PasswordReset(UserId),
 }
 
-impl InvitedAs {
-    const fn columns(self) -> (&'static str, Option<Text<TeamId>>, Option<Text<PersonId>>) {
+impl InvitationRole {
+    const fn columns(self) -> (&'static str, Option<Text<TeamId>>, Option<Text<UserId>>) {
         match self {
             Self::Organiser => ("organiser", None, None),
             Self::Member(team) => ("member", Some(Text(team)), None),
             Self::Founder => ("founder", None, None),
-            Self::Return(person) => ("return", None, Some(Text(person))),
+            Self::PasswordReset(user) => ("return", None, Some(Text(user))),
         }
     }
 
-    fn of(role: &str, team: Option<Text<TeamId>>, person: Option<Text<PersonId>>) -> Result<Self> {
-        Ok(match (role, team, person) {
+    fn from_columns(
+        role: &str,
+        team: Option<Text<TeamId>>,
+        user: Option<Text<UserId>>,
+    ) -> Result<Self> {
+        Ok(match (role, team, user) {
             ("organiser", None, None) => Self::Organiser,
             ("founder", None, None) => Self::Founder,
             ("member", Some(team), None) => Self::Member(team.0),
-            ("return", None, Some(person)) => Self::Return(person.0),
+            ("return", None, Some(user)) => Self::PasswordReset(user.0),
             _ => return Err(StoreError::Damaged(format!("invited as {role:?}"))),
         })
     }
 }
 
-/// Where an invitation stands.
+/// State of an invitation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum InvitationState {
     Open,
-    /// Somebody has followed it.
     Accepted {
-        by: PersonId,
+        by: UserId,
         at: Timestamp,
     },
-    /// It was taken back.
     Revoked {
         at: Timestamp,
     },
 }
 
-/// A link by which one person joins, once.
+/// An invitation link, which can be used once.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Invitation {
-    /// Names it; tells nothing of the link.
+    /// Not secret: the link cannot be derived from it.
     pub id: InvitationId,
-    /// What it makes of them.
-    pub invited_as: InvitedAs,
-    /// For whom it was made, as who made it wrote.
+    pub role: InvitationRole,
+    /// A note of its author, to recognise it in lists.
     pub note: String,
-    /// When it was made.
     pub created_at: Timestamp,
-    /// From then on it is worth nothing.
     pub expires_at: Timestamp,
-    /// What became of it.
     pub state: InvitationState,
 }
 
@@ -76,12 +73,12 @@ struct Row {
     id: Text<InvitationId>,
     role: String,
     team_id: Option<Text<TeamId>>,
-    person_id: Option<Text<PersonId>>,
+    person_id: Option<Text<UserId>>,
     note: String,
     created_at: Instant,
     expires_at: Instant,
     accepted_at: Option<Instant>,
-    accepted_by: Option<Text<PersonId>>,
+    accepted_by: Option<Text<UserId>>,
     revoked_at: Option<Instant>,
 }
 
@@ -95,7 +92,7 @@ impl TryFrom<Row> for Invitation {
         };
         Ok(Self {
             id: row.id.0,
-            invited_as: InvitedAs::of(&row.role, row.team_id, row.person_id)?,
+            role: InvitationRole::from_columns(&row.role, row.team_id, row.person_id)?,
             note: row.note,
             created_at: row.created_at.0,
             expires_at: row.expires_at.0,
@@ -104,22 +101,22 @@ impl TryFrom<Row> for Invitation {
     }
 }
 
-/// `SELECT` of whole invitations; the argument is what follows `FROM invitations`.
+/// `SELECT` of whole invitations; the argument is the SQL after `FROM invitations`.
 macro_rules! select_invitations {
     ($tail:literal $(, $argument:expr)*) => {
         sqlx::query_as!(
             Row,
             r#"SELECT id AS "id: Text<InvitationId>", role, team_id AS "team_id: Text<TeamId>",
-                      person_id AS "person_id: Text<PersonId>", note, created_at AS "created_at: Instant",
+                      person_id AS "person_id: Text<UserId>", note, created_at AS "created_at: Instant",
                       expires_at AS "expires_at: Instant", accepted_at AS "accepted_at: Instant",
-                      accepted_by AS "accepted_by: Text<PersonId>", revoked_at AS "revoked_at: Instant"
+                      accepted_by AS "accepted_by: Text<UserId>", revoked_at AS "revoked_at: Instant"
                FROM invitations "# + $tail
             $(, $argument)*
         )
     };
 }
 
-/// All that were ever made, the newest first.
+/// All invitations, including used and expired ones, the newest first.
 pub(crate) async fn all(connection: &mut SqliteConnection) -> Result<Vec<Invitation>> {
     let rows = select_invitations!("ORDER BY created_at DESC, id DESC")
         .fetch_all(connection)
@@ -139,7 +136,7 @@ pub(crate) async fn find(
         .try_into()
 }
 
-/// Whatever it is worth.
+/// The invitation with this code, valid or not.
 pub(crate) async fn by_code(
     connection: &mut SqliteConnection,
     code_hash: [u8; 32],
@@ -151,7 +148,7 @@ pub(crate) async fn by_code(
     row.map(Invitation::try_from).transpose()
 }
 
-/// Those of a team's members that somebody could still follow.
+/// Number of valid, unused invitations for members of a team.
 pub(crate) async fn count_open(
     connection: &mut SqliteConnection,
     team: TeamId,
@@ -174,7 +171,7 @@ pub(crate) async fn insert(
     code_hash: [u8; 32],
 ) -> Result<()> {
     let (id, code_hash) = (Text(invitation.id), Bytes32(code_hash));
-    let (role, team, person) = invitation.invited_as.columns();
+    let (role, team, user) = invitation.role.columns();
     let created_at = Instant(invitation.created_at);
     let expires_at = Instant(invitation.expires_at);
     sqlx::query!(
@@ -184,7 +181,7 @@ pub(crate) async fn insert(
         code_hash,
         role,
         team,
-        person,
+        user,
         invitation.note,
         created_at,
         expires_at,
@@ -197,7 +194,7 @@ pub(crate) async fn insert(
 pub(crate) async fn set_accepted(
     connection: &mut SqliteConnection,
     id: InvitationId,
-    by: PersonId,
+    by: UserId,
     at: Timestamp,
 ) -> Result<()> {
     let (id, by, at) = (Text(id), Text(by), Instant(at));

@@ -1,22 +1,22 @@
-//! The tables: rows as types, and changes of single rows. When a change may happen, and what else
-//! changes with it, is the operations' business.
+//! The tables: types of rows, and changes of single rows. The operations decide when a row may change,
+//! and what changes with it.
 
 pub(crate) mod ablations;
 pub(crate) mod active_submissions;
 pub(crate) mod announcements;
-pub(crate) mod archived;
+pub(crate) mod archive;
 pub(crate) mod bundles;
 pub(crate) mod days;
 pub(crate) mod deliveries;
 pub(crate) mod divisions;
-pub(crate) mod drafts;
+pub(crate) mod proposed_evaluations;
 pub(crate) mod entrants;
 pub(crate) mod entries;
 pub(crate) mod episode_summaries;
 pub(crate) mod evaluations;
 pub(crate) mod events;
-pub(crate) mod finalisations;
-pub(crate) mod finalised;
+pub(crate) mod scorings;
+pub(crate) mod sign_offs;
 pub(crate) mod freezes;
 pub(crate) mod friendly_games_declined;
 pub(crate) mod game;
@@ -24,9 +24,9 @@ pub(crate) mod game_attempts;
 pub(crate) mod game_transitions;
 pub(crate) mod games;
 pub(crate) mod invitations;
-pub(crate) mod measured;
-pub(crate) mod needed;
-pub(crate) mod people;
+pub(crate) mod job_durations;
+pub(crate) mod required_artifacts;
+pub(crate) mod users;
 pub(crate) mod plan;
 pub(crate) mod programs;
 pub(crate) mod proposals;
@@ -38,10 +38,10 @@ pub(crate) mod rulings;
 pub(crate) mod runs;
 pub(crate) mod season;
 pub(crate) mod shards;
-pub(crate) mod smoke_runs;
+pub(crate) mod validation_runs;
 pub(crate) mod stage_runtimes;
 pub(crate) mod stages;
-pub(crate) mod standings;
+pub(crate) mod counting_evaluations;
 pub(crate) mod submissions;
 pub(crate) mod teams;
 pub(crate) mod terms;

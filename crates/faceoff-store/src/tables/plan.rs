@@ -1,30 +1,31 @@
 use crate::error::{Result, StoreError};
 use faceoff_types::{Profile, StageLimits, Task, Variation};
 
-/// What a run plays.
+/// The episodes and rules of a run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RunPlan {
-    /// Which perturbations are switched on.
+    /// Selects the enabled perturbations.
     pub profile: Profile,
-    /// At least one, none twice.
+    /// At least one, without duplicates.
     pub tasks: Vec<Task>,
     /// Episodes of each task; at least one.
     pub episodes_per_task: u32,
-    /// Episodes of one unit of work; at least one. Scores do not depend on it.
+    /// Episodes of one shard; at least one. Scores do not depend on it.
     pub episodes_per_shard: u32,
-    /// More agent faults than this, summed over the run, end it without a score.
+    /// The run ends without a score after more agent faults than this in all its shards.
     pub max_faults: u32,
-    /// What is played and scored by otherwise than the ruleset has it.
+    /// Differences from the ruleset.
     pub variation: Variation,
-    /// What agents are held to otherwise than by the server's configuration.
+    /// Limits of agents that override the server's configuration.
     pub limits: Box<StageLimits>,
 }
 
 impl RunPlan {
-    /// Refuses a plan that plays nothing or a task twice.
+    /// Refuses a plan without episodes, or with a duplicate task.
     pub(crate) fn check(&self) -> Result<()> {
-        let twice = |task: &Task| self.tasks.iter().filter(|other| *other == task).count() > 1;
-        if self.tasks.is_empty() || self.tasks.iter().any(twice) {
+        let is_duplicate =
+            |task: &Task| self.tasks.iter().filter(|other| *other == task).count() > 1;
+        if self.tasks.is_empty() || self.tasks.iter().any(is_duplicate) {
             return Err(StoreError::Conflict(
                 "a plan names each task once, and at least one".into(),
             ));
@@ -38,7 +39,7 @@ impl RunPlan {
         magnitudes.map_err(|error| StoreError::Conflict(format!("perturbations.{error}")))
     }
 
-    /// Episodes over all tasks.
+    /// Number of episodes of all tasks.
     #[must_use]
     pub fn episodes_total(&self) -> u32 {
         let tasks = u32::try_from(self.tasks.len()).unwrap_or(u32::MAX);

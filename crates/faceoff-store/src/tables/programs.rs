@@ -1,10 +1,10 @@
-//! Which versions of the program have opened the database.
+//! The versions of the program that have opened the database.
 
 use crate::{error::Result, program::Program};
 use sqlx::SqliteConnection;
 
-/// The last one; `None` of a database from before it was noted. Asked without the compile-time check, since the table may
-/// be missing, or be a later version's.
+/// The last version that opened the database; `None` if older versions did, which did not record it. The query is not
+/// checked at compile time, because the table may be missing or from a later version.
 pub(crate) async fn last(connection: &mut SqliteConnection) -> Result<Option<Program>> {
     let found: i64 = sqlx::query_scalar(
         "SELECT COUNT(*) FROM sqlite_master WHERE type = 'table' AND name = 'programs'",
@@ -21,9 +21,9 @@ pub(crate) async fn last(connection: &mut SqliteConnection) -> Result<Option<Pro
     Ok(row.map(|(version, schema)| Program { version, schema }))
 }
 
-/// Notes that this one has opened it.
+/// Records that this version has opened the database.
 pub(crate) async fn put(connection: &mut SqliteConnection, program: &Program) -> Result<()> {
-    // Taken away first: who comes back after another version is the last one again.
+    // The version's old row is deleted, so that its new row is the last one.
     sqlx::query!("DELETE FROM programs WHERE version = ?", program.version)
         .execute(&mut *connection)
         .await?;

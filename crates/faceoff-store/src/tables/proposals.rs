@@ -1,4 +1,4 @@
-//! Proposals: what is tried, or played again, without counting.
+//! Trials and proposed re-evaluations, which do not count unless they are applied.
 
 use crate::{
     column::Instant,
@@ -8,38 +8,37 @@ use faceoff_types::{ProposalId, StageId};
 use jiff::{Timestamp, civil::Date};
 use sqlx::{SqliteConnection, types::Text};
 
-/// Evaluations of a stage that do not count.
+/// A trial or a proposed re-evaluation of a stage.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Proposal {
     /// Part of its URLs.
     pub id: ProposalId,
-    /// Whose rules they are played by.
     pub stage: StageId,
-    /// By which of these.
+    /// Revision of the stage's rules.
     pub revision: u32,
     pub kind: ProposalKind,
     pub reason: String,
     /// When it was queued.
     pub created_at: Timestamp,
-    /// What became of it; `None`: nothing yet.
-    pub settled: Option<Settled>,
+    /// `None` while it is neither applied nor dropped.
+    pub outcome: Option<ProposalOutcome>,
 }
 
-/// What a proposal plays.
+/// The evaluations of a proposal.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ProposalKind {
-    /// What is active now, on episodes of its own: to see how it goes. It never counts.
+    /// A trial of the currently active submissions on separate episodes. It never counts.
     Trial,
-    /// One evaluation of a day once more, on the same episodes.
+    /// Repeats one evaluation of a day, on the same episodes.
     Evaluation(Date),
-    /// All of a day that count, once more, on the same episodes.
+    /// Repeats all counting evaluations of a day, on the same episodes.
     Day(Date),
-    /// All of a day that count, on the same episodes by the stage's newest rules: for the board of these.
+    /// Repeats all counting evaluations of a day, on the same episodes, under the newest revision of the stage's rules.
     Rules(Date),
 }
 
 impl ProposalKind {
-    /// The date whose results it would change; `None` of a trial.
+    /// The date whose results it would change; `None` for a trial.
     #[must_use]
     pub const fn day(self) -> Option<Date> {
         match self {
@@ -57,7 +56,7 @@ impl ProposalKind {
         }
     }
 
-    fn of(label: &str, day: Option<Date>) -> Option<Self> {
+    fn from_columns(label: &str, day: Option<Date>) -> Option<Self> {
         Some(match (label, day) {
             ("trial", None) => Self::Trial,
             ("evaluation", Some(day)) => Self::Evaluation(day),
@@ -70,10 +69,10 @@ impl ProposalKind {
 
 /// How a proposal ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Settled {
-    /// What it played counts since then.
+pub enum ProposalOutcome {
+    /// Its results count since then.
     Applied(Timestamp),
-    /// It never will.
+    /// Its results will never count.
     Dropped(Timestamp),
 }
 
@@ -92,22 +91,23 @@ struct Row {
 impl TryFrom<Row> for Proposal {
     type Error = StoreError;
     fn try_from(row: Row) -> Result<Self> {
-        let damaged = |what: &str| StoreError::Damaged(format!("proposal {}: {what}", row.id.0));
-        let kind = ProposalKind::of(&row.kind, row.day.as_ref().map(|day| day.0));
+        let damaged =
+            |problem: &str| StoreError::Damaged(format!("proposal {}: {problem}", row.id.0));
+        let kind = ProposalKind::from_columns(&row.kind, row.day.as_ref().map(|day| day.0));
         let settled = match (row.outcome.as_deref(), row.settled_at) {
             (None, None) => None,
-            (Some("applied"), Some(at)) => Some(Settled::Applied(at.0)),
-            (Some("dropped"), Some(at)) => Some(Settled::Dropped(at.0)),
-            _ => return Err(damaged("settled in no way that there is")),
+            (Some("applied"), Some(at)) => Some(ProposalOutcome::Applied(at.0)),
+            (Some("dropped"), Some(at)) => Some(ProposalOutcome::Dropped(at.0)),
+            _ => return Err(damaged("unknown outcome")),
         };
         Ok(Self {
             id: row.id.0,
             stage: row.stage.0,
             revision: row.revision,
-            kind: kind.ok_or_else(|| damaged("of no kind that there is"))?,
+            kind: kind.ok_or_else(|| damaged("unknown kind"))?,
             reason: row.reason,
             created_at: row.created_at.0,
-            settled,
+            outcome: settled,
         })
     }
 }
@@ -125,7 +125,7 @@ macro_rules! select_proposals {
     };
 }
 
-/// All of the season, the newest first.
+/// All proposals of the season, the newest first.
 pub(crate) async fn all(connection: &mut SqliteConnection) -> Result<Vec<Proposal>> {
     let rows = select_proposals!("ORDER BY created_at DESC, id DESC");
     let rows = rows.fetch_all(connection).await?;
@@ -160,14 +160,14 @@ pub(crate) async fn insert(connection: &mut SqliteConnection, new: &Proposal) ->
     Ok(())
 }
 
-pub(crate) async fn settle(
+pub(crate) async fn set_outcome(
     connection: &mut SqliteConnection,
     id: ProposalId,
-    settled: Settled,
+    settled: ProposalOutcome,
 ) -> Result<()> {
     let (outcome, at) = match settled {
-        Settled::Applied(at) => ("applied", at),
-        Settled::Dropped(at) => ("dropped", at),
+        ProposalOutcome::Applied(at) => ("applied", at),
+        ProposalOutcome::Dropped(at) => ("dropped", at),
     };
     let (id, at) = (Text(id), Instant(at));
     sqlx::query!(

@@ -6,20 +6,20 @@ use faceoff_types::{QuestionId, TeamId};
 use jiff::Timestamp;
 use sqlx::{SqliteConnection, types::Text};
 
-/// What the organisers have answered.
+/// The organisers' answer to a question.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Reply {
     pub at: Timestamp,
     pub text: String,
-    /// May everybody read question and answer? Not who asked.
+    /// Are question and answer public? The team that asked is never shown.
     pub is_public: bool,
 }
 
-/// What a team asks the organisers.
+/// A team's question to the organisers.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Question {
     pub id: QuestionId,
-    /// Who asks; a public archive does not tell.
+    /// The team that asked; `None` in a public archive.
     pub team: Option<TeamId>,
     pub at: Timestamp,
     pub text: String,
@@ -54,7 +54,7 @@ impl From<Row> for Question {
     }
 }
 
-/// All of them, the newest first.
+/// All questions, the newest first.
 pub(crate) async fn all(connection: &mut SqliteConnection) -> Result<Vec<Question>> {
     let rows = sqlx::query_as!(
         Row,
@@ -73,7 +73,7 @@ pub(crate) async fn find(connection: &mut SqliteConnection, id: QuestionId) -> R
     found.ok_or(StoreError::NotFound("question"))
 }
 
-/// How many of a team's have no answer.
+/// Number of a team's unanswered questions.
 pub(crate) async fn count_open(connection: &mut SqliteConnection, team: TeamId) -> Result<i64> {
     let team = Text(team);
     Ok(sqlx::query_scalar!(

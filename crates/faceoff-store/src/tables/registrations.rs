@@ -6,42 +6,39 @@ use faceoff_types::{DivisionName, RegistrationId, TeamId, TeamName};
 use jiff::Timestamp;
 use sqlx::{SqliteConnection, types::Text};
 
-/// Where a registration stands.
+/// State of a registration.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum RegistrationState {
     /// An organiser has to decide.
-    Waiting,
-    /// There is a team, and its code is an invitation of its first member's.
+    Pending,
+    /// The team was created; the registration's code now invites its first member.
     Approved {
         at: Timestamp,
         team: TeamId,
     },
-    /// It takes no part.
     Refused {
         at: Timestamp,
-        /// As who registered may read it.
+        /// Shown to the person who registered.
         reason: String,
     },
 }
 
-/// A team that wants to take part.
+/// A request to add a team to the season.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Registration {
-    /// Names it; tells nothing of its code.
+    /// Not secret: the code cannot be derived from it.
     pub id: RegistrationId,
-    /// What it wants to be called.
+    /// The requested name.
     pub team_name: TeamName,
-    /// Where it is from.
     pub affiliation: Option<String>,
     pub link: Option<String>,
-    /// The division that it wants to be in.
+    /// The requested division.
     pub division: Option<DivisionName>,
-    /// How the organisers reach it; nobody else sees it.
+    /// Contact address; visible to organisers only.
     pub contact: String,
-    /// Which terms were accepted.
+    /// Version of the terms that was accepted.
     pub accepted_terms: Option<u32>,
     pub created_at: Timestamp,
-    /// What became of it.
     pub state: RegistrationState,
 }
 
@@ -67,7 +64,7 @@ impl From<Row> for Registration {
                 team: team.0,
             },
             (Some(at), None, Some(reason)) => RegistrationState::Refused { at: at.0, reason },
-            _ => RegistrationState::Waiting,
+            _ => RegistrationState::Pending,
         };
         Self {
             id: row.id.0,
@@ -83,7 +80,7 @@ impl From<Row> for Registration {
     }
 }
 
-/// `SELECT` of whole registrations; the argument is what follows `FROM registrations`.
+/// `SELECT` of whole registrations; the argument is the SQL after `FROM registrations`.
 macro_rules! select_registrations {
     ($tail:literal $(, $argument:expr)*) => {
         sqlx::query_as!(
@@ -98,7 +95,7 @@ macro_rules! select_registrations {
     };
 }
 
-/// All that ever came, the newest first.
+/// All registrations, the newest first.
 pub(crate) async fn all(connection: &mut SqliteConnection) -> Result<Vec<Registration>> {
     let rows = select_registrations!("ORDER BY created_at DESC, id DESC")
         .fetch_all(connection)
@@ -129,7 +126,7 @@ pub(crate) async fn by_code(
     Ok(row.map(Registration::from))
 }
 
-/// The hash of the code that who registered has.
+/// The hash of the code that the person who registered has.
 pub(crate) async fn code_hash(
     connection: &mut SqliteConnection,
     id: RegistrationId,
@@ -144,7 +141,7 @@ pub(crate) async fn code_hash(
     Ok(hash.0)
 }
 
-pub(crate) async fn count_waiting(connection: &mut SqliteConnection) -> Result<i64> {
+pub(crate) async fn count_pending(connection: &mut SqliteConnection) -> Result<i64> {
     Ok(
         sqlx::query_scalar!("SELECT COUNT(*) FROM registrations WHERE state = 'waiting'")
             .fetch_one(connection)
@@ -152,8 +149,8 @@ pub(crate) async fn count_waiting(connection: &mut SqliteConnection) -> Result<i
     )
 }
 
-/// Does one of this name wait?
-pub(crate) async fn waits(connection: &mut SqliteConnection, name: &TeamName) -> Result<bool> {
+/// Is a registration for this team name pending?
+pub(crate) async fn is_pending(connection: &mut SqliteConnection, name: &TeamName) -> Result<bool> {
     let name = name.as_str();
     Ok(sqlx::query_scalar!(
         r#"SELECT EXISTS (SELECT 1 FROM registrations WHERE state = 'waiting' AND team_name = ? COLLATE NOCASE)

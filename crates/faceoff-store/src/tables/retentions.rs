@@ -1,4 +1,4 @@
-//! What is kept of a stage's large files, and what of them has gone.
+//! Retention of a stage's large files, and their removal.
 
 use crate::{
     column::{Instant, Json},
@@ -10,23 +10,23 @@ use serde::Deserialize;
 use sqlx::{SqliteConnection, types::Text};
 use std::cmp::Ordering;
 
-/// What a stage keeps; everything, if nobody has said so.
+/// The retention of a stage; everything is kept if none is set.
 pub(crate) async fn of_stage(
     connection: &mut SqliteConnection,
     stage: StageId,
 ) -> Result<Retention> {
     let stage = Text(stage);
-    let found = sqlx::query_scalar!(
+    let retention = sqlx::query_scalar!(
         r#"SELECT retention AS "retention: Json<Retention>" FROM stage_retentions WHERE stage_id = ?"#,
         stage
     )
     .fetch_optional(connection)
     .await?;
-    Ok(found.map_or_else(Retention::default, |found| found.0))
+    Ok(retention.map_or_else(Retention::default, |retention| retention.0))
 }
 
-/// The stages that do not keep everything for ever.
-pub(crate) async fn bounded(connection: &mut SqliteConnection) -> Result<Vec<StageId>> {
+/// The stages whose retention removes files at some time.
+pub(crate) async fn stages_with_removals(connection: &mut SqliteConnection) -> Result<Vec<StageId>> {
     let stages = sqlx::query_scalar!(
         r#"SELECT stage_id AS "stage: Text<StageId>" FROM stage_retentions WHERE retention <> '{}'"#
     )
@@ -51,7 +51,7 @@ pub(crate) async fn set(
     Ok(())
 }
 
-/// What of a result decides how a board ranks it.
+/// The part of a result that decides its rank on a board.
 #[derive(Debug, Clone, Deserialize)]
 pub(crate) struct Rank {
     tier: Tier,
@@ -59,28 +59,28 @@ pub(crate) struct Rank {
     penalty_points: f64,
 }
 
-/// A finished evaluation, as retention sees it.
+/// A finished evaluation, with the data that retention depends on.
 #[derive(Debug, Clone)]
-pub(crate) struct Scored {
+pub(crate) struct ScoredEvaluation {
     pub(crate) id: EvaluationId,
     pub(crate) team: TeamId,
-    /// Of its stage's rules: no board mixes two.
+    /// Revision of the stage's rules; a board shows one revision only.
     pub(crate) revision: u32,
-    /// It was not voided.
+    /// False if it was voided.
     pub(crate) counts: bool,
-    /// Its dataset is there.
-    pub(crate) is_kept: bool,
-    /// All of its team's is kept, for the organisers.
+    /// Is its dataset stored?
+    pub(crate) has_dataset: bool,
+    /// All files of its team are kept as evidence for the organisers.
     pub(crate) is_evidence: bool,
-    /// Of the dataset; `None`: not measured yet.
+    /// Size of the dataset; `None` if it has not been measured.
     pub(crate) bytes: Option<u64>,
     submitted_at: Timestamp,
     rank: Rank,
 }
 
-impl Scored {
-    /// The better one first, as boards have them: by tier, score, penalty points, and the time of the upload.
-    pub(crate) fn board_order(&self, other: &Self) -> Ordering {
+impl ScoredEvaluation {
+    /// Compares ranks as boards do, the better one first: by tier, score, penalty points, and time of the upload.
+    pub(crate) fn compare_rank(&self, other: &Self) -> Ordering {
         let (a, b) = (&self.rank, &other.rank);
         a.tier
             .cmp(&b.tier)
@@ -90,11 +90,11 @@ impl Scored {
     }
 }
 
-/// The finished evaluations of a stage, team by team, the newest day first.
-pub(crate) async fn scored(
+/// The finished evaluations of a stage, grouped by team, the newest day first.
+pub(crate) async fn scored_evaluations(
     connection: &mut SqliteConnection,
     stage: StageId,
-) -> Result<Vec<Scored>> {
+) -> Result<Vec<ScoredEvaluation>> {
     let stage = Text(stage);
     let rows = sqlx::query!(
         r#"SELECT e.id AS "id: Text<EvaluationId>", e.team_id AS "team: Text<TeamId>", e.revision AS "revision: u32",
@@ -111,12 +111,12 @@ pub(crate) async fn scored(
     .await?;
     Ok(rows
         .into_iter()
-        .map(|row| Scored {
+        .map(|row| ScoredEvaluation {
             id: row.id.0,
             team: row.team.0,
             revision: row.revision,
             counts: row.counts,
-            is_kept: row.is_kept,
+            has_dataset: row.is_kept,
             is_evidence: row.is_evidence,
             bytes: row.bytes,
             submitted_at: row.submitted_at.0,
@@ -125,7 +125,7 @@ pub(crate) async fn scored(
         .collect())
 }
 
-/// How many trials and proposals of a stage are neither applied nor dropped.
+/// Number of trials and proposals of a stage that are neither applied nor dropped.
 pub(crate) async fn count_proposals(
     connection: &mut SqliteConnection,
     stage: StageId,
@@ -139,9 +139,10 @@ pub(crate) async fn count_proposals(
     .await?)
 }
 
-/// The archives of submissions that have played a stage, that nobody enters or plays, all of whose datasets have gone or
-/// are `going`, and of which nothing is to be played again: their stages are signed off. With their bytes.
-pub(crate) async fn idle_archives(
+/// Stored bundles, with their sizes, of submissions that were evaluated in a stage and are not needed any more. None is
+/// active or has open jobs, and all their datasets are removed or in `going`. None can be evaluated again, because their
+/// stages are signed off.
+pub(crate) async fn idle_bundles(
     connection: &mut SqliteConnection,
     stage: StageId,
     going: &[EvaluationId],
@@ -178,7 +179,7 @@ pub(crate) async fn idle_archives(
     Ok(rows.into_iter().map(|row| (row.id.0, row.bytes)).collect())
 }
 
-/// From now on nobody is promised an evaluation's dataset, nor that of the draft that it was.
+/// Marks an evaluation's dataset as removed, also in the proposal that it came from. The file is deleted later.
 pub(crate) async fn set_dataset_removed(
     connection: &mut SqliteConnection,
     id: EvaluationId,
@@ -204,9 +205,9 @@ pub(crate) async fn set_dataset_removed(
     Ok(())
 }
 
-/// The datasets whose files are there although nobody is promised them since `before`, with their keys; none that has
-/// become evidence.
-pub(crate) async fn datasets_going(
+/// Datasets that were marked as removed until `before` and whose files still exist, with their keys. Evidence is left
+/// out.
+pub(crate) async fn deletable_datasets(
     connection: &mut SqliteConnection,
     before: Timestamp,
 ) -> Result<Vec<(EvaluationId, String)>> {
@@ -226,8 +227,8 @@ pub(crate) async fn datasets_going(
         .collect())
 }
 
-/// The file of a removed dataset has gone.
-pub(crate) async fn set_dataset_gone(
+/// Notes that the file of a removed dataset was deleted.
+pub(crate) async fn set_dataset_file_deleted(
     connection: &mut SqliteConnection,
     id: EvaluationId,
 ) -> Result<()> {
@@ -238,7 +239,8 @@ pub(crate) async fn set_dataset_gone(
     Ok(())
 }
 
-/// Datasets that nobody has measured, with their keys; those of drafts that became evaluations are these's.
+/// Datasets whose size is unknown, with their keys. An applied proposed evaluation has the same dataset as the evaluation
+/// that it has become.
 pub(crate) async fn unmeasured(
     connection: &mut SqliteConnection,
 ) -> Result<Vec<(EvaluationId, String)>> {
@@ -257,7 +259,7 @@ pub(crate) async fn unmeasured(
         .collect())
 }
 
-/// Notes how large the dataset of an evaluation, or of the draft of this id, is.
+/// Stores the size of the dataset of an evaluation, or of the proposed evaluation with this id.
 pub(crate) async fn set_measured(
     connection: &mut SqliteConnection,
     id: EvaluationId,
@@ -283,8 +285,8 @@ pub(crate) async fn set_measured(
     Ok(())
 }
 
-/// The dataset of a draft is as large as the evaluation's that it has become.
-pub(crate) async fn follow_draft(
+/// Copies the size of the dataset from an applied proposed evaluation.
+pub(crate) async fn copy_dataset_bytes(
     connection: &mut SqliteConnection,
     id: EvaluationId,
 ) -> Result<()> {

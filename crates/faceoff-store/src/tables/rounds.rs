@@ -1,4 +1,4 @@
-//! The rounds of a tournament, as they were drawn.
+//! The rounds of a tournament, with their draws.
 
 use crate::{
     column::{Instant, Json},
@@ -9,24 +9,24 @@ use jiff::Timestamp;
 use sqlx::{SqliteConnection, types::Text};
 use std::collections::BTreeMap;
 
-/// A round that was started.
+/// A started round.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TournamentRound {
     /// From 1.
     pub number: RoundNumber,
-    /// From then on its submissions are fixed.
+    /// Its submissions are fixed since then.
     pub started_at: Timestamp,
-    /// When the last of its games had ended for the first time.
+    /// When all of its games had ended for the first time.
     pub over_at: Option<Timestamp>,
-    /// Who plays in which group, where there are groups.
+    /// The teams of each group; empty if there are no groups.
     pub groups: Vec<Vec<TeamId>>,
-    /// Who has nobody to play, in the order of play.
+    /// By matchday.
     pub byes: Vec<RoundBye>,
-    /// What each team plays with.
+    /// The submission of each team in this round.
     pub submissions: Vec<(TeamId, SubmissionId)>,
 }
 
-/// A team that has nobody to play on a matchday.
+/// A team without an opponent on a matchday.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct RoundBye {
     /// From 1.
@@ -34,26 +34,26 @@ pub struct RoundBye {
     pub team: TeamId,
 }
 
-/// A round as it is drawn, to be started. Pairs are the home team's first.
+/// The draw of a round that is to be started. Pairs have the home team first.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct DrawnRound {
-    /// The one after all that were started.
+    /// The number after the last started round.
     pub number: RoundNumber,
-    /// Who plays in which group, where there are groups.
+    /// The teams of each group; empty if there are no groups.
     pub groups: Vec<Vec<TeamId>>,
     /// In the order of play.
     pub matchdays: Vec<DrawnMatchday>,
 }
 
-/// Games that can be played side by side.
+/// Games that can be played at the same time.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct DrawnMatchday {
     pub games: Vec<[TeamId; 2]>,
-    /// Who has nobody to play.
+    /// Teams without an opponent.
     pub byes: Vec<TeamId>,
 }
 
-/// All of a tournament, in order.
+/// All started rounds of a tournament, in order.
 pub(crate) async fn all(
     connection: &mut SqliteConnection,
     tournament: TournamentId,
@@ -68,8 +68,8 @@ pub(crate) async fn all(
     .fetch_all(&mut *connection)
     .await?;
     for row in rows {
-        let of_round = submissions.entry(row.round).or_default();
-        of_round.push((row.team.0, row.submission.0));
+        let round = submissions.entry(row.round).or_default();
+        round.push((row.team.0, row.submission.0));
     }
     let rows = sqlx::query!(
         r#"SELECT number AS "number: u32", started_at AS "started_at: Instant", over_at AS "over_at: Instant",
@@ -99,7 +99,7 @@ pub(crate) async fn all(
         .collect()
 }
 
-/// How many were started.
+/// Number of started rounds.
 pub(crate) async fn count(
     connection: &mut SqliteConnection,
     tournament: TournamentId,
@@ -154,8 +154,8 @@ pub(crate) async fn insert(
     Ok(())
 }
 
-/// All of its games have ended. False if they had before.
-pub(crate) async fn set_over(
+/// Notes that all games of a round have ended; false if that was noted before.
+pub(crate) async fn set_ended(
     connection: &mut SqliteConnection,
     tournament: TournamentId,
     round: RoundNumber,

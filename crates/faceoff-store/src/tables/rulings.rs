@@ -1,17 +1,17 @@
 use crate::column::Instant;
 use jiff::Timestamp;
 
-/// What the organiser has decided against a result or a team.
+/// Time and public reason of a decision, such as a disqualification, a voided result or a pause.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Ruling {
     pub at: Timestamp,
-    /// Everybody may read it.
+    /// Public.
     pub reason: String,
 }
 
 impl Ruling {
-    /// From its two columns, which are set together.
-    pub(crate) fn of(at: Option<Instant>, reason: Option<String>) -> Option<Self> {
+    /// Reads it from its two columns, which are set together.
+    pub(crate) fn from_columns(at: Option<Instant>, reason: Option<String>) -> Option<Self> {
         let (at, reason) = (at?.0, reason?);
         Some(Self { at, reason })
     }

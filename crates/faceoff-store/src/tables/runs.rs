@@ -9,16 +9,16 @@ use faceoff_types::{
 use jiff::Timestamp;
 use sqlx::{SqliteConnection, types::Text};
 
-/// A run that is over and may be cleared.
+/// A finished run whose shards can be deleted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Clearable {
+pub struct ClearableRun {
     pub run: RunId,
-    /// Every shard was played, and no episode summary of the version that was asked for is kept: it has to be made
-    /// from the outcomes before they go.
-    pub wants_summary: bool,
+    /// The run is complete and has no episode summary of the requested version. It must be computed from the outcomes
+    /// before they are deleted.
+    pub needs_summary: bool,
 }
 
-/// Contestants, a profile and episodes, cut into shards.
+/// A run: episodes of one or more submissions under one plan, divided into shards.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Run {
     /// Part of the artifact keys of its recordings.
@@ -26,11 +26,11 @@ pub struct Run {
     pub ruleset: Ruleset,
     pub plan: RunPlan,
     pub seed: SeedLabel,
-    /// Are its shards recorded? If not, their outcomes are all that is kept.
+    /// Are its shards recorded? If not, only their outcomes are stored.
     pub keeps_recordings: bool,
 }
 
-/// How far a run is.
+/// State of a run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, sqlx::Type)]
 #[sqlx(rename_all = "snake_case")]
 pub(crate) enum RunState {
@@ -38,12 +38,13 @@ pub(crate) enum RunState {
     Queued,
     Running,
     /// Every shard is committed.
-    Played,
-    /// Its owner has ended without it.
+    #[sqlx(rename = "played")]
+    Complete,
+    /// Its owner ended before the run was complete.
     Stopped,
 }
 
-/// Adds a run that nobody has begun, with its contestants from side 0 on.
+/// Adds a queued run with its contestants, from side 0 on.
 pub(crate) async fn insert(
     connection: &mut SqliteConnection,
     run: &Run,
@@ -120,7 +121,7 @@ pub(crate) async fn find(connection: &mut SqliteConnection, id: RunId) -> Result
     })
 }
 
-/// What plays, from side 0 on.
+/// The submissions of a run, from side 0 on.
 pub(crate) async fn contestants(
     connection: &mut SqliteConnection,
     id: RunId,
@@ -136,7 +137,7 @@ pub(crate) async fn contestants(
     Ok(rows.into_iter().map(|id| id.0).collect())
 }
 
-/// A shard was claimed. True if it was the run's first.
+/// Marks a run as running. True if the claimed shard is its first.
 pub(crate) async fn begin(connection: &mut SqliteConnection, id: RunId) -> Result<bool> {
     let id = Text(id);
     let begun = sqlx::query!(
@@ -148,8 +149,8 @@ pub(crate) async fn begin(connection: &mut SqliteConnection, id: RunId) -> Resul
     Ok(begun.rows_affected() == 1)
 }
 
-/// Every shard is committed.
-pub(crate) async fn set_played(connection: &mut SqliteConnection, id: RunId) -> Result<()> {
+/// Marks a run as complete.
+pub(crate) async fn set_complete(connection: &mut SqliteConnection, id: RunId) -> Result<()> {
     let id = Text(id);
     sqlx::query!("UPDATE runs SET state = 'played' WHERE id = ?", id)
         .execute(connection)
@@ -157,7 +158,7 @@ pub(crate) async fn set_played(connection: &mut SqliteConnection, id: RunId) -> 
     Ok(())
 }
 
-/// Ends a run that is not played.
+/// Stops a run that is not complete.
 pub(crate) async fn set_stopped(connection: &mut SqliteConnection, id: RunId) -> Result<()> {
     let id = Text(id);
     sqlx::query!(
@@ -169,7 +170,7 @@ pub(crate) async fn set_stopped(connection: &mut SqliteConnection, id: RunId) ->
     Ok(())
 }
 
-/// The runs whose recordings are kept although their evaluation was over at `before` or earlier.
+/// The runs whose recordings are stored although their evaluation ended at `before` or earlier.
 pub(crate) async fn with_old_recordings(
     connection: &mut SqliteConnection,
     before: Timestamp,
@@ -203,12 +204,12 @@ pub(crate) async fn set_recordings_removed(
     Ok(())
 }
 
-/// The runs that have their shards although their owner was over at `before` or earlier, the oldest first.
+/// The runs whose shards are stored although their owner ended at `before` or earlier, the oldest first.
 pub(crate) async fn clearable(
     connection: &mut SqliteConnection,
     summary_version: u32,
     before: Timestamp,
-) -> Result<Vec<Clearable>> {
+) -> Result<Vec<ClearableRun>> {
     let before = Instant(before);
     let rows = sqlx::query!(
         r#"SELECT r.id AS "run!: Text<RunId>",
@@ -226,9 +227,9 @@ pub(crate) async fn clearable(
     .await?;
     Ok(rows
         .into_iter()
-        .map(|row| Clearable {
+        .map(|row| ClearableRun {
             run: row.run.0,
-            wants_summary: row.wants_summary,
+            needs_summary: row.wants_summary,
         })
         .collect())
 }
@@ -245,7 +246,7 @@ pub(crate) async fn set_cleared(
     Ok(())
 }
 
-/// When its shards were removed, if they were.
+/// When the run's shards were deleted, if they were.
 pub(crate) async fn cleared_at(
     connection: &mut SqliteConnection,
     id: RunId,

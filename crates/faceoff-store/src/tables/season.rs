@@ -10,22 +10,22 @@ use sqlx::SqliteConnection;
 /// The season: one per data folder.
 #[derive(Debug, Clone)]
 pub struct Season {
-    /// As shown to teams.
+    /// Display name.
     pub name: String,
-    /// All seeds derive from it; published when the season closes. Of one that is an archive's and was not closed:
-    /// zeros, from which nothing derives.
+    /// All seeds derive from it; published when the season closes. In an archive of a season that was not closed it is
+    /// zero and unused.
     pub secret: Seed,
-    /// BLAKE3 of the secret's 32 bytes, 64 hexadecimal digits; published before the season opens, so
-    /// that nobody can choose the episodes afterwards.
+    /// BLAKE3 of the secret's 32 bytes, 64 hexadecimal digits. It is published before the season opens, so
+    /// that the episodes cannot be chosen afterwards.
     pub commitment: String,
     /// When the data folder was first opened.
     pub created_at: Timestamp,
-    /// When it was closed; `None` while it runs.
+    /// `None` while the season is open.
     pub closed_at: Option<Timestamp>,
-    /// The queue is held, if it is: nothing is begun.
+    /// Set while the queue is paused: no job starts.
     pub paused: Option<Ruling>,
-    /// May anybody register a team?
-    pub takes_registrations: bool,
+    /// Is registration of teams open to everyone?
+    pub registration_open: bool,
 }
 
 pub(crate) async fn read(connection: &mut SqliteConnection) -> Result<Season> {
@@ -43,18 +43,18 @@ pub(crate) async fn read(connection: &mut SqliteConnection) -> Result<Season> {
         name: row.name,
         secret: Seed::from_bytes(row.secret.0),
         commitment: match (row.archived_commitment, row.closed_at) {
-            // the secret is not here
+            // an archive without the secret
             (Some(commitment), None) => commitment,
             _ => blake3::hash(&row.secret.0).to_string(),
         },
         created_at: row.created_at.0,
         closed_at: row.closed_at.map(|at| at.0),
-        paused: Ruling::of(row.paused_at, row.paused_for),
-        takes_registrations: row.takes_registrations,
+        paused: Ruling::from_columns(row.paused_at, row.paused_for),
+        registration_open: row.takes_registrations,
     })
 }
 
-/// Refuses what a closed season no longer takes.
+/// Refuses changes to a closed season.
 pub(crate) async fn check_open(connection: &mut SqliteConnection) -> Result<()> {
     match read(connection).await?.closed_at {
         Some(closed_at) => Err(StoreError::SeasonClosed { closed_at }),
@@ -62,7 +62,7 @@ pub(crate) async fn check_open(connection: &mut SqliteConnection) -> Result<()> 
     }
 }
 
-/// False if that was its name before.
+/// Renames the season; false if it has that name already.
 pub(crate) async fn rename(connection: &mut SqliteConnection, name: &str) -> Result<bool> {
     let renamed = sqlx::query!("UPDATE season SET name = ?1 WHERE name <> ?1", name)
         .execute(connection)
@@ -70,7 +70,7 @@ pub(crate) async fn rename(connection: &mut SqliteConnection, name: &str) -> Res
     Ok(renamed.rows_affected() > 0)
 }
 
-/// Is the queue held? Asked at every claim, which needs no more of the season.
+/// Is the queue paused? A separate query, because every claim needs it.
 pub(crate) async fn is_paused(connection: &mut SqliteConnection) -> Result<bool> {
     Ok(sqlx::query_scalar!(
         r#"SELECT EXISTS (SELECT 1 FROM season WHERE paused_at IS NOT NULL) AS "paused!: bool""#
@@ -79,7 +79,7 @@ pub(crate) async fn is_paused(connection: &mut SqliteConnection) -> Result<bool>
     .await?)
 }
 
-/// Holds the queue, or lets it go on.
+/// Pauses the queue, or resumes it.
 pub(crate) async fn set_paused(
     connection: &mut SqliteConnection,
     ruling: Option<&Ruling>,
@@ -96,11 +96,11 @@ pub(crate) async fn set_paused(
     Ok(())
 }
 
-pub(crate) async fn set_takes_registrations(
+pub(crate) async fn set_registration_open(
     connection: &mut SqliteConnection,
-    takes: bool,
+    is_open: bool,
 ) -> Result<()> {
-    sqlx::query!("UPDATE season SET takes_registrations = ?", takes)
+    sqlx::query!("UPDATE season SET takes_registrations = ?", is_open)
         .execute(connection)
         .await?;
     Ok(())
@@ -114,8 +114,8 @@ pub(crate) async fn close(connection: &mut SqliteConnection, now: Timestamp) -> 
     Ok(())
 }
 
-/// Gives a new data folder its season, with a secret from the operating system's generator.
-pub(crate) async fn draw_secret_once(connection: &mut SqliteConnection) -> Result<()> {
+/// Creates the season of a new data folder, with a secret from the operating system's generator.
+pub(crate) async fn create_once(connection: &mut SqliteConnection) -> Result<()> {
     let mut secret = [0; 32];
     getrandom::fill(&mut secret)
         .map_err(|error| StoreError::Database(sqlx::Error::Io(std::io::Error::other(error))))?;

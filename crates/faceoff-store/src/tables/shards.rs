@@ -7,44 +7,43 @@ use jiff::Timestamp;
 use sqlx::{SqliteConnection, types::Text};
 use uuid::Uuid;
 
-/// A range of episodes of one task of one run.
+/// A range of episodes of one task of a run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Shard {
-    /// Drawn when the run was cut.
     pub id: ShardId,
     pub task: Task,
-    /// Its index within the run's task, from 0.
+    /// Index of the episode within the run's task, from 0.
     pub first_episode: u32,
     /// One past the last episode.
     pub end_episode: u32,
-    /// Artifact key prefix of its recording, once committed, if its run keeps recordings. The
-    /// artifacts are removed some time after the run's owner is over.
+    /// Artifact key prefix of its recording, once committed, if its run is recorded. The artifacts
+    /// are removed some time after the end of the run's owner.
     pub recording: Option<String>,
 }
 
 impl Shard {
-    /// How many episodes it plays.
+    /// Number of its episodes.
     #[must_use]
     pub const fn episodes(&self) -> u32 {
         self.end_episode - self.first_episode
     }
 }
 
-/// What playing a shard yields.
+/// The result of playing a shard, as committed by a worker.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ShardCommit {
     /// One outcome per episode, in order; fewer only if the shard was stopped by faults.
     pub outcomes: Vec<EpisodeOutcome>,
     /// Tail of the agent's standard error.
     pub log: String,
-    /// The agent's faults exceeded the plan's bound within this shard.
+    /// The agent's faults in this shard exceeded the plan's limit.
     pub stopped_by_faults: bool,
-    /// Artifact key prefix of the recording, uploaded before; `None` exactly if the run keeps none.
+    /// Artifact key prefix of the recording, uploaded before; `None` exactly if the run is not recorded.
     pub recording: Option<String>,
 }
 
 impl ShardCommit {
-    /// A commit that does not cover its shard would publish a score of fewer episodes.
+    /// Refuses a commit that does not cover its shard: the score would be based on fewer episodes.
     pub(crate) fn check(&self, shard: &Shard, keeps_recordings: bool) -> Result<()> {
         let episodes = shard.first_episode..shard.end_episode;
         let in_order = self
@@ -68,7 +67,7 @@ impl ShardCommit {
                 "the run keeps recordings: upload the shard's and name its key".into(),
             )),
             (Some(key), false) => Err(StoreError::Conflict(format!(
-                "the run keeps no recordings: do not upload one (came: {key})"
+                "the run keeps no recordings: do not upload one (got {key})"
             ))),
         }
     }
@@ -104,7 +103,7 @@ impl From<ShardRow> for Shard {
     }
 }
 
-/// `SELECT` of shards without outcomes and logs; the argument is what follows `FROM shards`.
+/// `SELECT` of shards without outcomes and logs; the argument is the SQL after `FROM shards`.
 macro_rules! select_shards {
     ($tail:literal $(, $argument:expr)*) => {
         sqlx::query_as!(
@@ -118,31 +117,31 @@ macro_rules! select_shards {
     };
 }
 
-/// The shard that a unit of work plays, and its run.
-pub(crate) async fn of_unit(
+/// The shard that a job plays, and its run.
+pub(crate) async fn of_job(
     connection: &mut SqliteConnection,
-    unit: Uuid,
+    job: Uuid,
 ) -> Result<Option<(RunId, Shard)>> {
-    let unit = Text(unit);
-    Ok(select_shards!("WHERE unit_id = ?", unit)
+    let job = Text(job);
+    Ok(select_shards!("WHERE unit_id = ?", job)
         .fetch_optional(connection)
         .await?
         .map(|row| (row.run.0, row.into())))
 }
 
-/// A shard that a worker has played.
+/// A shard that a worker has committed.
 #[derive(Debug)]
-pub(crate) struct PlayedShard {
+pub(crate) struct CommittedShard {
     pub(crate) id: ShardId,
-    pub(crate) unit: Uuid,
+    pub(crate) job: Uuid,
     pub(crate) recording: Option<String>,
 }
 
-/// What a worker elsewhere (`holder`: `remote/WORKER`) has committed of runs that go on.
-pub(crate) async fn of_running_by(
+/// The shards of running runs that a remote worker (`holder`: `remote/WORKER`) has committed.
+pub(crate) async fn committed_by(
     connection: &mut SqliteConnection,
     holder: &str,
-) -> Result<Vec<PlayedShard>> {
+) -> Result<Vec<CommittedShard>> {
     let rows = sqlx::query!(
         r#"SELECT s.id AS "id: Text<ShardId>", s.unit_id AS "unit: Text<Uuid>", s.recording
            FROM units u JOIN shards s ON s.unit_id = u.id JOIN runs r ON r.id = s.run_id
@@ -154,16 +153,16 @@ pub(crate) async fn of_running_by(
     )
     .fetch_all(connection)
     .await?;
-    let played = rows.into_iter().map(|row| PlayedShard {
+    let committed = rows.into_iter().map(|row| CommittedShard {
         id: row.id.0,
-        unit: row.unit.0,
+        job: row.unit.0,
         recording: row.recording,
     });
-    Ok(played.collect())
+    Ok(committed.collect())
 }
 
-/// What came of a shard is forgotten.
-pub(crate) async fn take_back(connection: &mut SqliteConnection, id: ShardId) -> Result<()> {
+/// Deletes the result of a committed shard.
+pub(crate) async fn clear_result(connection: &mut SqliteConnection, id: ShardId) -> Result<()> {
     let id = Text(id);
     sqlx::query!(
         "UPDATE shards SET committed_at = NULL, recording = NULL, agent_faults = NULL, outcomes = NULL, log = NULL
@@ -175,7 +174,7 @@ pub(crate) async fn take_back(connection: &mut SqliteConnection, id: ShardId) ->
     Ok(())
 }
 
-/// The shards of a run in (task, first episode) order.
+/// The shards of a run, by task and first episode.
 pub(crate) async fn of_run(connection: &mut SqliteConnection, run: RunId) -> Result<Vec<Shard>> {
     let run = Text(run);
     let shards = select_shards!("WHERE run_id = ? ORDER BY position", run)
@@ -184,33 +183,33 @@ pub(crate) async fn of_run(connection: &mut SqliteConnection, run: RunId) -> Res
     Ok(shards.into_iter().map(Shard::from).collect())
 }
 
-/// The units of work of a run's shards that are not committed.
-pub(crate) async fn open_units(connection: &mut SqliteConnection, run: RunId) -> Result<Vec<Uuid>> {
+/// The jobs of a run's shards that are not committed.
+pub(crate) async fn open_jobs(connection: &mut SqliteConnection, run: RunId) -> Result<Vec<Uuid>> {
     let run = Text(run);
-    let units = sqlx::query_scalar!(
+    let jobs = sqlx::query_scalar!(
         r#"SELECT unit_id AS "id: Text<Uuid>" FROM shards WHERE run_id = ? AND committed_at IS NULL"#,
         run,
     )
     .fetch_all(connection)
     .await?;
-    Ok(units.into_iter().map(|id| id.0).collect())
+    Ok(jobs.into_iter().map(|id| id.0).collect())
 }
 
-/// Adds a shard at its `position` in the run, to be played by `unit`.
+/// Adds a shard at its `position` in the run, with the job that plays it.
 pub(crate) async fn insert(
     connection: &mut SqliteConnection,
     run: RunId,
     shard: &Shard,
     position: u32,
-    unit: Uuid,
+    job: Uuid,
 ) -> Result<()> {
-    let (id, run, unit, task) = (Text(shard.id), Text(run), Text(unit), Text(shard.task));
+    let (id, run, job, task) = (Text(shard.id), Text(run), Text(job), Text(shard.task));
     sqlx::query!(
         "INSERT INTO shards (id, run_id, unit_id, position, task, first_episode, end_episode)
          VALUES (?, ?, ?, ?, ?, ?, ?)",
         id,
         run,
-        unit,
+        job,
         position,
         task,
         shard.first_episode,
@@ -221,7 +220,7 @@ pub(crate) async fn insert(
     Ok(())
 }
 
-/// Stores what playing an uncommitted shard yielded.
+/// Stores the result of a shard that is not committed yet.
 pub(crate) async fn commit(
     connection: &mut SqliteConnection,
     id: ShardId,
@@ -245,22 +244,22 @@ pub(crate) async fn commit(
     match stored.rows_affected() {
         1 => Ok(()),
         _ => Err(StoreError::Damaged(format!(
-            "shard {id}: committed, but its unit of work is open"
+            "shard {id}: committed, but its job is open"
         ))),
     }
 }
 
-/// What a run's shards come to so far.
-pub(crate) struct Sums {
+/// Sums over a run's shards.
+pub(crate) struct ShardSums {
     pub(crate) agent_faults: i64,
     /// Shards that are not committed.
     pub(crate) open: i64,
 }
 
-pub(crate) async fn sums(connection: &mut SqliteConnection, run: RunId) -> Result<Sums> {
+pub(crate) async fn sums(connection: &mut SqliteConnection, run: RunId) -> Result<ShardSums> {
     let run = Text(run);
     Ok(sqlx::query_as!(
-        Sums,
+        ShardSums,
         r#"SELECT COALESCE(SUM(agent_faults), 0) AS "agent_faults!: i64",
                   COUNT(*) - COUNT(committed_at) AS "open!: i64"
            FROM shards WHERE run_id = ?"#,
@@ -270,7 +269,7 @@ pub(crate) async fn sums(connection: &mut SqliteConnection, run: RunId) -> Resul
     .await?)
 }
 
-/// The outcomes of a run's committed shards in (task, episode) order.
+/// The outcomes of a run's committed shards, by task and episode.
 pub(crate) async fn outcomes(
     connection: &mut SqliteConnection,
     run: RunId,
@@ -286,19 +285,19 @@ pub(crate) async fn outcomes(
     Ok(shards.into_iter().flat_map(|outcomes| outcomes.0).collect())
 }
 
-/// A committed shard in which the agent broke the protocol or a limit.
-pub(crate) struct Faulty {
+/// A committed shard with agent faults.
+pub(crate) struct FaultyShard {
     pub(crate) task: Text<Task>,
     pub(crate) first_episode: u32,
     pub(crate) outcomes: Json<Vec<EpisodeOutcome>>,
     pub(crate) log: String,
 }
 
-/// In order of play.
-pub(crate) async fn faulty(connection: &mut SqliteConnection, run: RunId) -> Result<Vec<Faulty>> {
+/// The shards of a run with agent faults, in order of play.
+pub(crate) async fn with_agent_faults(connection: &mut SqliteConnection, run: RunId) -> Result<Vec<FaultyShard>> {
     let run = Text(run);
     Ok(sqlx::query_as!(
-        Faulty,
+        FaultyShard,
         r#"SELECT task AS "task: Text<Task>", first_episode AS "first_episode: u32",
                   outcomes AS "outcomes!: Json<Vec<EpisodeOutcome>>", log AS "log!"
            FROM shards WHERE run_id = ? AND agent_faults > 0 ORDER BY position"#,
@@ -308,20 +307,20 @@ pub(crate) async fn faulty(connection: &mut SqliteConnection, run: RunId) -> Res
     .await?)
 }
 
-/// Removes a run's shards in which the agent broke nothing, committed or not, with their units of work.
-pub(crate) async fn remove_faultless(connection: &mut SqliteConnection, run: RunId) -> Result<()> {
+/// Deletes a run's shards without agent faults, committed or not, with their jobs.
+pub(crate) async fn delete_without_faults(connection: &mut SqliteConnection, run: RunId) -> Result<()> {
     let run = Text(run);
-    let units = sqlx::query_scalar!(
+    let jobs = sqlx::query_scalar!(
         r#"DELETE FROM shards WHERE run_id = ? AND COALESCE(agent_faults, 0) = 0
            RETURNING unit_id AS "unit: Text<Uuid>""#,
         run,
     )
     .fetch_all(&mut *connection)
     .await?;
-    let units = Json(units.iter().map(|unit| unit.0).collect::<Vec<_>>());
+    let jobs = Json(jobs.iter().map(|job| job.0).collect::<Vec<_>>());
     sqlx::query!(
         "DELETE FROM units WHERE id IN (SELECT value FROM json_each(?))",
-        units
+        jobs
     )
     .execute(connection)
     .await?;

@@ -1,4 +1,4 @@
-//! Which agents a stage takes, by their runtimes.
+//! The agent runtimes that a stage accepts.
 
 use crate::{
     error::StoreError,
@@ -7,11 +7,11 @@ use crate::{
         submissions::Submission,
     },
 };
-use faceoff_types::{RuntimeNotTaken, StageRuntimes};
+use faceoff_types::{RuntimeRefused, StageRuntimes};
 use jiff::Timestamp;
 
 impl Stage {
-    /// The runtimes that it takes; `None`: all that the server offers.
+    /// The runtimes that the stage accepts; `None`: all that the server offers.
     #[must_use]
     pub fn runtimes(&self) -> Option<StageRuntimes> {
         Some(StageRuntimes {
@@ -20,29 +20,29 @@ impl Stage {
         })
     }
 
-    /// Does it take an agent?
+    /// Checks whether the stage accepts a submission.
     ///
     /// # Errors
-    /// If it does not take its runtime, or that is not known.
-    pub fn check_takes(&self, submission: &Submission) -> Result<(), RuntimeNotTaken> {
+    /// If the stage does not accept its runtime, or the runtime is unknown.
+    pub fn check_accepts(&self, submission: &Submission) -> Result<(), RuntimeRefused> {
         self.runtimes()
             .map_or(Ok(()), |taken| taken.check(submission.runtime.as_deref()))
     }
 }
 
-/// The stages one of which must take what is uploaded at `now`: those that are open, or the one that matters then.
-/// None, if one of them takes any.
-pub(crate) fn of_uploads(all: &[Stage], now: Timestamp) -> Vec<StageRuntimes> {
+/// The stages of which at least one must accept an upload at `now`: the open ones, else the current one. Empty if one of
+/// them accepts all runtimes.
+pub(crate) fn required_runtimes(all: &[Stage], now: Timestamp) -> Vec<StageRuntimes> {
     let is_open = |stage: &&Stage| stage.phase(now) == StagePhase::Open;
     let mut stages: Vec<&Stage> = all.iter().filter(is_open).collect();
     if stages.is_empty() {
         stages.extend(stages::current(all, now));
     }
-    let taken: Option<_> = stages.into_iter().map(Stage::runtimes).collect();
-    taken.unwrap_or_default()
+    let required: Option<_> = stages.into_iter().map(Stage::runtimes).collect();
+    required.unwrap_or_default()
 }
 
-/// What is asked for by somebody, and cannot be.
-pub(crate) fn conflict(why: &RuntimeNotTaken) -> StoreError {
+/// The error for a request with a submission whose runtime is not accepted.
+pub(crate) fn conflict(why: &RuntimeRefused) -> StoreError {
     StoreError::Conflict(why.to_string())
 }

@@ -2,7 +2,7 @@ use crate::{
     column::{Instant, Json},
     error::{Result, StoreError},
     event::Actor,
-    tables::{finalised::Finalised, plan::RunPlan},
+    tables::{sign_offs::SignOff, plan::RunPlan},
 };
 use faceoff_types::{
     DayDeadline, SeedLabel, StageDay, StageId, StageName, StageRules, StageSettings, TeamId, Zone,
@@ -15,37 +15,37 @@ use sqlx::{SqliteConnection, types::Text};
 pub struct Stage {
     /// Part of its URLs, and of its days' seeds.
     pub id: StageId,
-    /// No two that differ only in case.
+    /// Unique regardless of case.
     pub name: StageName,
-    /// From then on its days start, and its rules are fixed.
+    /// Its days can start from then on, and its rules are fixed.
     pub opens_at: Timestamp,
-    /// From then on none of its days starts; `None`: it has no end yet.
+    /// None of its days starts from then on; `None`: no end is set.
     pub closes_at: Option<Timestamp>,
-    /// Its days are dates there.
+    /// Time zone of its dates.
     pub zone: Zone,
-    /// What no score depends on.
+    /// Everything that scores do not depend on.
     pub settings: StageSettings,
-    /// What scores depend on, as they are now.
+    /// Everything that scores depend on: the current revision.
     pub rules: Revision,
-    /// Does its id enter the seeds of its days? Not if they began before there were stages.
+    /// Do the seeds of its days derive from its id? False if they began before there were stages.
     pub names_seeds: bool,
     /// Does it take rules and settings from the server's configuration?
     pub configured: bool,
-    /// The organiser has signed its result off, if so: nothing of it changes any more.
-    pub finalised: Option<Finalised>,
+    /// Set once the stage is signed off: then it cannot be changed.
+    pub sign_off: Option<SignOff>,
 }
 
-/// Rules from one time on.
+/// A revision of a stage's rules.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Revision {
     /// From 1.
     pub number: u32,
-    /// When they became the stage's.
+    /// When it came into force.
     pub since: Timestamp,
     pub rules: StageRules,
 }
 
-/// Where a stage is by an instant.
+/// Phase of a stage at an instant.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum StagePhase {
     Upcoming,
@@ -54,7 +54,7 @@ pub enum StagePhase {
 }
 
 impl Stage {
-    /// Where it is at `now`.
+    /// The stage's phase at `now`.
     #[must_use]
     pub fn phase(&self, now: Timestamp) -> StagePhase {
         if now < self.opens_at {
@@ -66,7 +66,7 @@ impl Stage {
         }
     }
 
-    /// Its day at `now`.
+    /// The stage's day at `now`.
     #[must_use]
     pub fn day(&self, now: Timestamp) -> StageDay {
         StageDay {
@@ -75,10 +75,10 @@ impl Stage {
         }
     }
 
-    /// Its next day, if it has one, whose newest cut so far was on the date `newest`; and when the schedule starts
-    /// that, which may be due already. Without a schedule it is the earliest day that the organiser can start.
+    /// The stage's next day, if it has one, and its scheduled cutoff, which may be due already. `newest` is the date of
+    /// the newest day so far. Without a schedule it is the earliest day that an organiser can start.
     #[must_use]
-    pub fn next_cut(
+    pub fn next_cutoff(
         &self,
         newest: Option<Date>,
         now: Timestamp,
@@ -88,38 +88,38 @@ impl Stage {
             Some(newest) if newest >= earliest => newest.tomorrow().ok()?,
             _ => earliest,
         };
-        let ends_before = |at: Timestamp| self.closes_at.is_some_and(|closes_at| closes_at <= at);
+        let is_closed_at = |at: Timestamp| self.closes_at.is_some_and(|closes_at| closes_at <= at);
         if self.phase(now) == StagePhase::Closed {
             return None;
         }
         let Some(schedule) = &self.settings.schedule else {
-            let begins = from.to_zoned(self.zone.time_zone()).ok()?.timestamp();
-            return (!ends_before(begins)).then_some((from, None));
+            let midnight = from.to_zoned(self.zone.time_zone()).ok()?.timestamp();
+            return (!is_closed_at(midnight)).then_some((from, None));
         };
         let (date, at) = schedule.next(from, self.opens_at, &self.zone)?;
-        (!ends_before(at)).then_some((date, Some(at)))
+        (!is_closed_at(at)).then_some((date, Some(at)))
     }
 
-    /// Until when its day of this date, which has its cut at `cut_at`, may be played; `None`: however long it takes.
-    /// The closing of the stage ends no day.
+    /// Deadline of the stage's day of this date with this cutoff; `None`: there is none. The closing of the stage ends
+    /// no day.
     #[must_use]
-    pub fn deadline(&self, date: Date, cut_at: Timestamp) -> Option<Timestamp> {
+    pub fn deadline(&self, date: Date, cutoff_at: Timestamp) -> Option<Timestamp> {
         match self.settings.day_deadline {
             DayDeadline::Never => None,
-            DayDeadline::Hours(hours) => cut_at
+            DayDeadline::Hours(hours) => cutoff_at
                 .checked_add(SignedDuration::from_hours(hours.into()))
                 .ok(),
             DayDeadline::NextCut => {
                 let schedule = self.settings.schedule.as_ref()?;
                 let from = date.tomorrow().ok()?;
-                // A missed day may be played just when another is due.
-                let after = cut_at.checked_add(SignedDuration::from_secs(1)).ok()?;
+                // A missed day may start at the same time at which another day is due.
+                let after = cutoff_at.checked_add(SignedDuration::from_secs(1)).ok()?;
                 schedule.next(from, after, &self.zone).map(|(_, at)| at)
             }
         }
     }
 
-    /// What each team plays on a day by the rules as they are now.
+    /// The plan of each team's run on a day, under the current rules.
     #[must_use]
     pub fn plan(&self) -> RunPlan {
         let rules = &self.rules.rules;
@@ -134,7 +134,7 @@ impl Stage {
         }
     }
 
-    /// What the seeds of its evaluations on a date follow from.
+    /// Label from which the seeds of the stage's evaluations on a date derive.
     #[must_use]
     pub const fn seed_label(&self, date: Date) -> SeedLabel {
         if self.names_seeds {
@@ -181,12 +181,12 @@ impl From<Row> for Stage {
             },
             names_seeds: row.names_seeds,
             configured: row.configured,
-            finalised: Finalised::of(row.finalised_at, row.finalised_by, row.finalised_without),
+            sign_off: SignOff::from_columns(row.finalised_at, row.finalised_by, row.finalised_without),
         }
     }
 }
 
-/// All stages, the first to open first. One without rules is none yet: the program that makes it has not named them.
+/// All stages, by opening time. A stage without rules is left out: its creation is not complete.
 pub(crate) async fn all(connection: &mut SqliteConnection) -> Result<Vec<Stage>> {
     let rows = sqlx::query_as!(
         Row,
@@ -206,24 +206,24 @@ pub(crate) async fn all(connection: &mut SqliteConnection) -> Result<Vec<Stage>>
     Ok(rows.into_iter().map(Stage::from).collect())
 }
 
-/// The one that matters at `now`: of the open ones the last that opened, else the last that closed, else the first to
+/// The current stage at `now`: of the open ones the one that opened last, else the one that closed last, else the next to
 /// open.
 pub(crate) fn current(stages: &[Stage], now: Timestamp) -> Option<&Stage> {
-    let of = |phase| stages.iter().filter(move |stage| stage.phase(now) == phase);
-    of(StagePhase::Open)
+    let in_phase = |phase| stages.iter().filter(move |stage| stage.phase(now) == phase);
+    in_phase(StagePhase::Open)
         .next_back()
-        .or_else(|| of(StagePhase::Closed).max_by_key(|stage| stage.closes_at))
-        .or_else(|| of(StagePhase::Upcoming).next())
+        .or_else(|| in_phase(StagePhase::Closed).max_by_key(|stage| stage.closes_at))
+        .or_else(|| in_phase(StagePhase::Upcoming).next())
 }
 
 pub(crate) async fn find(connection: &mut SqliteConnection, id: StageId) -> Result<Stage> {
-    // They are few.
+    // There are only a few stages.
     let stages = all(connection).await?;
     let found = stages.into_iter().find(|stage| stage.id == id);
     found.ok_or(StoreError::NotFound("stage"))
 }
 
-/// The rules that a stage has had, the first ones first.
+/// All revisions of a stage's rules, the oldest first.
 pub(crate) async fn revisions(
     connection: &mut SqliteConnection,
     stage: StageId,
@@ -246,8 +246,8 @@ pub(crate) async fn revisions(
         .collect())
 }
 
-/// The stage that takes its rules from the configuration, with or without rules as yet.
-pub(crate) async fn configured(connection: &mut SqliteConnection) -> Result<Option<StageId>> {
+/// The stage that takes its rules from the configuration, even if it has no rules yet.
+pub(crate) async fn find_configured(connection: &mut SqliteConnection) -> Result<Option<StageId>> {
     let id =
         sqlx::query_scalar!(r#"SELECT id AS "id: Text<StageId>" FROM stages WHERE configured = 1"#)
             .fetch_optional(connection)
@@ -301,7 +301,7 @@ pub(crate) async fn insert_revision(
     Ok(())
 }
 
-/// Replaces rules by which nothing was played.
+/// Replaces rules under which no evaluation exists.
 pub(crate) async fn replace_revision(
     connection: &mut SqliteConnection,
     stage: StageId,
@@ -320,7 +320,7 @@ pub(crate) async fn replace_revision(
     Ok(())
 }
 
-/// Stores everything of a stage but its rules. [`StoreError::StageNameTaken`] if another has its name.
+/// Stores everything of a stage except its rules. [`StoreError::StageNameTaken`] if another has its name.
 pub(crate) async fn update(connection: &mut SqliteConnection, stage: &Stage) -> Result<()> {
     let (id, name, opens_at) = (Text(stage.id), stage.name.as_str(), Instant(stage.opens_at));
     let (closes_at, zone) = (stage.closes_at.map(Instant), Text(&stage.zone));
@@ -387,16 +387,16 @@ mod tests {
             },
             names_seeds: true,
             configured: false,
-            finalised: None,
+            sign_off: None,
         }
     }
 
     #[test]
-    fn the_next_cut_is_the_first_of_the_schedule_between_opening_and_closing() {
+    fn next_cutoff_is_scheduled_between_opening_and_closing() {
         // 06:00 in Berlin is 05:00 UTC.
         let stage = stage(Some(Schedule::daily("06:00".parse().unwrap())));
         let next = |newest, now: &str| {
-            let (date, starts) = stage.next_cut(newest, at(now))?;
+            let (date, starts) = stage.next_cutoff(newest, at(now))?;
             Some((date, starts.unwrap().to_string()))
         };
         let third = Some((date(2026, 3, 3), "2026-03-03T05:00:00Z".to_owned()));
@@ -410,19 +410,19 @@ mod tests {
     }
 
     #[test]
-    fn a_day_may_be_played_until_the_next_cut_or_as_the_stage_says() {
+    fn day_deadline_is_the_next_cutoff_or_the_configured_time() {
         let scheduled = stage(Some(Schedule::daily("06:00".parse().unwrap())));
-        let deadline = |stage: &Stage, day: Date, cut_at: &str| {
-            let deadline_at = stage.deadline(day, at(cut_at));
+        let deadline = |stage: &Stage, day: Date, cutoff_at: &str| {
+            let deadline_at = stage.deadline(day, at(cutoff_at));
             deadline_at.map(|at| at.to_string())
         };
         let fourth = Some("2026-03-04T05:00:00Z".to_owned());
         let third = date(2026, 3, 3);
         assert_eq!(deadline(&scheduled, third, "2026-03-03T05:00:00Z"), fourth);
-        // By hand, early or late: the next date's all the same.
+        // If it is started by hand, early or late, it is still the cutoff of the next date.
         assert_eq!(deadline(&scheduled, third, "2026-03-03T00:00:00Z"), fourth);
         assert_eq!(deadline(&scheduled, third, "2026-03-03T22:00:00Z"), fourth);
-        // Of a missed day it is the first that comes, and of the last one that which would come.
+        // For a missed day it is the next cutoff, and for the last day the one that would follow.
         let missed = deadline(&scheduled, date(2026, 3, 1), "2026-03-03T05:00:00Z");
         assert_eq!(missed, fourth);
         let last = deadline(&scheduled, date(2026, 3, 5), "2026-03-05T05:00:00Z");
@@ -443,9 +443,9 @@ mod tests {
     }
 
     #[test]
-    fn without_a_schedule_it_is_the_next_date_that_has_had_none() {
+    fn next_cutoff_without_schedule_is_the_next_free_date() {
         let stage = stage(None);
-        let next = |newest, now: &str| stage.next_cut(newest, at(now)).map(|(date, _)| date);
+        let next = |newest, now: &str| stage.next_cutoff(newest, at(now)).map(|(date, _)| date);
         assert_eq!(next(None, "2026-02-01T00:00:00Z"), Some(date(2026, 3, 2)));
         let second = Some(date(2026, 3, 2));
         assert_eq!(next(second, "2026-03-02T22:59:00Z"), Some(date(2026, 3, 3)));

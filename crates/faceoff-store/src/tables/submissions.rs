@@ -4,77 +4,76 @@ use crate::{
     event::Actor,
     tables::rulings::Ruling,
 };
-use faceoff_types::{BundleRef, SmokeTiming, SubmissionId, TeamId};
+use faceoff_types::{BundleRef, ValidationTiming, SubmissionId, TeamId};
 use jiff::Timestamp;
 use sqlx::{SqliteConnection, types::Text};
 
 #[derive(Debug, Clone, PartialEq)]
 pub struct Submission {
-    /// Drawn at the upload.
     pub id: SubmissionId,
     pub team: TeamId,
     pub bundle: BundleRef,
     /// When its upload was complete.
     pub created_at: Timestamp,
-    /// The agent's own name; known once the bundle was unpacked.
+    /// The name in the agent's manifest; known once the bundle was unpacked.
     pub agent_name: Option<String>,
-    /// The runtime that it names; known likewise, but not of what was checked by older programs.
+    /// The runtime in the manifest; unknown before unpacking, and for submissions validated by older versions.
     pub runtime: Option<String>,
-    /// How far its smoke run is.
+    /// State of its validation.
     pub state: SubmissionState,
-    /// How long its answers took in the smoke run, for each task that was played.
-    pub timing: Vec<SmokeTiming>,
-    /// Is it what its team enters at the next cut?
+    /// Response times in the validation run, for each task that was played.
+    pub timing: Vec<ValidationTiming>,
+    /// Is it its team's active submission, which is evaluated at the next cutoff?
     pub active: bool,
-    /// When its team took it back: it enters no further day, unless it is chosen again.
+    /// When its team withdrew it; it is not evaluated again unless it is chosen again.
     pub withdrawn_at: Option<Timestamp>,
-    /// What its team calls it.
+    /// A label set by its team.
     pub label: Option<String>,
-    /// What its team writes about it.
+    /// A note written by its team.
     pub note: Option<String>,
-    /// The team's first submission of the same archive, if this is another.
-    pub same_as: Option<SubmissionId>,
-    /// Its archive was removed, if it was: nobody plays it any more.
-    pub archive_removed: Option<Ruling>,
-    /// Who wished that, if somebody did.
+    /// The team's first submission of the same bundle, if this is a later one.
+    pub duplicate_of: Option<SubmissionId>,
+    /// Set if its bundle was removed: it cannot be evaluated any more.
+    pub bundle_removed: Option<Ruling>,
+    /// Set if the removal was requested.
     pub deleted: Option<Deletion>,
 }
 
-/// Somebody has had the archive of a submission removed.
+/// The requested removal of a submission's bundle.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Deletion {
     pub at: Timestamp,
     pub by: Actor,
 }
 
-/// A submission's way through its smoke run. The agent's log is read by itself
-/// ([`Store::submission_log`](crate::Store::submission_log)).
+/// State of a submission's validation. [`Store::submission_log`](crate::Store::submission_log) reads the agent's
+/// log.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum SubmissionState {
-    /// The smoke run is queued or running.
+    /// The validation run is queued or running.
     Validating,
-    /// It starts, answers and keeps time.
+    /// The agent starts, responds, and meets its time limits.
     Valid,
     Invalid {
-        /// What is wrong and where.
+        /// The fault and its location.
         reason: String,
     },
-    /// Our fault, after several attempts; the team may upload again.
+    /// Given up after platform faults in several attempts; the team may upload again.
     ValidationError {
         reason: String,
     },
 }
 
 impl SubmissionState {
-    /// Has the smoke run come to an end, whichever?
+    /// Has the validation run ended?
     #[must_use]
-    pub const fn is_settled(&self) -> bool {
+    pub const fn is_checked(&self) -> bool {
         !matches!(self, Self::Validating)
     }
 }
 
-/// Why the archive of a refused upload has gone.
-pub(crate) const REFUSED: &str = "since its smoke run refused it";
+/// Reason of the removal of a rejected submission's bundle.
+pub(crate) const REFUSED: &str = "because its validation run failed";
 
 struct SubmissionRow {
     id: Text<SubmissionId>,
@@ -88,7 +87,7 @@ struct SubmissionRow {
     runtime: Option<String>,
     state: String,
     reason: Option<String>,
-    timing: Option<Json<Vec<SmokeTiming>>>,
+    timing: Option<Json<Vec<ValidationTiming>>>,
     active: bool,
     withdrawn_at: Option<Instant>,
     label: Option<String>,
@@ -111,7 +110,7 @@ impl TryFrom<SubmissionRow> for Submission {
             ("validation_error", Some(reason)) => SubmissionState::ValidationError { reason },
             (state, _) => {
                 return Err(StoreError::Damaged(format!(
-                    "submission {}: state {state:?} with other data than it has",
+                    "submission {}: state {state:?} does not match its reason",
                     row.id.0
                 )));
             }
@@ -134,8 +133,8 @@ impl TryFrom<SubmissionRow> for Submission {
             withdrawn_at: row.withdrawn_at.map(|at| at.0),
             label: row.label,
             note: row.note,
-            same_as: row.same_as.map(|id| id.0),
-            archive_removed: row.removed_at.map(|at| Ruling {
+            duplicate_of: row.same_as.map(|id| id.0),
+            bundle_removed: row.removed_at.map(|at| Ruling {
                 at: at.0,
                 reason: row.removed_for.unwrap_or_else(|| REFUSED.to_owned()),
             }),
@@ -147,7 +146,7 @@ impl TryFrom<SubmissionRow> for Submission {
     }
 }
 
-/// `SELECT` of submissions `s` without their logs; the argument is what follows `FROM submissions s`.
+/// `SELECT` of submissions `s` without their logs; the argument is the SQL after `FROM submissions s`.
 macro_rules! select_submissions {
     ($tail:literal $(, $argument:expr)*) => {
         sqlx::query_as!(
@@ -156,7 +155,7 @@ macro_rules! select_submissions {
                       s.bundle_key, s.bundle_bytes AS "bundle_bytes: u64", s.bundle_blake3,
                       s.bundle_file_name, s.created_at AS "created_at: Instant",
                       s.agent_name, s.runtime, s.state, s.reason,
-                      s.timing AS "timing: Json<Vec<SmokeTiming>>",
+                      s.timing AS "timing: Json<Vec<ValidationTiming>>",
                       EXISTS (SELECT 1 FROM active_submissions a
                               WHERE a.team_id = s.team_id AND a.submission_id = s.id)
                       AS "active!: bool",
@@ -185,7 +184,7 @@ pub(crate) async fn find(
         .try_into()
 }
 
-/// A team's submissions, newest first.
+/// A team's submissions, the newest first.
 pub(crate) async fn of_team(
     connection: &mut SqliteConnection,
     team: TeamId,
@@ -202,7 +201,7 @@ pub(crate) async fn of_team(
     .collect()
 }
 
-/// When a submission was uploaded, if there is one of this id.
+/// When the submission was uploaded; `None` if the id is unknown.
 pub(crate) async fn created_at(
     connection: &mut SqliteConnection,
     id: SubmissionId,
@@ -215,7 +214,7 @@ pub(crate) async fn created_at(
     Ok(at.fetch_optional(connection).await?.map(|at| at.0))
 }
 
-/// Some of a team's submissions, newest first: those behind one of this time and id.
+/// One page of a team's submissions, the newest first. It follows the given time and id.
 pub(crate) async fn of_team_after(
     connection: &mut SqliteConnection,
     team: TeamId,
@@ -238,7 +237,7 @@ pub(crate) async fn of_team_after(
     .collect()
 }
 
-/// What each team that may play has active, earliest upload first.
+/// The active submission of each team that may compete, the earliest upload first.
 pub(crate) async fn active(connection: &mut SqliteConnection) -> Result<Vec<Submission>> {
     select_submissions!(
         "WHERE s.id IN (SELECT a.submission_id FROM active_submissions a JOIN teams t ON t.id = a.team_id
@@ -252,8 +251,8 @@ pub(crate) async fn active(connection: &mut SqliteConnection) -> Result<Vec<Subm
     .collect()
 }
 
-/// The tail of the agent's standard error in the smoke run; `None` if there was none, or it is not
-/// over.
+/// The tail of the agent's standard error in the validation run; `None` before its end, or if there was
+/// none.
 pub(crate) async fn log(
     connection: &mut SqliteConnection,
     id: SubmissionId,
@@ -265,7 +264,7 @@ pub(crate) async fn log(
         .ok_or(StoreError::NotFound("submission"))
 }
 
-/// Adds an upload whose smoke run is to come.
+/// Adds an uploaded submission that is to be validated.
 pub(crate) async fn insert(
     connection: &mut SqliteConnection,
     id: SubmissionId,
@@ -297,7 +296,7 @@ pub(crate) async fn set_valid(
     connection: &mut SqliteConnection,
     id: SubmissionId,
     (agent_name, runtime): (&str, &str),
-    timing: &[SmokeTiming],
+    timing: &[ValidationTiming],
     log: &str,
 ) -> Result<()> {
     let (id, timing) = (Text(id), Json(timing));
@@ -319,7 +318,7 @@ pub(crate) async fn set_invalid(
     id: SubmissionId,
     (agent_name, runtime): (Option<&str>, Option<&str>),
     reason: &str,
-    timing: &[SmokeTiming],
+    timing: &[ValidationTiming],
     log: &str,
 ) -> Result<()> {
     let (id, timing) = (Text(id), Json(timing));
@@ -354,7 +353,7 @@ pub(crate) async fn set_validation_error(
     Ok(())
 }
 
-/// Takes a submission back, or lets it play again.
+/// Withdraws a submission, or revokes the withdrawal.
 pub(crate) async fn set_withdrawn(
     connection: &mut SqliteConnection,
     id: SubmissionId,

@@ -1,7 +1,7 @@
 use crate::{
     column::Instant,
     error::{Result, StoreError},
-    tables::{people, rulings::Ruling, terms},
+    tables::{users, rulings::Ruling, terms},
 };
 use faceoff_types::{DivisionName, TeamId, TeamName};
 use jiff::Timestamp;
@@ -9,30 +9,26 @@ use sqlx::{SqliteConnection, types::Text};
 
 #[derive(Debug, Clone, PartialEq)]
 pub struct Team {
-    /// Stays when the team is renamed or gets another token.
+    /// Does not change when the team is renamed or gets another token.
     pub id: TeamId,
-    /// As on the board; unique whatever the case of its letters.
+    /// Shown on boards; unique regardless of case.
     pub name: TeamName,
-    /// When it was invited.
     pub created_at: Timestamp,
-    /// It neither plays nor is ranked, if it is.
+    /// Set while the team is disqualified: it is neither evaluated nor ranked.
     pub disqualified: Option<Ruling>,
-    /// What it tells of itself.
     pub profile: TeamProfile,
-    /// Since when it plays no more, by its own wish; its results stay.
+    /// When the team withdrew from the season; its results stay.
     pub retired_at: Option<Timestamp>,
-    /// A reference agent of the organisers: it plays as others do, and no board ranks it.
+    /// A reference agent of the organisers: it is evaluated as others are, and not ranked.
     pub is_baseline: bool,
 }
 
-/// What a team tells of itself.
+/// A team's description of itself.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct TeamProfile {
-    /// Where it is from.
     pub affiliation: Option<String>,
-    /// Its page, an address of http or https.
+    /// Address of its web page, http or https.
     pub link: Option<String>,
-    /// The division that it is in.
     pub division: Option<DivisionName>,
 }
 
@@ -55,7 +51,7 @@ impl From<TeamRow> for Team {
             id: row.id.0,
             name: row.name.0,
             created_at: row.created_at.0,
-            disqualified: Ruling::of(row.disqualified_at, row.disqualified_for),
+            disqualified: Ruling::from_columns(row.disqualified_at, row.disqualified_for),
             profile: TeamProfile {
                 affiliation: row.affiliation,
                 link: row.link,
@@ -67,7 +63,7 @@ impl From<TeamRow> for Team {
     }
 }
 
-/// `SELECT` of whole teams; the argument is what follows `FROM teams`.
+/// `SELECT` of whole teams; the argument is the SQL after `FROM teams`.
 macro_rules! select_teams {
     ($tail:literal $(, $argument:expr)*) => {
         sqlx::query_as!(
@@ -98,7 +94,7 @@ pub(crate) async fn find(connection: &mut SqliteConnection, id: TeamId) -> Resul
         .ok_or(StoreError::NotFound("team"))
 }
 
-/// [`StoreError::TeamNameTaken`] if the name exists, whatever its case.
+/// Adds a team. [`StoreError::TeamNameTaken`] if the name exists, regardless of case.
 pub(crate) async fn insert(connection: &mut SqliteConnection, team: &Team) -> Result<()> {
     let (id, name) = (Text(team.id), Text(&team.name));
     let created_at = Instant(team.created_at);
@@ -118,7 +114,7 @@ pub(crate) async fn insert(connection: &mut SqliteConnection, team: &Team) -> Re
     Ok(())
 }
 
-/// [`StoreError::TeamNameTaken`] if another has the name, whatever its case.
+/// Renames a team. [`StoreError::TeamNameTaken`] if another has the name, regardless of case.
 pub(crate) async fn set_name(
     connection: &mut SqliteConnection,
     id: TeamId,
@@ -151,7 +147,7 @@ pub(crate) async fn set_profile(
     Ok(())
 }
 
-/// Retires a team, by an organiser's doing or its own, or lets it play again.
+/// Retires a team, by its own decision or an organiser's, or revokes this.
 pub(crate) async fn set_retired(
     connection: &mut SqliteConnection,
     id: TeamId,
@@ -187,8 +183,8 @@ pub(crate) async fn set_baseline(
     Ok(())
 }
 
-/// The name of a signed-off stage on whose boards the team stands, if there is one.
-pub(crate) async fn signed_off_with(
+/// The name of a signed-off stage whose boards include the team, if there is one.
+pub(crate) async fn signed_off_stage(
     connection: &mut SqliteConnection,
     id: TeamId,
 ) -> Result<Option<String>> {
@@ -205,12 +201,12 @@ pub(crate) async fn signed_off_with(
     .await?)
 }
 
-/// Why what a team has uploaded and played is kept, whatever else would have it go.
+/// Why a team's files are kept as evidence, regardless of retention.
 #[derive(Debug)]
 pub(crate) enum Evidence {
-    /// As long as it is.
+    /// The team is disqualified.
     Disqualified(Ruling),
-    /// By an organiser, then.
+    /// An organiser retired the team at this time.
     Retired(Timestamp),
 }
 
@@ -228,7 +224,7 @@ pub(crate) async fn evidence(
     .fetch_optional(connection)
     .await?
     .ok_or(StoreError::NotFound("team"))?;
-    if let Some(ruling) = Ruling::of(row.disqualified_at, row.disqualified_for) {
+    if let Some(ruling) = Ruling::from_columns(row.disqualified_at, row.disqualified_for) {
         return Ok(Some(Evidence::Disqualified(ruling)));
     }
     let retired_at = row.retired_at.filter(|_| row.by_organiser);
@@ -255,8 +251,8 @@ pub(crate) async fn set_disqualified(
     Ok(())
 }
 
-/// Refuses what a team that is disqualified, has retired, or owes its consent to the terms may not do.
-pub(crate) async fn check_may_play(connection: &mut SqliteConnection, id: TeamId) -> Result<()> {
+/// Refuses a team that is disqualified, has retired, or has not accepted the terms.
+pub(crate) async fn check_may_compete(connection: &mut SqliteConnection, id: TeamId) -> Result<()> {
     let team = find(connection, id).await?;
     if let Some(Ruling { at, reason }) = team.disqualified {
         return Err(StoreError::Disqualified { at, reason });
@@ -265,8 +261,8 @@ pub(crate) async fn check_may_play(connection: &mut SqliteConnection, id: TeamId
         return Err(StoreError::Retired { at });
     }
     match terms::newest(connection).await? {
-        Some(version) if people::owes_terms(connection, id, version).await? => {
-            Err(StoreError::TermsOwed { version })
+        Some(version) if users::lacks_accepted_terms(connection, id, version).await? => {
+            Err(StoreError::TermsNotAccepted { version })
         }
         _ => Ok(()),
     }

@@ -2,10 +2,10 @@ use crate::{column::Instant, error::Result};
 use jiff::Timestamp;
 use sqlx::SqliteConnection;
 
-/// What taking part means, as people accept it.
+/// A version of the terms of participation.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Terms {
-    /// From 1; the newest is what counts.
+    /// From 1; the newest version is in force.
     pub version: u32,
     /// When it was published.
     pub since: Timestamp,

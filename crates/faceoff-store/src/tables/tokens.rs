@@ -2,19 +2,19 @@ use crate::{
     column::{Bytes32, Instant},
     error::{Result, StoreError},
 };
-use faceoff_types::{PersonId, TeamId, TokenId};
+use faceoff_types::{UserId, TeamId, TokenId};
 use jiff::Timestamp;
 use sqlx::{SqliteConnection, types::Text};
 
-/// By whom a token speaks.
+/// The owner of a token, as whom its requests act.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum TokenOwner {
-    /// Whoever may read the data folder; it acts as an organiser.
+    /// The host: any process that can read the data folder. It acts as an organiser.
     Host,
-    /// A team's programs.
+    /// A team's API clients.
     Team(TeamId),
-    /// A person, with the role that they have.
-    Person(PersonId),
+    /// A user, with their role.
+    User(UserId),
 }
 
 impl TokenOwner {
@@ -22,38 +22,38 @@ impl TokenOwner {
         match self {
             Self::Host => "host",
             Self::Team(_) => "team",
-            Self::Person(_) => "person",
+            Self::User(_) => "person",
         }
     }
 
     const fn team(self) -> Option<Text<TeamId>> {
         match self {
             Self::Team(id) => Some(Text(id)),
-            Self::Host | Self::Person(_) => None,
+            Self::Host | Self::User(_) => None,
         }
     }
 
-    const fn person(self) -> Option<Text<PersonId>> {
+    const fn user(self) -> Option<Text<UserId>> {
         match self {
-            Self::Person(id) => Some(Text(id)),
+            Self::User(id) => Some(Text(id)),
             Self::Host | Self::Team(_) => None,
         }
     }
 
-    fn of(team: Option<Text<TeamId>>, person: Option<Text<PersonId>>) -> Self {
-        match (team, person) {
+    fn from_columns(team: Option<Text<TeamId>>, user: Option<Text<UserId>>) -> Self {
+        match (team, user) {
             (Some(team), _) => Self::Team(team.0),
-            (None, Some(person)) => Self::Person(person.0),
+            (None, Some(user)) => Self::User(user.0),
             (None, None) => Self::Host,
         }
     }
 }
 
-/// How a token comes to the server.
+/// How a client sends the token.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum TokenKind {
-    /// In the header `Authorization`.
-    Key,
+    /// In the header `Authorization`; stored as `key`.
+    ApiToken,
     /// As a browser's cookie, after signing in.
     Session,
 }
@@ -61,35 +61,32 @@ pub enum TokenKind {
 impl TokenKind {
     const fn name(self) -> &'static str {
         match self {
-            Self::Key => "key",
+            Self::ApiToken => "key",
             Self::Session => "session",
         }
     }
 }
 
-/// A key to the API. The token itself is never stored.
+/// An API token or a browser's session. Only a hash of the secret is stored.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Token {
-    /// Names it; tells nothing of the token.
+    /// Not secret: the token cannot be derived from it.
     pub id: TokenId,
     pub kind: TokenKind,
-    /// By whom it speaks.
     pub owner: TokenOwner,
-    /// What its owner calls it.
+    /// A label, chosen by its owner.
     pub name: String,
-    /// When it was made.
     pub created_at: Timestamp,
-    /// From then on it is worth nothing; none: it has no end.
+    /// `None`: it does not expire.
     pub expires_at: Option<Timestamp>,
     pub last_used_at: Option<Timestamp>,
-    /// Since when it is worth nothing.
     pub revoked_at: Option<Timestamp>,
 }
 
 impl Token {
-    /// Is it worth anything at `now`?
+    /// Is the token neither revoked nor expired at `now`?
     #[must_use]
-    pub fn is_good(&self, now: Timestamp) -> bool {
+    pub fn is_valid(&self, now: Timestamp) -> bool {
         self.revoked_at.is_none() && self.expires_at.is_none_or(|at| now < at)
     }
 }
@@ -98,7 +95,7 @@ struct Row {
     id: Text<TokenId>,
     is_key: bool,
     team_id: Option<Text<TeamId>>,
-    person_id: Option<Text<PersonId>>,
+    person_id: Option<Text<UserId>>,
     name: String,
     created_at: Instant,
     expires_at: Option<Instant>,
@@ -111,11 +108,11 @@ impl From<Row> for Token {
         Self {
             id: row.id.0,
             kind: if row.is_key {
-                TokenKind::Key
+                TokenKind::ApiToken
             } else {
                 TokenKind::Session
             },
-            owner: TokenOwner::of(row.team_id, row.person_id),
+            owner: TokenOwner::from_columns(row.team_id, row.person_id),
             name: row.name,
             created_at: row.created_at.0,
             expires_at: row.expires_at.map(|at| at.0),
@@ -125,13 +122,13 @@ impl From<Row> for Token {
     }
 }
 
-/// `SELECT` of whole tokens; the argument is what follows `FROM tokens`.
+/// `SELECT` of whole tokens; the argument is the SQL after `FROM tokens`.
 macro_rules! select_tokens {
     ($tail:literal $(, $argument:expr)*) => {
         sqlx::query_as!(
             Row,
             r#"SELECT id AS "id: Text<TokenId>", kind = 'key' AS "is_key!: bool",
-                      team_id AS "team_id: Text<TeamId>", person_id AS "person_id: Text<PersonId>", name,
+                      team_id AS "team_id: Text<TeamId>", person_id AS "person_id: Text<UserId>", name,
                       created_at AS "created_at: Instant", expires_at AS "expires_at: Instant",
                       last_used_at AS "last_used_at: Instant", revoked_at AS "revoked_at: Instant"
                FROM tokens "# + $tail
@@ -140,7 +137,7 @@ macro_rules! select_tokens {
     };
 }
 
-/// All keys and sessions, the newest first.
+/// All API tokens and sessions, the newest first.
 pub(crate) async fn all(connection: &mut SqliteConnection) -> Result<Vec<Token>> {
     let rows = select_tokens!("ORDER BY created_at DESC, id DESC")
         .fetch_all(connection)
@@ -157,7 +154,7 @@ pub(crate) async fn find(connection: &mut SqliteConnection, id: TokenId) -> Resu
         .ok_or(StoreError::NotFound("token"))
 }
 
-/// Whatever it is worth.
+/// The token with this hash, valid or not.
 pub(crate) async fn by_hash(
     connection: &mut SqliteConnection,
     hash: [u8; 32],
@@ -169,7 +166,7 @@ pub(crate) async fn by_hash(
     Ok(row.map(Token::from))
 }
 
-/// What is kept of a token's text.
+/// The stored hash of a token.
 pub(crate) async fn hash_of(connection: &mut SqliteConnection, id: TokenId) -> Result<[u8; 32]> {
     let id = Text(id);
     sqlx::query_scalar!(
@@ -182,27 +179,27 @@ pub(crate) async fn hash_of(connection: &mut SqliteConnection, id: TokenId) -> R
     .ok_or(StoreError::NotFound("token"))
 }
 
-/// How many of an owner are worth something at `now`.
-pub(crate) async fn count_good(
+/// Number of an owner's valid tokens and sessions at `now`.
+pub(crate) async fn count_valid(
     connection: &mut SqliteConnection,
     owner: TokenOwner,
     now: Timestamp,
 ) -> Result<i64> {
-    let (kind, team, person, now) = (owner.kind(), owner.team(), owner.person(), Instant(now));
+    let (kind, team, user, now) = (owner.kind(), owner.team(), owner.user(), Instant(now));
     Ok(sqlx::query_scalar!(
         r#"SELECT COUNT(*) FROM tokens
            WHERE owner = ? AND team_id IS ? AND person_id IS ? AND revoked_at IS NULL
              AND (expires_at IS NULL OR expires_at > ?)"#,
         kind,
         team,
-        person,
+        user,
         now,
     )
     .fetch_one(connection)
     .await?)
 }
 
-/// [`StoreError::Conflict`] if there is one of this hash.
+/// Adds a token. [`StoreError::Conflict`] if its hash exists.
 pub(crate) async fn insert(
     connection: &mut SqliteConnection,
     token: &Token,
@@ -210,7 +207,7 @@ pub(crate) async fn insert(
 ) -> Result<()> {
     let (id, hash, kind) = (Text(token.id), Bytes32(hash), token.kind.name());
     let owner = token.owner;
-    let (owner_kind, team, person) = (owner.kind(), owner.team(), owner.person());
+    let (owner_kind, team, user) = (owner.kind(), owner.team(), owner.user());
     let (created_at, expires_at) = (Instant(token.created_at), token.expires_at.map(Instant));
     sqlx::query!(
         "INSERT INTO tokens (id, hash, kind, owner, team_id, person_id, name, created_at, expires_at)
@@ -220,18 +217,18 @@ pub(crate) async fn insert(
         kind,
         owner_kind,
         team,
-        person,
+        user,
         token.name,
         created_at,
         expires_at,
     )
     .execute(connection)
     .await
-    .map_err(taken)?;
+    .map_err(hash_taken)?;
     Ok(())
 }
 
-/// Gives a token another secret: the old one is worth nothing from then on.
+/// Replaces a token's secret; the old one becomes invalid.
 pub(crate) async fn set_hash(
     connection: &mut SqliteConnection,
     id: TokenId,
@@ -245,7 +242,7 @@ pub(crate) async fn set_hash(
     )
     .execute(connection)
     .await
-    .map_err(taken)?;
+    .map_err(hash_taken)?;
     Ok(())
 }
 
@@ -277,14 +274,14 @@ pub(crate) async fn revoke(
     Ok(())
 }
 
-/// All of an owner, but the one with this id.
+/// Revokes all tokens and sessions of an owner, except the one with the id `kept`.
 pub(crate) async fn revoke_others(
     connection: &mut SqliteConnection,
     owner: TokenOwner,
     kept: Option<TokenId>,
     at: Timestamp,
 ) -> Result<()> {
-    let (kind, team, person, at) = (owner.kind(), owner.team(), owner.person(), Instant(at));
+    let (kind, team, user, at) = (owner.kind(), owner.team(), owner.user(), Instant(at));
     let kept = kept.map(Text);
     sqlx::query!(
         "UPDATE tokens SET revoked_at = ?
@@ -292,7 +289,7 @@ pub(crate) async fn revoke_others(
         at,
         kind,
         team,
-        person,
+        user,
         kept,
     )
     .execute(connection)
@@ -300,8 +297,8 @@ pub(crate) async fn revoke_others(
     Ok(())
 }
 
-/// Forgets what is worth nothing any more and was used last before `before`; who had which is in the events.
-pub(crate) async fn forget(connection: &mut SqliteConnection, before: Timestamp) -> Result<()> {
+/// Deletes the sessions that expired or were revoked before an instant. The events still record them.
+pub(crate) async fn delete_old_sessions(connection: &mut SqliteConnection, before: Timestamp) -> Result<()> {
     let before = Instant(before);
     sqlx::query!(
         "DELETE FROM tokens WHERE kind = 'session' AND (expires_at < ?1 OR revoked_at < ?1)",
@@ -312,7 +309,7 @@ pub(crate) async fn forget(connection: &mut SqliteConnection, before: Timestamp)
     Ok(())
 }
 
-fn taken(error: sqlx::Error) -> StoreError {
+fn hash_taken(error: sqlx::Error) -> StoreError {
     if StoreError::is_duplicate(&error, "tokens.hash") {
         StoreError::Conflict("there is such a token: draw a new one".into())
     } else {

@@ -9,28 +9,27 @@ use faceoff_types::{
 use jiff::Timestamp;
 use sqlx::{SqliteConnection, types::Text};
 
-/// Rounds of games among teams: a stage whose days are rounds.
+/// A tournament: rounds of games among teams.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Tournament {
     /// Part of its URLs.
     pub id: TournamentId,
-    /// In its season, from 1; its seeds follow from it.
+    /// Number in its season, from 1; its seeds derive from it.
     pub number: u32,
-    /// No two that differ only in case.
+    /// Unique regardless of case.
     pub name: StageName,
-    /// When the organiser opened it.
     pub created_at: Timestamp,
-    /// The stage whose tiers its first entrants come from, if they do.
+    /// The stage whose tiers selected the first entrants, if any.
     pub stage: Option<StageId>,
-    /// What results depend on; fixed from the first round on.
+    /// Everything that results depend on; fixed from the first round on.
     pub rules: TournamentRules,
-    /// What they do not depend on.
+    /// Everything that results do not depend on.
     pub settings: TournamentSettings,
-    /// The organisers' agent, against which teams may test theirs.
+    /// The organisers' agent, the opponent in test games.
     pub baseline: Option<SubmissionId>,
-    /// No game of it begins, if so.
+    /// Set while the tournament is paused: no game starts.
     pub paused: Option<Ruling>,
-    /// From then on nothing of it changes.
+    /// Set once the tournament is closed: then it cannot be changed.
     pub closed_at: Option<Timestamp>,
 }
 
@@ -59,13 +58,13 @@ impl From<Row> for Tournament {
             rules: row.rules.0,
             settings: row.settings.0,
             baseline: row.baseline.map(|id| id.0),
-            paused: Ruling::of(row.paused_at, row.paused_for),
+            paused: Ruling::from_columns(row.paused_at, row.paused_for),
             closed_at: row.closed_at.map(|at| at.0),
         }
     }
 }
 
-/// `SELECT` of tournaments; the argument is what follows `FROM tournaments`.
+/// `SELECT` of tournaments; the argument is the SQL after `FROM tournaments`.
 macro_rules! select_tournaments {
     ($tail:literal $(, $argument:expr)*) => {
         sqlx::query_as!(
@@ -81,7 +80,7 @@ macro_rules! select_tournaments {
     };
 }
 
-/// All, the first one first.
+/// All tournaments, the oldest first.
 pub(crate) async fn all(connection: &mut SqliteConnection) -> Result<Vec<Tournament>> {
     let rows = select_tournaments!("ORDER BY number")
         .fetch_all(connection)
@@ -101,7 +100,7 @@ pub(crate) async fn find(
         .ok_or(StoreError::NotFound("tournament"))
 }
 
-/// One that may still change. [`StoreError::Conflict`] once it is closed.
+/// A tournament that can be changed. [`StoreError::Conflict`] if it is closed.
 pub(crate) async fn find_open(
     connection: &mut SqliteConnection,
     id: TournamentId,
@@ -110,13 +109,13 @@ pub(crate) async fn find_open(
     match tournament.closed_at {
         None => Ok(tournament),
         Some(at) => Err(StoreError::Conflict(format!(
-            "the tournament was closed on {}: nothing of it changes any more",
+            "the tournament was closed on {}: it cannot be changed any more",
             at.strftime("%Y-%m-%d at %H:%M UTC")
         ))),
     }
 }
 
-/// The number of the next one of the season, from 1.
+/// The number of the season's next tournament, from 1.
 pub(crate) async fn next_number(connection: &mut SqliteConnection) -> Result<u32> {
     Ok(sqlx::query_scalar!(
         r#"SELECT COALESCE(MAX(number), 0) + 1 AS "number!: u32" FROM tournaments"#
@@ -125,7 +124,7 @@ pub(crate) async fn next_number(connection: &mut SqliteConnection) -> Result<u32
     .await?)
 }
 
-/// [`StoreError::TournamentNameTaken`] if another has its name.
+/// Adds a tournament. [`StoreError::TournamentNameTaken`] if another has its name.
 pub(crate) async fn insert(
     connection: &mut SqliteConnection,
     tournament: &Tournament,
@@ -149,7 +148,7 @@ pub(crate) async fn insert(
     Ok(())
 }
 
-/// Stores what can change of it. [`StoreError::TournamentNameTaken`] if another has its name.
+/// Stores all changeable fields of a tournament. [`StoreError::TournamentNameTaken`] if another has its name.
 pub(crate) async fn update(
     connection: &mut SqliteConnection,
     tournament: &Tournament,

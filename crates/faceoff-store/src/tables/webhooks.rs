@@ -1,4 +1,4 @@
-//! Addresses that are told of what happens.
+//! Webhooks: addresses to which events are sent.
 
 use crate::{
     column::{Bytes32, Instant, Json},
@@ -8,48 +8,47 @@ use faceoff_types::{TeamId, WebhookId};
 use jiff::Timestamp;
 use sqlx::{SqliteConnection, types::Text};
 
-/// An address that is told of what happens.
+/// An address to which events are sent.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Webhook {
     pub id: WebhookId,
-    /// Whose; none: the organisers'.
+    /// The owner; `None`: the organisers.
     pub team: Option<TeamId>,
-    /// What its owner calls it.
+    /// A label, chosen by its owner.
     pub name: String,
     pub url: String,
-    /// What it is told of; empty: everything that its owner may know.
-    pub about: Vec<String>,
-    /// When it was made.
+    /// Topics of the events that are sent; empty: all events that its owner may see.
+    pub topics: Vec<String>,
     pub created_at: Timestamp,
-    /// All events until this one have become deliveries.
+    /// Deliveries exist for all events up to this id.
     pub seen: i64,
-    /// Since when nothing was taken; none: the last delivery was, or none was sent.
+    /// Time of the first failed delivery since the last success; `None` if the last one succeeded or none was sent.
     pub failing_since: Option<Timestamp>,
-    /// Since when nothing is sent any more, and why.
-    pub dead: Option<DeadWebhook>,
-    /// Until when the secret before this one signs, too.
+    /// Set while the webhook is disabled after failures.
+    pub disabled: Option<DisabledWebhook>,
+    /// Until when the previous secret also signs.
     pub old_secret_until: Option<Timestamp>,
 }
 
-/// Why a webhook is told nothing any more.
+/// Time and reason of the disabling of a webhook.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct DeadWebhook {
+pub struct DisabledWebhook {
     pub at: Timestamp,
     pub reason: String,
 }
 
-/// The keys of a webhook's signatures. They are stored as they are, since they sign.
+/// The secrets that sign a webhook's deliveries. They are stored in clear text, because signing needs them.
 #[derive(Clone, PartialEq, Eq)]
-pub struct WebhookKeys {
-    /// The one that was shown last.
+pub struct WebhookSecrets {
+    /// The current secret.
     pub secret: [u8; 32],
-    /// The one before it, for as long as it signs.
+    /// The previous secret, while it still signs.
     pub old_secret: Option<[u8; 32]>,
 }
 
-impl std::fmt::Debug for WebhookKeys {
+impl std::fmt::Debug for WebhookSecrets {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str("WebhookKeys(..)")
+        f.write_str("WebhookSecrets(..)")
     }
 }
 
@@ -75,17 +74,17 @@ impl From<Row> for Webhook {
             team: row.team_id.map(|team| team.0),
             name: row.name,
             url: row.url,
-            about: row.about.0,
+            topics: row.about.0,
             created_at: row.created_at.0,
             seen: row.seen,
             failing_since: row.failing_since.map(|at| at.0),
-            dead: dead.map(|(at, reason)| DeadWebhook { at: at.0, reason }),
+            disabled: dead.map(|(at, reason)| DisabledWebhook { at: at.0, reason }),
             old_secret_until: row.old_secret_until.map(|at| at.0),
         }
     }
 }
 
-/// `SELECT` of whole webhooks; the argument is what follows `FROM webhooks`.
+/// `SELECT` of whole webhooks; the argument is the SQL after `FROM webhooks`.
 macro_rules! select_webhooks {
     ($tail:literal $(, $argument:expr)*) => {
         sqlx::query_as!(
@@ -100,7 +99,7 @@ macro_rules! select_webhooks {
     };
 }
 
-/// All, the oldest first.
+/// All webhooks, the oldest first.
 pub(crate) async fn all(connection: &mut SqliteConnection) -> Result<Vec<Webhook>> {
     let rows = select_webhooks!("ORDER BY created_at, id")
         .fetch_all(connection)
@@ -117,8 +116,9 @@ pub(crate) async fn find(connection: &mut SqliteConnection, id: WebhookId) -> Re
         .ok_or(StoreError::NotFound("webhook"))
 }
 
-/// Those that are alive and have not seen the event with this id, with as many deliveries waiting as these at most.
-pub(crate) async fn behind(
+/// The enabled webhooks for which events up to `newest` have no deliveries yet, with at most `waiting` waiting
+/// deliveries.
+pub(crate) async fn with_new_events(
     connection: &mut SqliteConnection,
     newest: i64,
     waiting: u32,
@@ -135,7 +135,7 @@ pub(crate) async fn behind(
     Ok(rows.into_iter().map(Webhook::from).collect())
 }
 
-/// How many an owner has.
+/// Number of an owner's webhooks.
 pub(crate) async fn count(connection: &mut SqliteConnection, team: Option<TeamId>) -> Result<i64> {
     let team = team.map(Text);
     Ok(
@@ -151,7 +151,7 @@ pub(crate) async fn insert(
     secret: [u8; 32],
 ) -> Result<()> {
     let (id, team, secret) = (Text(webhook.id), webhook.team.map(Text), Bytes32(secret));
-    let (about, created_at) = (Json(&webhook.about), Instant(webhook.created_at));
+    let (about, created_at) = (Json(&webhook.topics), Instant(webhook.created_at));
     sqlx::query!(
         "INSERT INTO webhooks (id, team_id, name, url, about, secret, created_at, seen) VALUES (?, ?, ?, ?, ?, ?, ?, ?)",
         id,
@@ -168,11 +168,11 @@ pub(crate) async fn insert(
     Ok(())
 }
 
-/// Writes what its owner may change, and how it stands.
+/// Stores the fields that the owner can change, and the state.
 pub(crate) async fn update(connection: &mut SqliteConnection, webhook: &Webhook) -> Result<()> {
-    let (id, about) = (Text(webhook.id), Json(&webhook.about));
+    let (id, about) = (Text(webhook.id), Json(&webhook.topics));
     let failing_since = webhook.failing_since.map(Instant);
-    let (dead_at, dead_for) = match &webhook.dead {
+    let (dead_at, dead_for) = match &webhook.disabled {
         Some(dead) => (Some(Instant(dead.at)), Some(dead.reason.clone())),
         None => (None, None),
     };
@@ -192,7 +192,7 @@ pub(crate) async fn update(connection: &mut SqliteConnection, webhook: &Webhook)
     Ok(())
 }
 
-/// All events until this one have become deliveries of it.
+/// Notes that deliveries exist for all events up to `seen`.
 pub(crate) async fn set_seen(
     connection: &mut SqliteConnection,
     id: WebhookId,
@@ -205,7 +205,7 @@ pub(crate) async fn set_seen(
     Ok(())
 }
 
-/// Gives it another secret; the one that it has signs until then, too.
+/// Replaces a webhook's secret; the previous one also signs until `old_until`.
 pub(crate) async fn set_secret(
     connection: &mut SqliteConnection,
     id: WebhookId,
@@ -224,12 +224,12 @@ pub(crate) async fn set_secret(
     Ok(())
 }
 
-/// With what is signed at `now`.
-pub(crate) async fn keys(
+/// The secrets that sign at `now`.
+pub(crate) async fn secrets(
     connection: &mut SqliteConnection,
     id: WebhookId,
     now: Timestamp,
-) -> Result<WebhookKeys> {
+) -> Result<WebhookSecrets> {
     let id = Text(id);
     let row = sqlx::query!(
         r#"SELECT secret AS "secret: Bytes32", old_secret AS "old_secret: Bytes32",
@@ -240,10 +240,10 @@ pub(crate) async fn keys(
     .fetch_optional(connection)
     .await?
     .ok_or(StoreError::NotFound("webhook"))?;
-    let signs = row.until.is_some_and(|until| now < until.0);
-    Ok(WebhookKeys {
+    let old_signs = row.until.is_some_and(|until| now < until.0);
+    Ok(WebhookSecrets {
         secret: row.secret.0,
-        old_secret: row.old_secret.filter(|_| signs).map(|secret| secret.0),
+        old_secret: row.old_secret.filter(|_| old_signs).map(|secret| secret.0),
     })
 }
 

@@ -1,16 +1,16 @@
-//! Workers on other machines of which nothing is taken.
+//! Banned remote workers, whose results are rejected.
 
 use crate::{column::Instant, error::Result};
 use jiff::Timestamp;
 use sqlx::SqliteConnection;
 
-/// A worker of which nothing is taken.
+/// A ban of a remote worker.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct WorkerBan {
-    /// What it is called.
+    /// Name of the worker.
     pub worker: String,
     pub at: Timestamp,
-    /// Why, as organisers read it.
+    /// Shown to organisers.
     pub reason: String,
 }
 
@@ -30,7 +30,7 @@ impl From<BanRow> for WorkerBan {
     }
 }
 
-/// False if it is banned already.
+/// Adds a ban; false if the worker is banned already.
 pub(crate) async fn insert(connection: &mut SqliteConnection, ban: &WorkerBan) -> Result<bool> {
     let at = Instant(ban.at);
     let inserted = sqlx::query!(
@@ -44,7 +44,7 @@ pub(crate) async fn insert(connection: &mut SqliteConnection, ban: &WorkerBan) -
     Ok(inserted.rows_affected() == 1)
 }
 
-/// False if it is not banned.
+/// Removes a ban; false if the worker is not banned.
 pub(crate) async fn delete(connection: &mut SqliteConnection, worker: &str) -> Result<bool> {
     let deleted = sqlx::query!("DELETE FROM worker_bans WHERE worker = ?", worker)
         .execute(connection)

@@ -1,19 +1,19 @@
-//! Ablations: ordered, played behind everything else, and never in the way of what counts.
+//! Ablations: they run behind everything that counts.
 
-use crate::fixture::{Fixture, commit, plan};
+use crate::fixture::{TestStore, commit, plan};
 use faceoff_store::*;
 use faceoff_types::*;
 
 /// Per profile: three tasks of four episodes in shards of two.
 const SHARDS: u32 = 6;
 
-impl Fixture {
-    async fn claim_ablation_shard(&self) -> (Claim, Run, Shard) {
+impl TestStore {
+    async fn claim_ablation_shard(&self) -> (JobClaim, Run, Shard) {
         match self.claim().await {
-            Some(Claimed {
+            Some(ClaimedJob {
                 claim,
-                work:
-                    Work::Shard {
+                job:
+                    Job::Shard {
                         owner: RunOwner::Ablation(_),
                         run,
                         shard,
@@ -32,13 +32,13 @@ impl Fixture {
         }
     }
 
-    async fn order(&self, submission: SubmissionId) -> Ablation {
+    async fn request(&self, submission: SubmissionId) -> Ablation {
         let plan = RunPlan {
             max_faults: 1,
             ..plan()
         };
         self.store
-            .create_ablation(Actor::Organiser, submission, &plan, self.now)
+            .request_ablation(Actor::Organiser, submission, &plan, self.now)
             .await
             .unwrap()
     }
@@ -48,7 +48,7 @@ impl Fixture {
         newest.expect("an ablation")
     }
 
-    async fn commit_ablation(&self, claim: &Claim, commit: ShardCommit) -> Committed {
+    async fn commit_ablation(&self, claim: &JobClaim, commit: ShardCommit) -> CommitOutcome {
         self.store
             .commit_shard(claim, commit, self.now)
             .await
@@ -64,26 +64,26 @@ fn unrecorded(shard: &Shard, faults: u32) -> ShardCommit {
 }
 
 #[tokio::test]
-async fn every_profile_and_task_is_played_once_and_then_it_is_finished() {
-    let f = Fixture::new().await;
+async fn ablation_runs_each_profile_and_task_once() {
+    let f = TestStore::new().await;
     let submission = f.ready_team("Alpha").await;
     assert_eq!(f.store.newest_ablation(submission.id).await.unwrap(), None);
-    let ordered = f.order(submission.id).await;
+    let ablation = f.request(submission.id).await;
     let open = |episodes_done| AblationState::Open {
         episodes_done,
         episodes_total: 6 * 3 * 4,
     };
-    assert_eq!(ordered.state, open(0));
-    assert_eq!(ordered.episodes_per_task, 4);
+    assert_eq!(ablation.state, open(0));
+    assert_eq!(ablation.episodes_per_task, 4);
     let mut played = Vec::new();
     for done in 0..6 * SHARDS {
         assert_eq!(f.newest(submission.id).await.state, open(done * 2));
         let (claim, run, shard) = f.claim_ablation_shard().await;
-        for expected in [Committed::Now, Committed::Before] {
+        for expected in [CommitOutcome::Stored, CommitOutcome::AlreadyStored] {
             let committed = f.commit_ablation(&claim, unrecorded(&shard, 0)).await;
             assert_eq!(committed, expected);
         }
-        assert_eq!(ordered.runs[&run.plan.profile], run.id);
+        assert_eq!(ablation.runs[&run.plan.profile], run.id);
         played.push((run.plan.profile, shard.task, shard.first_episode));
     }
     let expected: Vec<_> = Profile::ABLATION
@@ -108,15 +108,15 @@ async fn every_profile_and_task_is_played_once_and_then_it_is_finished() {
 }
 
 #[tokio::test]
-async fn it_waits_behind_what_counts_takes_no_turn_and_reaches_no_board() {
-    let f = Fixture::new().await;
+async fn ablation_runs_last_and_reaches_no_board() {
+    let f = TestStore::new().await;
     let submission = f.ready_team("Alpha").await;
-    f.order(submission.id).await;
+    f.request(submission.id).await;
     let evaluation = f.evaluate(submission.id, &plan()).await;
     for _ in 0..6 {
         let (claim, run, shard) = f.claim_shard().await;
         assert_eq!(run.id, evaluation.run);
-        f.play(&claim, &shard, 0).await;
+        f.commit_shard(&claim, &shard, 0).await;
     }
     f.claim_scoring().await;
     let (claim, _, shard) = f.claim_ablation_shard().await;
@@ -127,61 +127,61 @@ async fn it_waits_behind_what_counts_takes_no_turn_and_reaches_no_board() {
 }
 
 #[tokio::test]
-async fn one_is_ordered_at_a_time_and_of_valid_submissions_only() {
-    let f = Fixture::new().await;
+async fn ablation_request_needs_valid_idle_submission() {
+    let f = TestStore::new().await;
     let team = f.team("Alpha").await;
     let submission = f.upload(&team).await;
     let plan = plan();
-    let order = |id| f.store.create_ablation(Actor::Organiser, id, &plan, f.now);
+    let request = |id| f.store.request_ablation(Actor::Organiser, id, &plan, f.now);
     assert!(matches!(
-        order(submission.id).await,
+        request(submission.id).await,
         Err(StoreError::Conflict(_))
     ));
     f.validate().await;
-    order(submission.id).await.unwrap();
+    request(submission.id).await.unwrap();
     assert!(matches!(
-        order(submission.id).await,
+        request(submission.id).await,
         Err(StoreError::Conflict(_))
     ));
 }
 
 #[tokio::test]
-async fn faults_of_the_agent_and_of_ours_end_it_with_a_reason() {
-    let mut f = Fixture::new().await;
+async fn ablation_failure_records_agent_or_platform_fault() {
+    let mut f = TestStore::new().await;
     let submission = f.ready_team("Alpha").await;
-    f.order(submission.id).await;
+    f.request(submission.id).await;
     let (claim, _, shard) = f.claim_ablation_shard().await;
     f.commit_ablation(&claim, unrecorded(&shard, 2)).await;
     assert!(f.claim().await.is_none(), "its other shards are dropped");
     let AblationState::Failed { reason, .. } = f.newest(submission.id).await.state else {
-        panic!("it failed")
+        panic!("expected a failed ablation")
     };
     assert!(reason.contains("more than 1 times with ideal"), "{reason}");
 
-    // A later one may be ordered; a fault of ours is tried again, then given up.
+    // Another one can be requested; after a platform fault the shard is retried, then given up.
     f.later(1);
-    f.order(submission.id).await;
+    f.request(submission.id).await;
     for _ in 0..MAX_ATTEMPTS {
         let (claim, ..) = f.claim_ablation_shard().await;
         f.store
             .release_failed(&claim, "the disk is full", f.now)
             .await
             .unwrap();
-        // Until its rest is over; then it is the first in the queue again.
+        // Until its pause is over; then it is the first in the queue again.
         f.later(120);
     }
     let AblationState::Failed { reason, .. } = f.newest(submission.id).await.state else {
-        panic!("it was given up")
+        panic!("expected a failed ablation")
     };
     assert_eq!(reason, "the disk is full");
     assert!(f.claim().await.is_none());
 }
 
 #[tokio::test]
-async fn a_commit_that_does_not_cover_its_shard_or_brings_a_recording_is_refused() {
-    let f = Fixture::new().await;
+async fn ablation_commit_with_gap_or_recording_is_refused() {
+    let f = TestStore::new().await;
     let submission = f.ready_team("Alpha").await;
-    f.order(submission.id).await;
+    f.request(submission.id).await;
     let (claim, _, shard) = f.claim_ablation_shard().await;
     let mut short = unrecorded(&shard, 0);
     short.outcomes.pop();

@@ -1,4 +1,4 @@
-//! The database on its way into an archive and out of it.
+//! Export of the database to an archive, and its import.
 
 use crate::fixture::*;
 use faceoff_store::*;
@@ -6,8 +6,8 @@ use faceoff_types::*;
 use sqlx::{AssertSqlSafe, Connection, SqliteConnection};
 use std::{collections::BTreeMap, path::Path};
 
-/// What the public archive's tables are made of. Whoever adds a column decides in `scrub.rs` whether everybody may
-/// read it, and then names it here; a table that is not on the list is emptied there.
+/// Columns of the tables in the public archive. A new column must be reviewed in `scrub.rs` (is it public?) and then
+/// listed here. A table that is not listed is emptied there.
 const PUBLIC_COLUMNS: &[(&str, &str)] = &[
     ("ablation_runs", "ablation_id run_id"),
     (
@@ -113,11 +113,11 @@ async fn count(file: &Path, table: &str) -> i64 {
     found.fetch_one(&mut open(file).await).await.unwrap()
 }
 
-/// The database of an archive as it lies in a folder of its own.
-async fn archived(f: &Fixture, edition: Edition) -> tempfile::TempDir {
-    for run in f.store.unsummed_runs(1).await.unwrap() {
-        let kept = f.store.keep_episode_summary(run, 1, "{}", f.now);
-        kept.await.unwrap();
+/// A folder with the database of an archive of this edition.
+async fn export(f: &TestStore, edition: Edition) -> tempfile::TempDir {
+    for run in f.store.unsummarised_runs(1).await.unwrap() {
+        let stored = f.store.store_episode_summary(run, 1, "{}", f.now);
+        stored.await.unwrap();
     }
     let folder = tempfile::tempdir().unwrap();
     let snapshot = f
@@ -128,7 +128,7 @@ async fn archived(f: &Fixture, edition: Edition) -> tempfile::TempDir {
     let file = folder.path().join("faceoff.sqlite3");
     snapshot.finish(&file).await.unwrap();
     let left = std::fs::read_dir(folder.path()).unwrap().count();
-    assert_eq!(left, 1, "the copy is gone");
+    assert_eq!(left, 1, "the intermediate copy is deleted");
     folder
 }
 
@@ -136,15 +136,15 @@ fn database(folder: &tempfile::TempDir) -> std::path::PathBuf {
     folder.path().join("faceoff.sqlite3")
 }
 
-/// A day that is over, a person, a proposal and work that waits.
-async fn season() -> (Fixture, EvaluationId) {
-    let mut f = Fixture::new().await;
+/// A season with a finished day, a user, a webhook and queued jobs.
+async fn season() -> (TestStore, EvaluationId) {
+    let mut f = TestStore::new().await;
     let alpha = f.ready_team("Alpha").await;
     let played = f.evaluate(alpha.id, &small()).await.id;
-    f.play_to(1.0).await;
+    f.run_all(1.0).await;
     let invitation = NewInvitation {
         code_hash: [7; 32],
-        invited_as: InvitedAs::Member(alpha.team),
+        role: InvitationRole::Member(alpha.team),
         note: "Ada".into(),
         expires_at: f.now + jiff::SignedDuration::from_hours(1),
     };
@@ -152,18 +152,18 @@ async fn season() -> (Fixture, EvaluationId) {
         .invite(Actor::Organiser, invitation, f.now)
         .await
         .unwrap();
-    f.store.join(joining([7; 32], "Ada"), f.now).await.unwrap();
+    f.store.join(join_request([7; 32], "Ada"), f.now).await.unwrap();
     let webhook = NewWebhook {
         team: Some(alpha.team),
-        name: "ours".into(),
+        name: "hook".into(),
         url: "https://example.org/".into(),
         about: Vec::new(),
         secret: [9; 32],
     };
     let webhook = f.store.create_webhook(Actor::Organiser, webhook, f.now);
     let webhook = webhook.await.unwrap().id;
-    let told = f.store.test_webhook(webhook, "test", "{}", f.now);
-    told.await.unwrap();
+    let delivery = f.store.test_webhook(webhook, "test", "{}", f.now);
+    delivery.await.unwrap();
     f.later(24 * 3600);
     f.ready_team("Beta").await;
     f.evaluate(alpha.id, &small()).await;
@@ -171,9 +171,9 @@ async fn season() -> (Fixture, EvaluationId) {
 }
 
 #[tokio::test]
-async fn every_column_that_everybody_gets_was_decided_on() {
+async fn public_archive_has_only_listed_columns() {
     let (f, _) = season().await;
-    let folder = archived(&f, Edition::Public).await;
+    let folder = export(&f, Edition::Public).await;
     let mut connection = open(&database(&folder)).await;
     let tables: Vec<String> = sqlx::query_scalar(
         "SELECT name FROM sqlite_master WHERE type = 'table' AND name NOT LIKE 'sqlite%' ORDER BY name",
@@ -200,14 +200,14 @@ async fn every_column_that_everybody_gets_was_decided_on() {
 }
 
 #[tokio::test]
-async fn what_is_open_is_no_result_and_no_key_goes_along() {
+async fn archive_omits_open_evaluations_and_credentials() {
     let (f, played) = season().await;
     assert_eq!(
         count(&f.folder.path().join("faceoff.sqlite3"), "evaluations").await,
         3
     );
     for edition in [Edition::Organiser, Edition::Public] {
-        let folder = archived(&f, edition).await;
+        let folder = export(&f, edition).await;
         let file = database(&folder);
         for (table, rows) in [
             ("evaluations", 1),
@@ -234,35 +234,35 @@ async fn what_is_open_is_no_result_and_no_key_goes_along() {
         connection.close().await.unwrap();
 
         Store::import(folder.path(), f.now).await.unwrap();
-        let shown = Store::open(folder.path()).await.unwrap();
+        let imported = Store::open(folder.path()).await.unwrap();
         let (was, is) = (
             f.store.season().await.unwrap(),
-            shown.season().await.unwrap(),
+            imported.season().await.unwrap(),
         );
-        assert_eq!(is.commitment, was.commitment, "the promise stays");
-        let (stages, days) = (shown.stages().await.unwrap(), shown.days().await.unwrap());
-        let days: Vec<StageDay> = days.into_iter().map(|(day, _)| day.of).collect();
-        let seeds = shown
+        assert_eq!(is.commitment, was.commitment, "the commitment stays");
+        let (stages, days) = (imported.stages().await.unwrap(), imported.days().await.unwrap());
+        let days: Vec<StageDay> = days.into_iter().map(|(day, _)| day.stage_day).collect();
+        let seeds = imported
             .day_seeds(&is, &stages, days.iter().copied())
             .await
             .unwrap();
         let first = days[1];
         let expected =
             BTreeMap::from([(first, stages[0].seed_label(first.date).seed(&was.secret))]);
-        assert_eq!(seeds, expected, "of the released day, and of no other");
+        assert_eq!(seeds, expected, "seeds of released days only");
         assert_eq!(
-            shown.evaluation(played).await.unwrap(),
+            imported.evaluation(played).await.unwrap(),
             f.store.evaluation(played).await.unwrap()
         );
     }
 }
 
 #[tokio::test]
-async fn everybody_gets_results_and_no_episodes() {
-    let f = Fixture::new().await;
+async fn public_archive_has_results_without_episodes() {
+    let f = TestStore::new().await;
     let alpha = f.ready_team("Alpha").await;
     let evaluation = f.evaluate(alpha.id, &small()).await;
-    f.play_to(1.0).await;
+    f.run_all(1.0).await;
     let public = f
         .store
         .snapshot(f.folder.path(), Edition::Public, "a test", f.now);
@@ -272,29 +272,29 @@ async fn everybody_gets_results_and_no_episodes() {
         "{error}"
     );
 
-    let folder = archived(&f, Edition::Public).await;
+    let folder = export(&f, Edition::Public).await;
     for table in ["shards", "units"] {
         assert_eq!(count(&database(&folder), table).await, 0, "{table}");
     }
     Store::import(folder.path(), f.now).await.unwrap();
-    let shown = Store::open(folder.path()).await.unwrap();
-    let summaries = shown.episode_summaries(&[evaluation.run], 1).await.unwrap();
+    let imported = Store::open(folder.path()).await.unwrap();
+    let summaries = imported.episode_summaries(&[evaluation.run], 1).await.unwrap();
     assert_eq!(summaries.len(), 1);
-    let outcomes = shown.outcomes(evaluation.run).await;
+    let outcomes = imported.outcomes(evaluation.run).await;
     assert!(
-        matches!(outcomes, Err(StoreError::Cleared { at }) if at == f.now),
+        matches!(outcomes, Err(StoreError::OutcomesRemoved { at }) if at == f.now),
         "{outcomes:?}"
     );
-    let submission = shown.submission(alpha.id).await.unwrap();
-    assert_eq!(submission.runtime, None, "no board tells it");
+    let submission = imported.submission(alpha.id).await.unwrap();
+    assert_eq!(submission.runtime, None, "the runtime is private");
 }
 
 #[tokio::test]
-async fn a_ruling_that_was_lifted_is_told_to_nobody_and_a_public_answer_to_everybody() {
-    let f = Fixture::new().await;
+async fn public_archive_omits_lifted_rulings_and_private_answers() {
+    let f = TestStore::new().await;
     let (alpha, beta) = (f.ready_team("Alpha").await, f.ready_team("Beta").await);
     f.evaluate(alpha.id, &small()).await;
-    f.play_to(1.0).await;
+    f.run_all(1.0).await;
     for (team, why) in [(alpha.team, "it spied"), (beta.team, "it slept")] {
         let ruling = f.store.disqualify_team(Actor::Organiser, team, why, f.now);
         ruling.await.unwrap();
@@ -314,26 +314,26 @@ async fn a_ruling_that_was_lifted_is_told_to_nobody_and_a_public_answer_to_every
             .answer(Actor::Organiser, asked.id, "so", public, f.now);
         answered.await.unwrap();
     }
-    let folder = archived(&f, Edition::Public).await;
+    let folder = export(&f, Edition::Public).await;
     Store::import(folder.path(), f.now).await.unwrap();
-    let shown = Store::open(folder.path()).await.unwrap();
+    let imported = Store::open(folder.path()).await.unwrap();
     let mut connection = open(&database(&folder)).await;
-    let told: Vec<(String, String)> = sqlx::query_as(
+    let rulings: Vec<(String, String)> = sqlx::query_as(
         "SELECT subject_id, payload FROM events WHERE kind LIKE 'team_%' AND kind <> 'team_created'",
     )
     .fetch_all(&mut connection)
     .await
     .unwrap();
-    assert_eq!(told.len(), 1, "{told:?}");
-    assert_eq!(told[0].0, beta.team.to_string());
-    assert!(told[0].1.contains("it slept"));
-    let questions = shown.questions().await.unwrap();
+    assert_eq!(rulings.len(), 1, "{rulings:?}");
+    assert_eq!(rulings[0].0, beta.team.to_string());
+    assert!(rulings[0].1.contains("it slept"));
+    let questions = imported.questions().await.unwrap();
     assert_eq!(questions.len(), 1);
     assert_eq!((&*questions[0].text, questions[0].team), ("how?", None));
 }
 
 #[tokio::test]
-async fn a_running_server_goes_on_and_the_archive_does_not() {
+async fn snapshot_is_unaffected_by_later_changes() {
     let (f, played) = season().await;
     let folder = tempfile::tempdir().unwrap();
     let snapshot = f
@@ -354,49 +354,49 @@ async fn a_running_server_goes_on_and_the_archive_does_not() {
         .name_season(Actor::Server, "x", f.now)
         .await;
     assert!(matches!(name, Err(StoreError::Archived { .. })), "{name:?}");
-    let kept = snapshot.kept_artifacts().await.unwrap();
-    assert_eq!(kept.len(), 2, "two bundles: {kept:?}");
+    let artifacts = snapshot.artifacts_to_archive().await.unwrap();
+    assert_eq!(artifacts.len(), 2, "two bundles: {artifacts:?}");
 }
 
 #[tokio::test]
-async fn of_a_public_archive_nothing_becomes_the_organisers() {
+async fn public_archive_cannot_become_organiser_edition() {
     let (f, _) = season().await;
-    let folder = archived(&f, Edition::Public).await;
+    let folder = export(&f, Edition::Public).await;
     Store::import(folder.path(), f.now).await.unwrap();
-    let shown = Store::open(folder.path()).await.unwrap();
+    let imported = Store::open(folder.path()).await.unwrap();
     let other = tempfile::tempdir().unwrap();
-    let asked = shown.snapshot(other.path(), Edition::Organiser, "a test", f.now);
+    let asked = imported.snapshot(other.path(), Edition::Organiser, "a test", f.now);
     let error = asked.await.unwrap_err();
     assert!(error.to_string().contains("public archive"), "{error}");
     assert!(
-        shown
+        imported
             .snapshot(other.path(), Edition::Public, "a test", f.now)
             .await
             .is_ok()
     );
-    assert!(shown.people().await.unwrap().is_empty());
+    assert!(imported.users().await.unwrap().is_empty());
 }
 
 #[tokio::test]
-async fn whether_a_folder_holds_an_archive_is_asked_without_changing_it() {
+async fn archive_detection_leaves_folder_unchanged() {
     let empty = tempfile::tempdir().unwrap();
     assert_eq!(Store::archived_in(empty.path()).await.unwrap(), None);
     assert_eq!(std::fs::read_dir(empty.path()).unwrap().count(), 0);
     let (f, _) = season().await;
     assert_eq!(Store::archived_in(f.folder.path()).await.unwrap(), None);
-    let folder = archived(&f, Edition::Public).await;
+    let folder = export(&f, Edition::Public).await;
     let found = Store::archived_in(folder.path()).await.unwrap().unwrap();
     assert_eq!(
         (found.edition, found.made_at, found.imported_at),
         (Edition::Public, f.now, None)
     );
-    // From before there were archives.
+    // A database of a version without archives.
     exec(&database(&folder), "DROP TABLE archived").await;
     assert_eq!(Store::archived_in(folder.path()).await.unwrap(), None);
 }
 
 #[tokio::test]
-async fn a_database_that_a_stranger_made_is_refused() {
+async fn import_refuses_manipulated_database() {
     let (f, _) = season().await;
     let planted = "CREATE TRIGGER help AFTER UPDATE ON archived BEGIN
         INSERT INTO tokens (id, hash, kind, owner, name, created_at)
@@ -407,8 +407,8 @@ async fn a_database_that_a_stranger_made_is_refused() {
         ("CREATE TABLE more (a)", "its table \"more\""),
         ("DROP TRIGGER a_closed_season_stays_closed", "its trigger \"a_closed_season_stays_closed\""),
         ("DROP TABLE archived", "not that of an archived season"),
-        ("DELETE FROM archived", "does not say what it is an archive of"),
-        ("PRAGMA foreign_keys = OFF; DELETE FROM teams", "refer to what is not there"),
+        ("DELETE FROM archived", "its description of the archive is missing"),
+        ("PRAGMA foreign_keys = OFF; DELETE FROM teams", "refer to missing rows"),
         (
             "INSERT INTO _sqlx_migrations SELECT 9999, 'later', installed_on, success, checksum, execution_time
              FROM _sqlx_migrations LIMIT 1",
@@ -416,7 +416,7 @@ async fn a_database_that_a_stranger_made_is_refused() {
         ),
         ("UPDATE _sqlx_migrations SET checksum = zeroblob(48) WHERE version = 1", "migration 1"),
     ] {
-        let folder = archived(&f, Edition::Organiser).await;
+        let folder = export(&f, Edition::Organiser).await;
         exec(&database(&folder), sql).await;
         let error = Store::import(folder.path(), f.now).await.unwrap_err();
         let StoreError::Conflict(why) = error else {
@@ -430,8 +430,8 @@ async fn a_database_that_a_stranger_made_is_refused() {
         let error = Store::import(folder.path(), f.now).await.unwrap_err();
         assert!(error.to_string().contains("database is refused"), "{error}");
     }
-    // Pages that are none.
-    let folder = archived(&f, Edition::Organiser).await;
+    // A file with overwritten pages.
+    let folder = export(&f, Edition::Organiser).await;
     let mut bytes = std::fs::read(database(&folder)).unwrap();
     let length = bytes.len();
     bytes[4096..length.min(40_960)].fill(0xff);
@@ -441,17 +441,17 @@ async fn a_database_that_a_stranger_made_is_refused() {
 }
 
 #[tokio::test]
-async fn keys_that_somebody_has_put_into_an_archive_open_nothing() {
+async fn import_removes_planted_credentials() {
     let (f, _) = season().await;
-    let folder = archived(&f, Edition::Organiser).await;
+    let folder = export(&f, Edition::Organiser).await;
     let key = "INSERT INTO tokens (id, hash, kind, owner, name, created_at)
                VALUES ('00000000-0000-7000-8000-000000000000', zeroblob(32), 'key', 'host', 'mine', 0);
                UPDATE people SET password = '$argon2id$v=19$m=19456,t=2,p=1$AAAA$AAAA'";
     exec(&database(&folder), key).await;
     Store::import(folder.path(), f.now).await.unwrap();
-    let shown = Store::open(folder.path()).await.unwrap();
-    assert!(shown.tokens().await.unwrap().is_empty());
-    let holder = shown.holder([0; 32], TokenKind::Key, f.now).await.unwrap();
+    let imported = Store::open(folder.path()).await.unwrap();
+    assert!(imported.tokens().await.unwrap().is_empty());
+    let holder = imported.verify_token([0; 32], TokenKind::ApiToken, f.now).await.unwrap();
     assert!(holder.is_err(), "{holder:?}");
     let passwords = "SELECT COUNT(*) FROM people WHERE password IS NOT NULL";
     let left: i64 = sqlx::query_scalar(passwords)
@@ -459,15 +459,15 @@ async fn keys_that_somebody_has_put_into_an_archive_open_nothing() {
         .await
         .unwrap();
     assert_eq!(left, 0);
-    // The new server's own key does.
-    assert!(shown.set_host_token([9; 32], f.now).await.unwrap());
-    let holder = shown.holder([9; 32], TokenKind::Key, f.now).await.unwrap();
-    assert!(matches!(holder.unwrap().who, Who::Host));
+    // The new server's own token works.
+    assert!(imported.set_host_token([9; 32], f.now).await.unwrap());
+    let holder = imported.verify_token([9; 32], TokenKind::ApiToken, f.now).await.unwrap();
+    assert!(matches!(holder.unwrap().principal, Principal::Host));
 }
 
 #[tokio::test]
-async fn of_a_tournament_everybody_gets_what_counts() {
-    let f = Fixture::new().await;
+async fn public_archive_has_counting_games_only() {
+    let f = TestStore::new().await;
     let teams = [
         f.ready_team("Alpha").await.team,
         f.ready_team("Beta").await.team,
@@ -486,9 +486,9 @@ async fn of_a_tournament_everybody_gets_what_counts() {
         .unwrap();
     let friendly =
         f.store
-            .order_friendly_game(Actor::Team(teams[0]), cup.id, teams[0], teams[1], f.now);
+            .request_friendly_game(Actor::Team(teams[0]), cup.id, teams[0], teams[1], f.now);
     friendly.await.unwrap();
-    play_game(&f).await;
+    run_game(&f).await;
     for number in 1..=2 {
         let drawn = DrawnRound {
             number: RoundNumber::try_from(number).unwrap(),
@@ -503,7 +503,7 @@ async fn of_a_tournament_everybody_gets_what_counts() {
             .await
             .unwrap();
         if number == 1 {
-            play_game(&f).await;
+            run_game(&f).await;
         }
     }
     for edition in [Edition::Organiser, Edition::Public] {
@@ -513,41 +513,41 @@ async fn of_a_tournament_everybody_gets_what_counts() {
             .snapshot(folder.path(), edition, "a test", f.now)
             .await
             .unwrap();
-        let kept = snapshot.kept_artifacts().await.unwrap();
+        let artifacts = snapshot.artifacts_to_archive().await.unwrap();
         let store = snapshot.store();
-        let shown = store.tournament_record(cup.id).await.unwrap();
-        assert_eq!(shown.entrants.len(), 2);
-        assert_eq!(shown.games.len(), 1, "what waits is no result");
-        assert!(matches!(shown.games[0].state, GameState::Played(_)));
-        let games = kept
+        let record = store.tournament_record(cup.id).await.unwrap();
+        assert_eq!(record.entrants.len(), 2);
+        assert_eq!(record.games.len(), 1, "open games are left out");
+        assert!(matches!(record.games[0].state, GameState::Played(_)));
+        let games = artifacts
             .iter()
-            .filter(|one| matches!(one.of, KeptOf::Game(_)))
+            .filter(|one| matches!(one.owner, ArtifactOwner::Game(_)))
             .count();
-        let free = store.games(cup.id, GamesOf::Free(None)).await.unwrap();
+        let friendly_games = store.games(cup.id, GameFilter::TestAndFriendly(None)).await.unwrap();
         let log = store
-            .game_log(shown.games[0].id, Side::First)
+            .game_log(record.games[0].id, Side::First)
             .await
             .unwrap();
         match edition {
             Edition::Organiser => {
-                assert_eq!((games, free.len()), (6, 1));
+                assert_eq!((games, friendly_games.len()), (6, 1));
                 assert_eq!(log.as_deref(), Some("home\n"));
             }
             Edition::Public => {
-                assert_eq!(free.len(), 0);
+                assert_eq!(friendly_games.len(), 0);
                 assert_eq!(log.as_deref(), Some(""));
-                let attempts = store.game_attempts(shown.games[0].id).await.unwrap();
+                let attempts = store.game_attempts(record.games[0].id).await.unwrap();
                 assert_eq!(attempts[0].worker, "");
             }
         }
     }
 }
 
-/// Plays the next unit, which must be a game with a recording.
-async fn play_game(f: &Fixture) {
-    let Some(Claimed {
+/// Runs the next job, which must be a game with a recording.
+async fn run_game(f: &TestStore) {
+    let Some(ClaimedJob {
         claim,
-        work: Work::Game { .. },
+        job: Job::Game { .. },
     }) = f.claim().await
     else {
         panic!("a game is queued")

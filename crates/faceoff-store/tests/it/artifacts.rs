@@ -4,12 +4,12 @@ use futures::TryStreamExt;
 use std::fs;
 
 #[tokio::test]
-async fn files_come_back_to_the_byte() {
-    let f = Fixture::new().await;
+async fn artifact_round_trip_is_exact() {
+    let f = TestStore::new().await;
     let artifacts = f.store.artifacts();
     let scratch = tempfile::tempdir().unwrap();
     let (source, target) = (scratch.path().join("a"), scratch.path().join("b"));
-    // empty, small, and several pieces with a broken last one
+    // empty, small, and several chunks with an incomplete last one
     for bytes in [0, 1, (3 << 20) + 17] {
         let content: Vec<u8> = (0..bytes).map(|i: usize| (i * 31 % 251) as u8).collect();
         fs::write(&source, &content).unwrap();
@@ -27,8 +27,8 @@ async fn files_come_back_to_the_byte() {
 }
 
 #[tokio::test]
-async fn a_missing_artifact_is_not_found_and_removed_again_without_harm() {
-    let f = Fixture::new().await;
+async fn missing_artifact_is_not_found_but_deletable() {
+    let f = TestStore::new().await;
     let artifacts = f.store.artifacts();
     let read = artifacts.read("datasets/none.zip").await;
     assert!(matches!(read.err(), Some(StoreError::NotFound("artifact"))));
@@ -41,8 +41,8 @@ async fn a_missing_artifact_is_not_found_and_removed_again_without_harm() {
 }
 
 #[tokio::test]
-async fn keys_cannot_leave_the_folder() {
-    let f = Fixture::new().await;
+async fn artifact_keys_cannot_leave_the_folder() {
+    let f = TestStore::new().await;
     let secret = f.folder.path().join("faceoff.sqlite3");
     for key in [
         "../faceoff.sqlite3",
@@ -63,8 +63,8 @@ async fn keys_cannot_leave_the_folder() {
 }
 
 #[tokio::test]
-async fn folders_travel_whole_and_apart() {
-    let f = Fixture::new().await;
+async fn artifact_folders_are_complete_and_separate() {
+    let f = TestStore::new().await;
     let artifacts = f.store.artifacts();
     let scratch = tempfile::tempdir().unwrap();
     let (from, to) = (scratch.path().join("from"), scratch.path().join("to"));
@@ -89,8 +89,8 @@ async fn folders_travel_whole_and_apart() {
 }
 
 #[tokio::test]
-async fn recordings_go_once_their_evaluation_has_been_over_for_a_day() {
-    let mut f = Fixture::new().await;
+async fn recordings_are_deleted_a_day_after_the_evaluation() {
+    let mut f = TestStore::new().await;
     let submission = f.ready_team("Alpha").await;
     let evaluation = f.evaluate(submission.id, &plan()).await;
     let (claim, _, shard) = f.claim_shard().await;
@@ -102,7 +102,7 @@ async fn recordings_go_once_their_evaluation_has_been_over_for_a_day() {
         .put_folder(&key, scratch.path())
         .await
         .unwrap();
-    f.play(&claim, &shard, 0).await;
+    f.commit_shard(&claim, &shard, 0).await;
     assert_eq!(f.store.remove_old_recordings(f.now).await.unwrap(), 0);
     f.store
         .artifacts()
@@ -113,8 +113,8 @@ async fn recordings_go_once_their_evaluation_has_been_over_for_a_day() {
         .cancel_evaluation(Actor::Organiser, evaluation.id, "rain", f.now)
         .await
         .unwrap();
-    // a backup that was begun before the end may still come to them
-    f.later(RECORDINGS_KEPT.as_secs() - 1);
+    // a backup that started before the end may still read them
+    f.later(RECORDINGS_KEPT_FOR.as_secs() - 1);
     assert_eq!(f.store.remove_old_recordings(f.now).await.unwrap(), 0);
     f.later(1);
     assert_eq!(f.store.remove_old_recordings(f.now).await.unwrap(), 1);
@@ -129,8 +129,8 @@ async fn recordings_go_once_their_evaluation_has_been_over_for_a_day() {
 }
 
 #[tokio::test]
-async fn what_a_kill_left_half_written_is_removed_and_nothing_else() {
-    let f = Fixture::new().await;
+async fn partial_artifacts_are_removed_and_others_kept() {
+    let f = TestStore::new().await;
     let artifacts = f.store.artifacts();
     let bundles = f.folder.path().join("artifacts/bundles");
     let source = f.folder.path().join("source");
@@ -142,20 +142,20 @@ async fn what_a_kill_left_half_written_is_removed_and_nothing_else() {
     assert_eq!(
         artifacts.remove_abandoned(now - hour).await.unwrap(),
         0,
-        "it may be under way"
+        "a write may still be in progress"
     );
     assert_eq!(artifacts.remove_abandoned(now + hour).await.unwrap(), 1);
     assert!(!bundles.join("2#1").exists());
     assert!(artifacts.read("bundles/1").await.is_ok());
     assert!(
         artifacts.put_file("bundles/3#1", &source).await.is_err(),
-        "no key looks like it"
+        "keys cannot look like a temporary file"
     );
 }
 
 #[tokio::test]
-async fn all_but_one_of_a_folder_can_go() {
-    let f = Fixture::new().await;
+async fn delete_others_keeps_one_artifact() {
+    let f = TestStore::new().await;
     let artifacts = f.store.artifacts();
     let source = f.folder.path().join("source");
     fs::write(&source, "x").unwrap();

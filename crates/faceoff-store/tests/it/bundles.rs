@@ -1,12 +1,12 @@
-//! What is kept of uploads, and how much a team may keep.
+//! Storage of bundles, and the upload quota.
 
 use crate::fixture::*;
 use faceoff_store::*;
 use faceoff_types::*;
 use jiff::{SignedDuration, Timestamp};
 
-/// An upload whose archive is stored under a key of its own.
-async fn stored(f: &Fixture, team: &Team, name: &str, bytes: u64) -> Submission {
+/// An upload whose bundle is stored under a key of its own.
+async fn stored(f: &TestStore, team: &Team, name: &str, bytes: u64) -> Submission {
     let key = format!("bundles/{}/{name}", team.id);
     let file = f.folder.path().join("upload");
     std::fs::write(&file, "an archive").unwrap();
@@ -23,7 +23,7 @@ async fn stored(f: &Fixture, team: &Team, name: &str, bytes: u64) -> Submission 
         .unwrap()
 }
 
-async fn is_kept(f: &Fixture, submission: &Submission) -> bool {
+async fn is_kept(f: &TestStore, submission: &Submission) -> bool {
     f.store
         .artifacts()
         .read(&submission.bundle.key)
@@ -31,22 +31,22 @@ async fn is_kept(f: &Fixture, submission: &Submission) -> bool {
         .is_ok()
 }
 
-async fn refuse(f: &Fixture) {
-    let (claim, _) = f.claim_smoke().await;
-    let outcome = SmokeOutcome::Invalid {
+async fn refuse(f: &TestStore) {
+    let (claim, _) = f.claim_validation().await;
+    let outcome = ValidationOutcome::Invalid {
         runtime: None,
         agent_name: None,
         reason: "there is no agent.toml".into(),
         timing: Vec::new(),
         log: "its log\n".into(),
     };
-    f.store.commit_smoke(&claim, outcome, f.now).await.unwrap();
+    f.store.commit_validation(&claim, outcome, f.now).await.unwrap();
 }
 
-/// Ends the next smoke run by our fault.
-async fn give_up(f: &mut Fixture) {
+/// Ends the next validation run by platform faults.
+async fn give_up(f: &mut TestStore) {
     for _ in 0..MAX_ATTEMPTS {
-        let (claim, _) = f.claim_smoke().await;
+        let (claim, _) = f.claim_validation().await;
         f.store
             .release_failed(&claim, "no disk", f.now)
             .await
@@ -56,8 +56,8 @@ async fn give_up(f: &mut Fixture) {
 }
 
 #[tokio::test]
-async fn a_refused_bundle_goes_and_its_reason_and_log_stay() {
-    let f = Fixture::new().await;
+async fn invalid_bundle_is_deleted_but_reason_and_log_stay() {
+    let f = TestStore::new().await;
     let team = f.team("Alpha").await;
     let valid = stored(&f, &team, "valid", 100).await;
     f.validate().await;
@@ -72,9 +72,9 @@ async fn a_refused_bundle_goes_and_its_reason_and_log_stay() {
     assert_eq!(f.store.remove_refused_bundles(f.now).await.unwrap(), 0);
     assert!(!is_kept(&f, &invalid).await);
     assert!(is_kept(&f, &valid).await && is_kept(&f, &waiting).await);
-    let told = f.store.submission(invalid.id).await.unwrap();
+    let stored = f.store.submission(invalid.id).await.unwrap();
     assert!(
-        matches!(told.state, SubmissionState::Invalid { reason } if reason.contains("agent.toml"))
+        matches!(stored.state, SubmissionState::Invalid { reason } if reason.contains("agent.toml"))
     );
     let log = f.store.submission_log(invalid.id).await.unwrap();
     assert_eq!(log.as_deref(), Some("its log\n"));
@@ -83,8 +83,8 @@ async fn a_refused_bundle_goes_and_its_reason_and_log_stay() {
 }
 
 #[tokio::test]
-async fn what_we_failed_to_check_is_kept_for_a_day_and_costs_the_team_nothing_of_its_day() {
-    let mut f = Fixture::new().await;
+async fn unchecked_bundle_is_kept_a_day_outside_the_quota() {
+    let mut f = TestStore::new().await;
     let team = f.team("Alpha").await;
     let unchecked = stored(&f, &team, "unchecked", 1000).await;
     let uploaded_at = f.now;
@@ -92,16 +92,16 @@ async fn what_we_failed_to_check_is_kept_for_a_day_and_costs_the_team_nothing_of
     let used = f.store.upload_usage(team.id, f.now).await.unwrap();
     assert_eq!((used.day_bytes, used.stored_bytes), (0, 1000));
     assert_eq!(f.store.remove_refused_bundles(f.now).await.unwrap(), 0);
-    let later = uploaded_at + UNCHECKED_KEPT;
+    let later = uploaded_at + UNCHECKED_KEPT_FOR;
     assert_eq!(f.store.remove_refused_bundles(later).await.unwrap(), 1);
     assert!(!is_kept(&f, &unchecked).await);
 }
 
 #[tokio::test]
-async fn what_a_run_or_another_upload_needs_is_not_removed() {
-    let f = Fixture::new().await;
+async fn shared_bundle_is_not_deleted() {
+    let f = TestStore::new().await;
     let team = f.team("Alpha").await;
-    // One archive under two submissions, as no upload makes it.
+    // Two submissions with the same bundle key; real uploads do not create this.
     let valid = stored(&f, &team, "shared", 100).await;
     f.validate().await;
     stored(&f, &team, "shared", 100).await;
@@ -111,15 +111,15 @@ async fn what_a_run_or_another_upload_needs_is_not_removed() {
 }
 
 #[tokio::test]
-async fn archives_of_no_submission_go_once_nobody_can_be_about_to_name_them() {
-    let f = Fixture::new().await;
+async fn orphaned_bundle_is_deleted_after_a_delay() {
+    let f = TestStore::new().await;
     let team = f.team("Alpha").await;
     let named = stored(&f, &team, "named", 100).await;
     let orphan = format!("bundles/{}/orphan", team.id);
     let file = f.folder.path().join("upload");
     f.store.artifacts().put_file(&orphan, &file).await.unwrap();
     let hour = SignedDuration::from_hours(1);
-    // The files' times are the host's.
+    // File times come from the host's clock.
     let (before, after) = (Timestamp::now() - hour, Timestamp::now() + hour);
     assert_eq!(f.store.remove_orphaned_bundles(before).await.unwrap(), 0);
     assert_eq!(f.store.remove_orphaned_bundles(after).await.unwrap(), 1);
@@ -128,14 +128,14 @@ async fn archives_of_no_submission_go_once_nobody_can_be_about_to_name_them() {
 }
 
 #[tokio::test]
-async fn a_quota_is_the_teams_own_and_the_last_word_is_the_transactions() {
-    let mut f = Fixture::new().await;
+async fn upload_quota_is_per_team_and_checked_on_insert() {
+    let mut f = TestStore::new().await;
     let (one, other) = (f.team("One").await, f.team("Other").await);
     let quota = UploadQuota {
         day_bytes: 1000,
         stored_bytes: 1500,
     };
-    let upload = async |f: &Fixture, team: &Team, bytes: u64| {
+    let upload = async |f: &TestStore, team: &Team, bytes: u64| {
         let bundle = BundleRef { bytes, ..bundle() };
         f.store
             .create_submission(Actor::Team(team.id), team.id, bundle, &quota, f.now)
@@ -146,7 +146,7 @@ async fn a_quota_is_the_teams_own_and_the_last_word_is_the_transactions() {
     assert!(
         matches!(
             error,
-            StoreError::DayQuotaSpent {
+            StoreError::DailyQuotaExceeded {
                 limit_bytes: 1000,
                 used_bytes: 600,
                 bundle_bytes: 500
@@ -157,14 +157,14 @@ async fn a_quota_is_the_teams_own_and_the_last_word_is_the_transactions() {
     upload(&f, &one, 400).await.unwrap();
     upload(&f, &other, 1000).await.unwrap();
     let error = upload(&f, &one, u64::MAX).await.unwrap_err();
-    assert!(matches!(error, StoreError::DayQuotaSpent { .. }), "{error}");
+    assert!(matches!(error, StoreError::DailyQuotaExceeded { .. }), "{error}");
     // Midnight, UTC.
     f.later(14 * 3600);
     let error = upload(&f, &one, 600).await.unwrap_err();
     assert!(
         matches!(
             error,
-            StoreError::StoredQuotaSpent {
+            StoreError::StorageQuotaExceeded {
                 used_bytes: 1000,
                 ..
             }

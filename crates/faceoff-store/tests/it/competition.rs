@@ -1,12 +1,12 @@
-//! From an upload to the board, as http and worker drive it.
+//! From an upload to the board, as the HTTP server and the worker use the store.
 
 use crate::fixture::*;
 use faceoff_store::*;
 use faceoff_types::*;
 
 #[tokio::test]
-async fn a_submission_travels_from_upload_to_board() {
-    let mut f = Fixture::new().await;
+async fn submission_travels_from_upload_to_board() {
+    let mut f = TestStore::new().await;
     let team = f.team("Alpha").await;
     let submission = f.upload(&team).await;
     assert_eq!(submission.state, SubmissionState::Validating);
@@ -32,7 +32,7 @@ async fn a_submission_travels_from_upload_to_board() {
 
     let evaluation = f.evaluate(submission.id, &plan()).await;
     assert_eq!(evaluation.state, EvaluationState::Queued);
-    assert_eq!(evaluation.of.date, jiff::civil::date(2026, 3, 1));
+    assert_eq!(evaluation.stage_day.date, jiff::civil::date(2026, 3, 1));
     assert_eq!(evaluation.plan, plan());
 
     let mut played = Vec::new();
@@ -56,7 +56,7 @@ async fn a_submission_travels_from_upload_to_board() {
             }
         );
         f.later(1);
-        assert_eq!(f.play(&claim, &shard, 0).await, Committed::Now);
+        assert_eq!(f.commit_shard(&claim, &shard, 0).await, CommitOutcome::Stored);
         played.push((shard.task, shard.first_episode, shard.end_episode));
     }
     let in_order = Task::ALL
@@ -77,10 +77,10 @@ async fn a_submission_travels_from_upload_to_board() {
 
     assert_eq!(f.state(evaluation.id).await, EvaluationState::Finalising);
     assert!(f.board().await.is_empty());
-    let Some(Claimed {
+    let Some(ClaimedJob {
         claim,
-        work:
-            Work::Finalise {
+        job:
+            Job::Scoring {
                 evaluation: scored,
                 run,
                 recordings,
@@ -89,7 +89,7 @@ async fn a_submission_travels_from_upload_to_board() {
             },
     }) = f.claim().await
     else {
-        panic!("the finalisation is a unit of work")
+        panic!("expected a scoring job")
     };
     assert_eq!((scored, run.id), (evaluation.id, evaluation.run));
     assert_eq!(agent_name, "striker");
@@ -99,15 +99,15 @@ async fn a_submission_travels_from_upload_to_board() {
     let secret = f.store.season().await.unwrap().secret;
     assert_eq!(
         seeds.episodes,
-        secret.stage(evaluation.of.stage).day(evaluation.of.date)
+        secret.stage(evaluation.stage_day.stage).day(evaluation.stage_day.date)
     );
     assert_eq!(seeds.mismatch, secret.model_mismatch());
-    assert!(f.claim().await.is_none(), "and is claimed once");
+    assert!(f.claim().await.is_none(), "it is claimed once");
     f.later(1);
     let finished = f.finish(&claim, 51.2, "datasets/x.zip").await;
-    assert_eq!(finished, Committed::Now);
-    let again = f.finish(&claim, 0.0, "datasets/y.zip").await;
-    assert_eq!(again, Committed::Before);
+    assert_eq!(finished, CommitOutcome::Stored);
+    let repeated = f.finish(&claim, 0.0, "datasets/y.zip").await;
+    assert_eq!(repeated, CommitOutcome::AlreadyStored);
     assert_eq!(
         f.state(evaluation.id).await,
         EvaluationState::Finished {

@@ -1,35 +1,35 @@
-//! A day has one cut: what each team has active then plays it.
+//! The cutoff of a day: each team's active submission is evaluated.
 
 use crate::fixture::*;
 use faceoff_store::*;
-use faceoff_types::{SmokeOutcome, SubmissionId, Zone};
+use faceoff_types::{ValidationOutcome, SubmissionId, Zone};
 use jiff::civil::date;
 
-fn had_its_cut<T: std::fmt::Debug>(result: Result<T, StoreError>) -> jiff::civil::Date {
+fn expect_cutoff_passed<T: std::fmt::Debug>(result: Result<T, StoreError>) -> jiff::civil::Date {
     match result {
-        Err(StoreError::DayHasCut { day, .. }) => day,
-        other => panic!("expected that the day had its cut, got {other:?}"),
+        Err(StoreError::CutoffPassed { day, .. }) => day,
+        other => panic!("expected that the cutoff has passed, got {other:?}"),
     }
 }
 
 #[tokio::test]
-async fn a_day_has_one_cut() {
-    let mut f = Fixture::new().await;
+async fn day_has_one_cutoff() {
+    let mut f = TestStore::new().await;
     let first = f.ready_team("Alpha").await;
     f.now = "2026-03-01T23:59:59.998Z".parse().unwrap();
-    let cut_at = f.now;
+    let cutoff_at = f.now;
     let evaluation = f.evaluate(first.id, &plan()).await;
-    // neither the same nor a new submission, nor another team's, gets a second one
+    // neither the same nor a new submission, nor another team's, gets a second cutoff
     f.now = "2026-03-01T23:59:59.999Z".parse().unwrap();
     let team = f.store.team(first.team).await.unwrap();
     f.upload(&team).await;
     let second = f.validate().await;
     f.ready_team("Beta").await;
-    let again = f
+    let repeated = f
         .store
         .start_day(Actor::Organiser, f.stage(&plan()).await, f.now)
         .await;
-    assert_eq!(had_its_cut(again), date(2026, 3, 1));
+    assert_eq!(expect_cutoff_passed(repeated), date(2026, 3, 1));
     assert_eq!(
         f.store.evaluations_on(date(2026, 3, 1)).await.unwrap(),
         [evaluation]
@@ -41,26 +41,26 @@ async fn a_day_has_one_cut() {
         .unwrap()
         .unwrap();
     assert_eq!(
-        (day.of.date, day.cut_at, day.released_at),
-        (date(2026, 3, 1), cut_at, None)
+        (day.stage_day.date, day.cutoff_at, day.released_at),
+        (date(2026, 3, 1), cutoff_at, None)
     );
     // but the next day comes a millisecond later
     f.now = "2026-03-02T00:00:00Z".parse().unwrap();
     let next = f.evaluate(second.id, &plan()).await;
-    assert_eq!(next.of.date, date(2026, 3, 2));
-    assert_eq!(f.store.evaluations_on(next.of.date).await.unwrap().len(), 2);
+    assert_eq!(next.stage_day.date, date(2026, 3, 2));
+    assert_eq!(f.store.evaluations_on(next.stage_day.date).await.unwrap().len(), 2);
     // and a clock that was set back starts nothing
     f.now = "2026-02-27T00:00:00Z".parse().unwrap();
-    let again = f
+    let repeated = f
         .store
         .start_day(Actor::Organiser, f.stage(&plan()).await, f.now)
         .await;
-    assert_eq!(had_its_cut(again), date(2026, 3, 2));
+    assert_eq!(expect_cutoff_passed(repeated), date(2026, 3, 2));
 }
 
 #[tokio::test]
-async fn of_many_at_once_one_makes_the_cut() {
-    let f = Fixture::new().await;
+async fn concurrent_day_starts_make_one_cutoff() {
+    let f = TestStore::new().await;
     f.ready_team("Alpha").await;
     let other = f.reopen().await;
     let stage = f.stage(&plan()).await;
@@ -73,20 +73,20 @@ async fn of_many_at_once_one_makes_the_cut() {
         let now = f.now;
         tokio::spawn(async move { store.start_day(Actor::Organiser, stage, now).await })
     });
-    let mut cuts = 0;
+    let mut evaluations = 0;
     for attempt in attempts.collect::<Vec<_>>() {
         match attempt.await.unwrap() {
-            Ok(started) => cuts += started.len(),
-            Err(StoreError::DayHasCut { .. }) => {}
+            Ok(started) => evaluations += started.len(),
+            Err(StoreError::CutoffPassed { .. }) => {}
             Err(error) => panic!("{error}"),
         }
     }
-    assert_eq!(cuts, 1);
+    assert_eq!(evaluations, 1);
 }
 
 #[tokio::test]
-async fn a_day_that_nobody_can_play_keeps_its_cut_unless_it_is_the_schedules() {
-    let mut f = Fixture::new().await;
+async fn empty_day_keeps_its_cutoff_unless_scheduled() {
+    let mut f = TestStore::new().await;
     let team = f.team("Alpha").await;
     let refused = f
         .store
@@ -112,10 +112,10 @@ async fn a_day_that_nobody_can_play_keeps_its_cut_unless_it_is_the_schedules() {
         .unwrap()
         .unwrap();
     assert_eq!(day.released_at, Some(f.now), "there is nothing to wait for");
-    // who comes later plays the next day
+    // a later submission is evaluated on the next day
     f.upload(&team).await;
     let submission = f.validate().await;
-    had_its_cut(
+    expect_cutoff_passed(
         f.store
             .start_day(Actor::Organiser, f.stage(&plan()).await, f.now)
             .await,
@@ -124,7 +124,7 @@ async fn a_day_that_nobody_can_play_keeps_its_cut_unless_it_is_the_schedules() {
     f.evaluate(submission.id, &plan()).await;
 }
 
-async fn active(f: &Fixture, team: &Team) -> SubmissionId {
+async fn active(f: &TestStore, team: &Team) -> SubmissionId {
     let of_team = f.store.submissions_of(team.id).await.unwrap();
     let active: Vec<_> = of_team.iter().filter(|one| one.active).collect();
     assert_eq!(active.len(), 1, "{of_team:?}");
@@ -132,32 +132,32 @@ async fn active(f: &Fixture, team: &Team) -> SubmissionId {
 }
 
 #[tokio::test]
-async fn an_upload_takes_its_place_when_it_is_valid_unless_a_newer_one_or_a_choice_has() {
-    let mut f = Fixture::new().await;
+async fn valid_upload_becomes_active_unless_superseded() {
+    let mut f = TestStore::new().await;
     let old = f.ready_team("Alpha").await;
     let team = f.store.team(old.team).await.unwrap();
     // Two uploads, the newer of which is valid first.
     f.later(1);
     let slow = f.upload(&team).await;
-    let (slow_claim, _) = f.claim_smoke().await;
+    let (slow_claim, _) = f.claim_validation().await;
     f.later(1);
     f.upload(&team).await;
     let quick = f.validate().await;
     assert!(quick.active);
-    let valid = || SmokeOutcome::Valid {
+    let valid = || ValidationOutcome::Valid {
         runtime: "native".into(),
         agent_name: "late".into(),
         timing: Vec::new(),
         log: String::new(),
     };
-    let late = f.store.commit_smoke(&slow_claim, valid(), f.now).await;
-    assert_eq!(late.unwrap(), Committed::Now);
+    let late = f.store.commit_validation(&slow_claim, valid(), f.now).await;
+    assert_eq!(late.unwrap(), CommitOutcome::Stored);
     assert_eq!(active(&f, &team).await, quick.id, "a newer one is active");
 
-    // A choice stays against what was uploaded before it.
+    // A choice is kept when an earlier upload turns valid.
     f.later(1);
     f.upload(&team).await;
-    let (claim, uploaded_before) = f.claim_smoke().await;
+    let (claim, uploaded_before) = f.claim_validation().await;
     f.later(1);
     let choose = |id| f.store.activate_submission(Actor::Team(team.id), id, f.now);
     assert!(matches!(
@@ -165,11 +165,11 @@ async fn an_upload_takes_its_place_when_it_is_valid_unless_a_newer_one_or_a_choi
         Err(StoreError::Conflict(_))
     ));
     assert!(choose(old.id).await.unwrap().active);
-    f.store.commit_smoke(&claim, valid(), f.now).await.unwrap();
+    f.store.commit_validation(&claim, valid(), f.now).await.unwrap();
     assert_eq!(active(&f, &team).await, old.id);
     choose(slow.id).await.unwrap();
     assert_eq!(active(&f, &team).await, slow.id);
-    // What comes later takes its place.
+    // A later upload replaces the choice.
     f.later(1);
     f.upload(&team).await;
     let newest = f.validate().await;
@@ -178,8 +178,8 @@ async fn an_upload_takes_its_place_when_it_is_valid_unless_a_newer_one_or_a_choi
 }
 
 #[tokio::test]
-async fn a_choice_after_the_cut_is_one_for_the_next() {
-    let mut f = Fixture::new().await;
+async fn choice_after_cutoff_applies_to_next_day() {
+    let mut f = TestStore::new().await;
     let first = f.ready_team("Alpha").await;
     let team = f.store.team(first.team).await.unwrap();
     f.later(1);
@@ -201,8 +201,8 @@ async fn a_choice_after_the_cut_is_one_for_the_next() {
 }
 
 #[tokio::test]
-async fn a_cancelled_run_loses_its_workers_and_can_be_played_again() {
-    let f = Fixture::new().await;
+async fn cancelled_evaluation_loses_leases_and_can_be_rerun() {
+    let f = TestStore::new().await;
     let submission = f.ready_team("Alpha").await;
     let evaluation = f.evaluate(submission.id, &plan()).await;
     let (claim, _, shard) = f.claim_shard().await;
@@ -216,7 +216,7 @@ async fn a_cancelled_run_loses_its_workers_and_can_be_played_again() {
         .await
         .unwrap();
     assert!(!f.store.heartbeat(&claim, 1, LEASE_S, f.now).await.unwrap());
-    assert_eq!(f.play(&claim, &shard, 0).await, Committed::LeaseLost);
+    assert_eq!(f.commit_shard(&claim, &shard, 0).await, CommitOutcome::LeaseLost);
     assert!(f.claim().await.is_none());
     assert_eq!(
         f.state(evaluation.id).await,
@@ -225,40 +225,40 @@ async fn a_cancelled_run_loses_its_workers_and_can_be_played_again() {
             reason: "power cut announced".into()
         }
     );
-    let again = f
+    let repeated = f
         .store
         .cancel_evaluation(Actor::Organiser, evaluation.id, "", f.now)
         .await;
-    assert!(matches!(again, Err(StoreError::Conflict(_))));
-    assert!(f.claim().await.is_none(), "not by itself");
-    let again = f
+    assert!(matches!(repeated, Err(StoreError::Conflict(_))));
+    assert!(f.claim().await.is_none(), "there is no automatic rerun");
+    let rerun = f
         .store
         .rerun_evaluation(Actor::Organiser, evaluation.id, f.now);
-    assert_eq!(again.await.unwrap().submission, submission.id);
+    assert_eq!(rerun.await.unwrap().submission, submission.id);
 }
 
 #[tokio::test]
-async fn the_cut_takes_the_newest_valid_submission_of_each_team() {
-    let mut f = Fixture::new().await;
+async fn cutoff_takes_newest_valid_submission_of_each_team() {
+    let mut f = TestStore::new().await;
     let alpha = f.ready_team("Alpha").await;
     let beta = f.ready_team("Beta").await;
     let silent = f.team("Never uploaded").await;
     let broken = f.team("Broken").await;
     f.upload(&broken).await;
-    let (claim, _) = f.claim_smoke().await;
-    let outcome = SmokeOutcome::Invalid {
+    let (claim, _) = f.claim_validation().await;
+    let outcome = ValidationOutcome::Invalid {
         runtime: None,
         agent_name: None,
         reason: "no agent.toml".into(),
         timing: Vec::new(),
         log: String::new(),
     };
-    f.store.commit_smoke(&claim, outcome, f.now).await.unwrap();
+    f.store.commit_validation(&claim, outcome, f.now).await.unwrap();
     f.later(1);
     let team = f.store.team(alpha.team).await.unwrap();
     f.upload(&team).await;
     let newer = f.validate().await;
-    f.upload(&team).await; // still validating: the one before it counts
+    f.upload(&team).await; // still validating: the previous one counts
 
     let started = f
         .store
@@ -276,8 +276,8 @@ async fn the_cut_takes_the_newest_valid_submission_of_each_team() {
 }
 
 #[tokio::test]
-async fn the_schedule_starts_a_day_once_whoever_asks() {
-    let mut f = Fixture::new().await;
+async fn scheduled_day_starts_once() {
+    let mut f = TestStore::new().await;
     f.ready_team("Alpha").await;
     let started = f
         .store
@@ -294,7 +294,7 @@ async fn the_schedule_starts_a_day_once_whoever_asks() {
             .unwrap()
             .is_none()
     );
-    had_its_cut(
+    expect_cutoff_passed(
         other
             .start_day(Actor::Organiser, f.stage(&plan()).await, f.now)
             .await,
@@ -321,8 +321,8 @@ async fn the_schedule_starts_a_day_once_whoever_asks() {
 }
 
 #[tokio::test]
-async fn an_empty_plan_is_refused() {
-    let f = Fixture::new().await;
+async fn empty_plan_is_refused() {
+    let f = TestStore::new().await;
     let submission = f.ready_team("Alpha").await;
     let bad = [
         RunPlan {
@@ -343,7 +343,7 @@ async fn an_empty_plan_is_refused() {
         },
     ];
     for plan in bad {
-        let (rules, settings) = rules_of(&plan);
+        let (rules, settings) = rules_and_settings(&plan);
         let error = f
             .store
             .configure_stage(rules, settings, Zone::UTC, f.now)
@@ -361,8 +361,8 @@ async fn an_empty_plan_is_refused() {
 }
 
 #[tokio::test]
-async fn the_board_shows_each_teams_newest_finished_day() {
-    let mut f = Fixture::new().await;
+async fn board_shows_newest_finished_day_of_each_team() {
+    let mut f = TestStore::new().await;
     f.ready_team("Alpha").await;
     f.ready_team("Beta").await;
     let small = RunPlan {
@@ -382,7 +382,7 @@ async fn the_board_shows_each_teams_newest_finished_day() {
         );
         for team in 0..2 {
             let (claim, _, shard) = f.claim_shard().await;
-            // on day 3 Beta's agent breaks down
+            // on day 3 Beta's agent fails
             let faults = u32::from(day == 3 && team == 1);
             let mut commit = commit(&shard, faults);
             commit.stopped_by_faults = faults > 0;
@@ -408,13 +408,13 @@ async fn the_board_shows_each_teams_newest_finished_day() {
 }
 
 #[tokio::test]
-async fn what_a_team_withdraws_enters_no_further_day_until_it_is_chosen_again() {
-    let mut f = Fixture::new().await;
+async fn withdrawn_submission_skips_days_until_chosen_again() {
+    let mut f = TestStore::new().await;
     let team = f.team("Alpha").await;
     let other = f.ready_team("Beta").await;
     f.upload(&team).await;
     let first = f.validate().await;
-    let withdraw = async |f: &Fixture, id| {
+    let withdraw = async |f: &TestStore, id| {
         f.store
             .withdraw_submission(Actor::Team(team.id), id, f.now)
             .await
@@ -425,10 +425,10 @@ async fn what_a_team_withdraws_enters_no_further_day_until_it_is_chosen_again() 
         (withdrawn.active, withdrawn.withdrawn_at),
         (false, Some(f.now))
     );
-    let again = withdraw(&f, first.id).await;
-    assert!(matches!(again, Err(StoreError::Conflict(_))), "{again:?}");
-    // The day that had its cut goes on, the next one is without it.
-    f.play_to(1.0).await;
+    let repeated = withdraw(&f, first.id).await;
+    assert!(matches!(repeated, Err(StoreError::Conflict(_))), "{repeated:?}");
+    // The day past its cutoff continues, the next one excludes it.
+    f.run_all(1.0).await;
     assert_eq!(f.board().await.len(), 2);
     f.later(24 * 3600);
     let stage = f.stage(&small()).await;
@@ -437,13 +437,13 @@ async fn what_a_team_withdraws_enters_no_further_day_until_it_is_chosen_again() 
         .start_day(Actor::Organiser, stage, f.now)
         .await
         .unwrap();
-    let plays: Vec<_> = started.iter().map(|one| one.submission).collect();
-    assert_eq!(plays, [other.id]);
-    f.play_to(2.0).await;
+    let evaluated: Vec<_> = started.iter().map(|one| one.submission).collect();
+    assert_eq!(evaluated, [other.id]);
+    f.run_all(2.0).await;
 
-    // Withdrawn before its verdict, a submission does not become active by it.
+    // A submission that was withdrawn before its validation does not become active.
     let second = f.upload(&team).await;
-    assert_eq!(second.same_as, Some(first.id), "the same archive");
+    assert_eq!(second.duplicate_of, Some(first.id), "the same bundle");
     withdraw(&f, second.id).await.unwrap();
     assert!(!f.validate().await.active);
     let chosen = f
@@ -451,28 +451,28 @@ async fn what_a_team_withdraws_enters_no_further_day_until_it_is_chosen_again() 
         .activate_submission(Actor::Team(team.id), first.id, f.now);
     let chosen = chosen.await.unwrap();
     assert_eq!((chosen.active, chosen.withdrawn_at), (true, None));
-    let says = async |words| {
-        let said = f
+    let describe = async |description| {
+        let described = f
             .store
-            .describe_submission(Actor::Team(team.id), first.id, words, f.now);
-        let said = said.await.unwrap();
-        (said.label, said.note)
+            .describe_submission(Actor::Team(team.id), first.id, description, f.now);
+        let described = described.await.unwrap();
+        (described.label, described.note)
     };
     let label = Some("baseline".to_owned());
     let note = Some("before the fix".to_owned());
-    let labelled = SubmissionWords {
+    let labelled = SubmissionDescription {
         label: Some(Some("baseline")),
         note: None,
     };
-    assert_eq!(says(labelled).await, (label.clone(), None));
-    let noted = SubmissionWords {
+    assert_eq!(describe(labelled).await, (label.clone(), None));
+    let noted = SubmissionDescription {
         label: None,
         note: Some(Some("before the fix")),
     };
-    assert_eq!(says(noted).await, (label, note.clone()));
-    let unnamed = SubmissionWords {
+    assert_eq!(describe(noted).await, (label, note.clone()));
+    let unnamed = SubmissionDescription {
         label: Some(None),
         note: None,
     };
-    assert_eq!(says(unnamed).await, (None, note));
+    assert_eq!(describe(unnamed).await, (None, note));
 }

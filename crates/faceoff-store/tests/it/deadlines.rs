@@ -1,11 +1,11 @@
-//! Days that do not fit: what is left of them goes on before the next ones, until the deadline.
+//! Days that take too long: they continue before later days, until their deadline.
 
 use crate::fixture::*;
 use faceoff_store::*;
 use faceoff_types::*;
 use jiff::Timestamp;
 
-/// Two shards of one task, so that a day can be half played.
+/// Two shards of one task, so that a day can be half finished.
 fn two_shards() -> RunPlan {
     RunPlan {
         tasks: vec![Task::Hit],
@@ -14,8 +14,8 @@ fn two_shards() -> RunPlan {
 }
 
 /// The first stage, with days at 10:00 UTC and this deadline.
-async fn daily(f: &Fixture, day_deadline: DayDeadline) -> StageId {
-    let (rules, settings) = rules_of(&two_shards());
+async fn daily(f: &TestStore, day_deadline: DayDeadline) -> StageId {
+    let (rules, settings) = rules_and_settings(&two_shards());
     let settings = StageSettings {
         schedule: Some(Schedule::daily("10:00".parse().unwrap())),
         day_deadline,
@@ -29,33 +29,33 @@ async fn daily(f: &Fixture, day_deadline: DayDeadline) -> StageId {
     f.store.stages().await.unwrap()[0].id
 }
 
-async fn start(f: &Fixture, stage: StageId) -> Vec<Evaluation> {
+async fn start(f: &TestStore, stage: StageId) -> Vec<Evaluation> {
     let started = f.store.start_scheduled_day(stage, f.now).await.unwrap();
-    started.expect("it had no cut")
+    started.expect("the day has not started before")
 }
 
-/// Plays the next shard; of which day, and whose it was.
-async fn play_one(f: &Fixture) -> (String, TeamId) {
-    let Some(Claimed {
+/// Runs the next shard. Returns the date of its day and its team.
+async fn run_shard(f: &TestStore) -> (String, TeamId) {
+    let Some(ClaimedJob {
         claim,
-        work: Work::Shard { owner, shard, .. },
+        job: Job::Shard { owner, shard, .. },
     }) = f.claim().await
     else {
         panic!("a shard is queued")
     };
-    f.play(&claim, &shard, 0).await;
+    f.commit_shard(&claim, &shard, 0).await;
     let RunOwner::Evaluation(id) = owner else {
-        panic!("of an evaluation, not of {owner:?}")
+        panic!("expected a shard of an evaluation, claimed one of {owner:?}")
     };
     let played = f.store.evaluation(id).await.unwrap();
-    (played.of.date.to_string(), played.team)
+    (played.stage_day.date.to_string(), played.team)
 }
 
 fn at(text: &str) -> Timestamp {
     text.parse().unwrap()
 }
 
-async fn kinds_since(f: &Fixture, id: i64) -> Vec<String> {
+async fn kinds_since(f: &TestStore, id: i64) -> Vec<String> {
     let events = f.store.events_after(id, 1000).await.unwrap();
     let kind = |record: &EventRecord| {
         let event = serde_json::to_value(&record.event).unwrap();
@@ -65,43 +65,43 @@ async fn kinds_since(f: &Fixture, id: i64) -> Vec<String> {
 }
 
 #[tokio::test]
-async fn an_unfinished_day_goes_on_before_the_next_one() {
-    let mut f = Fixture::new().await;
+async fn unfinished_day_runs_before_the_next_one() {
+    let mut f = TestStore::new().await;
     let [alpha, beta] = [f.ready_team("Alpha").await, f.ready_team("Beta").await];
     let stage = daily(&f, DayDeadline::Hours(30)).await;
     assert_eq!(start(&f, stage).await.len(), 2);
-    // Alpha's agent is slow: by slot time it would be Beta's turn for long.
-    let Some(Claimed {
+    // Alpha's agent is slow: by slot time Beta would be preferred for a long time.
+    let Some(ClaimedJob {
         claim,
-        work: Work::Shard { shard, .. },
+        job: Job::Shard { shard, .. },
     }) = f.claim().await
     else {
         panic!("a shard is queued")
     };
     f.later(24 * 3600);
-    f.play(&claim, &shard, 0).await;
+    f.commit_shard(&claim, &shard, 0).await;
     let gamma = f.ready_team("Gamma").await;
     assert_eq!(start(&f, stage).await.len(), 3);
 
     let mut order = Vec::new();
     while order.len() < 9 {
         match f.store.claim("slot 0", LEASE_S, f.now).await.unwrap() {
-            Some(Claimed {
+            Some(ClaimedJob {
                 claim,
-                work: Work::Finalise { .. },
+                job: Job::Scoring { .. },
             }) => {
                 f.finish(&claim, 1.0, "d").await;
             }
-            Some(Claimed {
+            Some(ClaimedJob {
                 claim,
-                work: Work::Shard { owner, shard, .. },
+                job: Job::Shard { owner, shard, .. },
             }) => {
-                f.play(&claim, &shard, 0).await;
+                f.commit_shard(&claim, &shard, 0).await;
                 let RunOwner::Evaluation(id) = owner else {
                     panic!("{owner:?}")
                 };
                 let played = f.store.evaluation(id).await.unwrap();
-                order.push((played.of.date.to_string(), played.team));
+                order.push((played.stage_day.date.to_string(), played.team));
             }
             other => panic!("{other:?}"),
         }
@@ -110,7 +110,7 @@ async fn an_unfinished_day_goes_on_before_the_next_one() {
     let (first, second) = ("2026-03-01", "2026-03-02");
     assert_eq!(days[..3], [first; 3], "{order:?}");
     assert_eq!(days[3..], [second; 6]);
-    // Of the first day Beta is served first, whose agent took nothing; of the second all wait alike for their share.
+    // On the first day Beta comes first, since its agent used no slot time. On the second day all teams get equal shares.
     assert_eq!(order[0].1, beta.team);
     assert_eq!(order[1].1, beta.team);
     assert_eq!(order[2].1, alpha.team);
@@ -118,45 +118,45 @@ async fn an_unfinished_day_goes_on_before_the_next_one() {
 }
 
 #[tokio::test]
-async fn at_the_deadline_what_is_left_is_not_played_and_the_day_is_released() {
-    let mut f = Fixture::new().await;
+async fn deadline_ends_open_evaluations_and_releases_the_day() {
+    let mut f = TestStore::new().await;
     let alpha = f.ready_team("Alpha").await;
     let stage = daily(&f, DayDeadline::NextCut).await;
-    let of = start(&f, stage).await[0].of;
-    f.play_to(1.0).await;
+    let of = start(&f, stage).await[0].stage_day;
+    f.run_all(1.0).await;
     f.later(24 * 3600);
     let beta = f.ready_team("Beta").await;
     let second = start(&f, stage).await;
     let deadline = at("2026-03-03T10:00:00Z");
     assert_eq!(second[0].deadline_at, Some(deadline));
     let id_of = |team: TeamId| second.iter().find(|one| one.team == team).unwrap().id;
-    // Beta's is played to its end, but not scored; Alpha's is in the middle.
+    // Beta's evaluation is complete but not scored; Alpha's is half done.
     while f.state(id_of(beta.team)).await != EvaluationState::Finalising {
-        let (_, team) = play_one(&f).await;
+        let (_, team) = run_shard(&f).await;
         if team == alpha.team {
             break;
         }
     }
     let held = loop {
         match f.claim().await.unwrap() {
-            Claimed {
+            ClaimedJob {
                 claim,
-                work: Work::Shard { owner, shard, .. },
+                job: Job::Shard { owner, shard, .. },
             } => {
                 if owner == RunOwner::Evaluation(id_of(alpha.team)) {
                     break (claim, shard);
                 }
-                f.play(&claim, &shard, 0).await;
+                f.commit_shard(&claim, &shard, 0).await;
             }
-            Claimed {
+            ClaimedJob {
                 claim,
-                work: Work::Finalise { .. },
+                job: Job::Scoring { .. },
             } => f.store.release(&claim, f.now).await.unwrap(),
             other => panic!("{other:?}"),
         }
     };
     while f.state(id_of(beta.team)).await != EvaluationState::Finalising {
-        play_one(&f).await;
+        run_shard(&f).await;
     }
     let before = f.store.events_after(0, 1000).await.unwrap();
     let before = before.last().unwrap().id;
@@ -164,7 +164,7 @@ async fn at_the_deadline_what_is_left_is_not_played_and_the_day_is_released() {
     f.now = deadline - jiff::SignedDuration::from_millis(1);
     assert_eq!(f.store.end_overdue_days(f.now).await.unwrap(), []);
     f.now = deadline;
-    let overdue = second[0].of;
+    let overdue = second[0].stage_day;
     let ended = f.store.end_overdue_days(f.now).await.unwrap();
     assert_eq!(ended, [(overdue, 1)]);
     let EvaluationState::NotPlayed {
@@ -172,26 +172,26 @@ async fn at_the_deadline_what_is_left_is_not_played_and_the_day_is_released() {
         reason,
     } = f.state(id_of(alpha.team)).await
     else {
-        panic!("it goes on")
+        panic!("expected that the evaluation has ended")
     };
     assert_eq!(finished_at, deadline);
-    for words in ["2026-03-03 at 10:00:00 UTC", "our capacity", "no fault"] {
+    for words in ["2026-03-03 at 10:00:00 UTC", "the server ran out of time", "no agent fault"] {
         assert!(reason.contains(words), "{words} is not in {reason}");
     }
-    assert_eq!(f.play(&held.0, &held.1, 0).await, Committed::LeaseLost);
+    assert_eq!(f.commit_shard(&held.0, &held.1, 0).await, CommitOutcome::LeaseLost);
     assert_eq!(
         kinds_since(&f, before).await,
         ["day_overdue", "evaluation_not_played"]
     );
     assert_eq!(f.store.end_overdue_days(f.now).await.unwrap(), [], "once");
-    // What only waited for its score has it, and then the day is released.
+    // The complete evaluation is scored, and then the day is released.
     let (claim, scored) = f.claim_scoring().await;
     assert_eq!(scored, id_of(beta.team));
     f.finish(&claim, 2.0, "d").await;
     let days = f.store.days().await.unwrap();
-    assert_eq!(days[0].0.of, overdue);
+    assert_eq!(days[0].0.stage_day, overdue);
     assert_eq!(days[0].0.released_at, Some(f.now));
-    assert!(f.claim().await.is_none(), "nothing of it begins again");
+    assert!(f.claim().await.is_none(), "there is no automatic rerun");
 
     let board: Vec<_> = f.board().await;
     let rows: Vec<_> = board
@@ -203,31 +203,31 @@ async fn at_the_deadline_what_is_left_is_not_played_and_the_day_is_released() {
         [(alpha.team, of.date, 1.0), (beta.team, overdue.date, 2.0)],
         "the older row stays"
     );
-    // The turn is given back: by hand it can be played, and has no deadline then.
-    let again = f
+    // An organiser can rerun it, without a deadline.
+    let rerun = f
         .store
         .rerun_evaluation(Actor::Organiser, id_of(alpha.team), f.now)
         .await
         .unwrap();
     f.later(3600);
     assert_eq!(f.store.end_overdue_days(f.now).await.unwrap(), []);
-    f.play_to(3.0).await;
+    f.run_all(3.0).await;
     assert!(matches!(
-        f.state(again.id).await,
+        f.state(rerun.id).await,
         EvaluationState::Finished { .. }
     ));
 }
 
 #[tokio::test]
-async fn an_overdue_day_of_which_nothing_is_left_but_shards_is_released_at_once() {
-    let mut f = Fixture::new().await;
+async fn overdue_day_without_scoring_is_released_at_once() {
+    let mut f = TestStore::new().await;
     f.ready_team("Alpha").await;
     let stage = daily(&f, DayDeadline::Hours(1)).await;
     let started = start(&f, stage).await;
-    // What we broke and would play again by itself has no time left for it.
-    let broken = f.break_next().await;
-    let waiting = f.store.evaluations_of_day(started[0].of).await.unwrap();
-    assert_eq!(waiting.len(), 2, "it is played again");
+    // An automatic rerun after a platform fault has no time left.
+    let broken = f.fail_next().await;
+    let evaluations = f.store.evaluations_of_day(started[0].stage_day).await.unwrap();
+    assert_eq!(evaluations.len(), 2, "the rerun is queued");
     f.later(3600);
     f.store.end_overdue_days(f.now).await.unwrap();
     let (day, finished) = f.store.days().await.unwrap()[0];
@@ -236,8 +236,8 @@ async fn an_overdue_day_of_which_nothing_is_left_but_shards_is_released_at_once(
         f.state(broken).await,
         EvaluationState::PlatformFailed { .. }
     ));
-    let again = f.store.evaluations_of_day(day.of).await.unwrap();
-    let not_played = again.iter().find(|one| one.id != broken).unwrap();
+    let evaluations = f.store.evaluations_of_day(day.stage_day).await.unwrap();
+    let not_played = evaluations.iter().find(|one| one.id != broken).unwrap();
     assert!(matches!(
         not_played.state,
         EvaluationState::NotPlayed { .. }
@@ -246,8 +246,8 @@ async fn an_overdue_day_of_which_nothing_is_left_but_shards_is_released_at_once(
 }
 
 #[tokio::test]
-async fn what_a_closed_stage_has_cut_goes_on_to_its_deadline_and_no_further() {
-    let mut f = Fixture::new().await;
+async fn closed_stage_continues_its_day_until_the_deadline() {
+    let mut f = TestStore::new().await;
     f.ready_team("Alpha").await;
     let stage = daily(&f, DayDeadline::NextCut).await;
     let closing = StageChange {
@@ -261,22 +261,22 @@ async fn what_a_closed_stage_has_cut_goes_on_to_its_deadline_and_no_further() {
     start(&f, stage).await;
     f.later(4 * 3600);
     assert_eq!(f.store.end_overdue_days(f.now).await.unwrap(), []);
-    play_one(&f).await;
+    run_shard(&f).await;
     f.later(20 * 3600);
     let ended = f.store.end_overdue_days(f.now).await.unwrap();
-    assert_eq!(ended.len(), 1, "its next cut would have been now");
+    assert_eq!(ended.len(), 1, "its next cutoff would have been now");
     assert!(f.claim().await.is_none());
     let none = f.store.start_scheduled_day(stage, f.now).await.unwrap();
     assert_eq!(none, None);
 }
 
 #[tokio::test]
-async fn a_deadline_follows_the_stages_settings_and_never_into_the_past() {
-    let mut f = Fixture::new().await;
+async fn deadline_follows_settings_but_never_into_the_past() {
+    let mut f = TestStore::new().await;
     f.ready_team("Alpha").await;
     let stage = daily(&f, DayDeadline::NextCut).await;
     start(&f, stage).await;
-    let change = async |f: &Fixture, day_deadline| {
+    let change = async |f: &TestStore, day_deadline| {
         let settings = f.store.stage(stage).await.unwrap().settings;
         let wanted = StageChange {
             settings: Some(StageSettings {
@@ -289,16 +289,16 @@ async fn a_deadline_follows_the_stages_settings_and_never_into_the_past() {
             .change_stage(Actor::Organiser, stage, wanted, f.now)
             .await
     };
-    let deadline = async |f: &Fixture| f.store.days_under_way(stage).await.unwrap()[0].deadline_at;
+    let deadline = async |f: &TestStore| f.store.unreleased_days(stage).await.unwrap()[0].deadline_at;
     f.later(2 * 3600);
     change(&f, DayDeadline::Hours(3)).await.unwrap();
     assert_eq!(deadline(&f).await, Some(at("2026-03-01T13:00:00Z")));
     let Err(StoreError::Conflict(why)) = change(&f, DayDeadline::Hours(2)).await else {
-        panic!("it would have passed")
+        panic!("expected a conflict, since the deadline would have passed")
     };
     assert!(why.contains("2026-03-01T12:00:00Z"), "{why}");
     assert_eq!(deadline(&f).await, Some(at("2026-03-01T13:00:00Z")));
-    // A server that starts with another configuration ends nothing by it.
+    // A server that starts with a changed configuration does not end the day.
     daily(&f, DayDeadline::Hours(2)).await;
     assert_eq!(deadline(&f).await, Some(at("2026-03-01T13:00:00Z")));
     change(&f, DayDeadline::Never).await.unwrap();

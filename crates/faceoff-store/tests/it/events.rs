@@ -1,10 +1,10 @@
-//! What happened is recorded with the change, and told after it.
+//! Events are recorded with the change, and sent to subscribers after it.
 
 use crate::fixture::*;
 use faceoff_store::*;
 use std::collections::BTreeSet;
 
-async fn recorded(f: &Fixture) -> Vec<EventRecord> {
+async fn recorded(f: &TestStore) -> Vec<EventRecord> {
     f.store.events_after(0, 1000).await.unwrap()
 }
 
@@ -20,8 +20,8 @@ fn kinds(records: &[EventRecord]) -> Vec<String> {
 }
 
 #[tokio::test]
-async fn a_submissions_way_to_the_board_is_recorded_step_by_step() {
-    let f = Fixture::new().await;
+async fn events_record_each_step_of_a_submission() {
+    let f = TestStore::new().await;
     let small = RunPlan {
         tasks: vec![faceoff_types::Task::Hit],
         ..plan()
@@ -30,7 +30,7 @@ async fn a_submissions_way_to_the_board_is_recorded_step_by_step() {
     let submission = f.ready_team("Alpha").await;
     let evaluation = f.evaluate(submission.id, &small).await;
     let (claim, _, shard) = f.claim_shard().await;
-    f.play(&claim, &shard, 0).await;
+    f.commit_shard(&claim, &shard, 0).await;
     let (claim, ..) = f.claim_shard().await;
     f.store
         .release_failed(&claim, "disk full", f.now)
@@ -85,19 +85,19 @@ async fn a_submissions_way_to_the_board_is_recorded_step_by_step() {
     assert_eq!(
         records[9].event,
         Event::UnitGivenBack {
-            unit: claim.unit,
+            unit: claim.job,
             failures: 1,
             reason: "disk full".into(),
         }
     );
-    // read on from where one was
+    // continue from a known id
     let later = f.store.events_after(records[6].id, 2).await.unwrap();
     assert_eq!(later, records[7..9]);
 }
 
 #[tokio::test]
-async fn every_end_is_recorded() {
-    let mut f = Fixture::new().await;
+async fn events_record_each_end_of_an_evaluation() {
+    let mut f = TestStore::new().await;
     let alpha = f.ready_team("Alpha").await;
     let small = RunPlan {
         tasks: vec![faceoff_types::Task::Hit],
@@ -112,11 +112,11 @@ async fn every_end_is_recorded() {
         let (claim, _, shard) = f.claim_shard().await;
         match end {
             0 => {
-                f.play(&claim, &shard, 0).await;
+                f.commit_shard(&claim, &shard, 0).await;
                 let (claim, _) = f.claim_scoring().await;
                 f.finish(&claim, 7.0, "d").await;
             }
-            1 => drop(f.play(&claim, &shard, 1).await),
+            1 => drop(f.commit_shard(&claim, &shard, 1).await),
             2 => {
                 let stop =
                     f.store
@@ -149,8 +149,8 @@ async fn every_end_is_recorded() {
 }
 
 #[tokio::test]
-async fn what_fails_changes_nothing_and_tells_nobody() {
-    let f = Fixture::new().await;
+async fn failed_operation_changes_nothing_and_sends_no_event() {
+    let f = TestStore::new().await;
     let submission = f.ready_team("Alpha").await;
     let evaluation = f.evaluate(submission.id, &plan()).await;
     let stop = f
@@ -163,9 +163,9 @@ async fn what_fails_changes_nothing_and_tells_nobody() {
     };
     rerun().await.unwrap();
     let before = recorded(&f).await;
-    let (mut events, mut signal) = (f.store.events(), f.store.work_signal());
+    let (mut events, mut signal) = (f.store.events(), f.store.job_signal());
     signal.mark_unchanged();
-    // it fails after a run was cut and queued
+    // it fails after a run was divided into shards and queued
     assert!(matches!(rerun().await, Err(StoreError::Conflict(_))));
     assert_eq!(recorded(&f).await, before);
     assert!(events.try_recv().is_err());
@@ -173,13 +173,13 @@ async fn what_fails_changes_nothing_and_tells_nobody() {
     for _ in 0..6 {
         f.claim_shard().await;
     }
-    assert!(f.claim().await.is_none(), "nothing of it is queued");
+    assert!(f.claim().await.is_none(), "no job of it is queued");
 }
 
 #[tokio::test]
-async fn waiting_workers_hear_of_new_work_and_pages_of_changes() {
-    let f = Fixture::new().await;
-    let mut signal = f.store.work_signal();
+async fn signals_report_new_jobs_and_changes() {
+    let f = TestStore::new().await;
+    let mut signal = f.store.job_signal();
     let mut events = f.store.events();
     let team = f.team("Alpha").await;
     assert!(!signal.has_changed().unwrap());
@@ -196,24 +196,24 @@ async fn waiting_workers_hear_of_new_work_and_pages_of_changes() {
     assert!(signal.has_changed().unwrap());
     signal.mark_unchanged();
     let (claim, ..) = f.claim_shard().await;
-    f.play(&claim, &shard, 0).await;
-    assert!(!signal.has_changed().unwrap(), "nothing more to claim");
+    f.commit_shard(&claim, &shard, 0).await;
+    assert!(!signal.has_changed().unwrap(), "no new job to claim");
 
-    let told: Vec<_> = std::iter::from_fn(|| events.try_recv().ok()).collect();
+    let sent: Vec<_> = std::iter::from_fn(|| events.try_recv().ok()).collect();
     let in_table = recorded(&f).await;
-    let of_table: Vec<_> = told
+    let records: Vec<_> = sent
         .iter()
         .filter_map(|change| match change {
             Change::Recorded(record) => Some(EventRecord::clone(record)),
             Change::Progress(_) => None,
         })
         .collect();
-    assert_eq!(of_table, in_table, "what is told is what is stored");
+    assert_eq!(records, in_table, "the stored events are sent");
     let subject = Subject::Evaluation(evaluation.id);
-    let progress = told
+    let progress = sent
         .iter()
         .filter(|change| **change == Change::Progress(subject))
         .count();
     assert_eq!(progress, 4, "two claims, a heartbeat and a release");
-    assert_eq!(told.last().unwrap().subject(), subject);
+    assert_eq!(sent.last().unwrap().subject(), subject);
 }

@@ -4,29 +4,29 @@ use crate::fixture::*;
 use faceoff_store::*;
 
 #[tokio::test]
-async fn as_many_faults_as_allowed_are_scored() {
-    let f = Fixture::new().await;
+async fn evaluation_at_fault_limit_is_scored() {
+    let f = TestStore::new().await;
     let submission = f.ready_team("Alpha").await;
     let evaluation = f.evaluate(submission.id, &plan()).await;
     for faults in [2, 1, 0, 0, 0, 0] {
         let (claim, _, shard) = f.claim_shard().await;
-        f.play(&claim, &shard, faults).await;
+        f.commit_shard(&claim, &shard, faults).await;
     }
     assert_eq!(f.state(evaluation.id).await, EvaluationState::Finalising);
 }
 
 #[tokio::test]
-async fn one_fault_more_ends_the_evaluation_without_a_score() {
-    let f = Fixture::new().await;
+async fn evaluation_above_fault_limit_ends_without_score() {
+    let f = TestStore::new().await;
     let submission = f.ready_team("Alpha").await;
     let evaluation = f.evaluate(submission.id, &plan()).await;
     let (first, _, first_shard) = f.claim_shard().await;
     let (running, _, running_shard) = f.claim_shard().await;
     let (third, _, third_shard) = f.claim_shard().await;
-    // committed out of order: the verdict lists them in order of play
-    f.play(&third, &third_shard, 2).await;
+    // committed out of order; the faults are listed in the order of the shards
+    f.commit_shard(&third, &third_shard, 2).await;
     assert!(!f.state(evaluation.id).await.is_over());
-    f.play(&first, &first_shard, 2).await;
+    f.commit_shard(&first, &first_shard, 2).await;
 
     assert_eq!(
         f.state(evaluation.id).await,
@@ -36,7 +36,7 @@ async fn one_fault_more_ends_the_evaluation_without_a_score() {
     let RunFaults { faults, log } = f.store.run_faults(evaluation.run).await.unwrap();
     let places: Vec<_> = faults
         .iter()
-        .map(|fault| (fault.contest, fault.episode))
+        .map(|fault| (fault.agent_task, fault.episode))
         .collect();
     assert_eq!(
         places,
@@ -56,27 +56,27 @@ async fn one_fault_more_ends_the_evaluation_without_a_score() {
             .unwrap()
     );
     assert_eq!(
-        f.play(&running, &running_shard, 0).await,
-        Committed::LeaseLost
+        f.commit_shard(&running, &running_shard, 0).await,
+        CommitOutcome::LeaseLost
     );
     assert!(
         f.claim().await.is_none(),
         "the remaining shards are dropped"
     );
     assert!(f.board().await.is_empty());
-    let again = f
+    let rerun = f
         .store
         .rerun_evaluation(Actor::Organiser, evaluation.id, f.now)
         .await;
     assert!(
-        matches!(again, Err(StoreError::Conflict(_))),
-        "its own fault counts"
+        matches!(rerun, Err(StoreError::Conflict(_))),
+        "agent faults count"
     );
 }
 
 #[tokio::test]
-async fn a_shard_stopped_by_faults_ends_the_evaluation() {
-    let f = Fixture::new().await;
+async fn shard_stopped_by_faults_ends_the_evaluation() {
+    let f = TestStore::new().await;
     let submission = f.ready_team("Alpha").await;
     let strict = RunPlan {
         max_faults: 0,
@@ -89,7 +89,7 @@ async fn a_shard_stopped_by_faults_ends_the_evaluation() {
     stopped.stopped_by_faults = true;
     assert_eq!(
         f.store.commit_shard(&claim, stopped, f.now).await.unwrap(),
-        Committed::Now
+        CommitOutcome::Stored
     );
     assert!(matches!(
         f.state(evaluation.id).await,

@@ -1,4 +1,4 @@
-//! A store in a temporary folder, a clock that tests turn, and shorthands for a competition's steps.
+//! A store in a temporary folder, an adjustable clock, and shorthands for the steps of a competition.
 
 use faceoff_store::*;
 use faceoff_types::*;
@@ -11,13 +11,13 @@ use std::{
 
 pub const LEASE_S: u32 = 15;
 
-pub struct Fixture {
+pub struct TestStore {
     pub store: Store,
     pub folder: tempfile::TempDir,
     pub now: Timestamp,
 }
 
-impl Fixture {
+impl TestStore {
     pub async fn new() -> Self {
         let folder = tempfile::tempdir().unwrap();
         let store = faceoff_testkit::new_store(folder.path()).await;
@@ -69,21 +69,21 @@ impl Fixture {
             .unwrap()
     }
 
-    pub async fn claim(&self) -> Option<Claimed> {
+    pub async fn claim(&self) -> Option<ClaimedJob> {
         self.store.claim("slot 0", LEASE_S, self.now).await.unwrap()
     }
 
-    /// Claims the next unit, which must be a smoke run, and finds the agent valid.
+    /// Claims the next job, which must be a validation run, and reports the agent as valid.
     pub async fn validate(&self) -> Submission {
-        let (claim, submission) = self.claim_smoke().await;
-        let outcome = SmokeOutcome::Valid {
+        let (claim, submission) = self.claim_validation().await;
+        let outcome = ValidationOutcome::Valid {
             runtime: "native".into(),
             agent_name: "striker".into(),
             timing: Vec::new(),
             log: "hello\n".into(),
         };
         self.store
-            .commit_smoke(&claim, outcome, self.now)
+            .commit_validation(&claim, outcome, self.now)
             .await
             .unwrap();
         self.store.submission(submission.id).await.unwrap()
@@ -96,12 +96,12 @@ impl Fixture {
         self.validate().await
     }
 
-    /// The season's first stage, which plays by this plan from now on.
+    /// The season's first stage, with this plan from now on.
     pub async fn stage(&self, plan: &RunPlan) -> StageId {
-        stage_of(&self.store, plan, self.now).await
+        configure_first_stage(&self.store, plan, self.now).await
     }
 
-    /// The board of the season's first stage, by the newest rules with results.
+    /// The board of the season's first stage, for the newest revision with results.
     pub async fn board(&self) -> Vec<BoardRecord> {
         let Some(stage) = self.store.stages().await.unwrap().into_iter().next() else {
             return Vec::new();
@@ -110,7 +110,7 @@ impl Fixture {
         self.store.board(stage.id, revision).await.unwrap()
     }
 
-    /// Starts the day with what all teams have active, unless that was done; the submission's evaluation.
+    /// Starts the day unless it has started already. Returns the submission's evaluation.
     pub async fn evaluate(&self, submission: SubmissionId, plan: &RunPlan) -> Evaluation {
         let stage = self.stage(plan).await;
         match self
@@ -118,62 +118,62 @@ impl Fixture {
             .start_day(Actor::Organiser, stage, self.now)
             .await
         {
-            Ok(_) | Err(StoreError::DayHasCut { .. }) => {}
+            Ok(_) | Err(StoreError::CutoffPassed { .. }) => {}
             Err(error) => panic!("{error}"),
         }
         let today = Zone::UTC.date(self.now);
         let of_day = self.store.evaluations_on(today).await.unwrap();
         let found = of_day.into_iter().rfind(|one| one.submission == submission);
-        found.expect("it was active at the cut")
+        found.expect("it was active at the cutoff")
     }
 
-    /// Plays what comes next in the queue until an evaluation is scored.
+    /// Runs queued jobs until an evaluation is scored.
     pub async fn finish_next(&self) -> EvaluationId {
         loop {
-            let Claimed { claim, work } = self.claim().await.expect("work is queued");
-            match work {
-                Work::Shard { shard, .. } => {
-                    self.play(&claim, &shard, 0).await;
+            let ClaimedJob { claim, job } = self.claim().await.expect("a job is queued");
+            match job {
+                Job::Shard { shard, .. } => {
+                    self.commit_shard(&claim, &shard, 0).await;
                 }
-                Work::Finalise { evaluation, .. } => {
+                Job::Scoring { evaluation, .. } => {
                     self.finish(&claim, 1.0, "d").await;
                     return evaluation;
                 }
-                Work::Smoke { .. } | Work::Game { .. } => {
-                    panic!("expected a shard or a finalisation")
+                Job::Validation { .. } | Job::Game { .. } => {
+                    panic!("expected a shard or a scoring job")
                 }
             }
         }
     }
 
-    /// Plays and scores all that is queued.
-    pub async fn play_to(&self, score: f64) {
-        while let Some(Claimed { claim, work }) = self.claim().await {
-            match work {
-                Work::Shard { shard, .. } => {
-                    self.play(&claim, &shard, 0).await;
+    /// Runs and scores all queued evaluations.
+    pub async fn run_all(&self, score: f64) {
+        while let Some(ClaimedJob { claim, job }) = self.claim().await {
+            match job {
+                Job::Shard { shard, .. } => {
+                    self.commit_shard(&claim, &shard, 0).await;
                 }
-                Work::Finalise { .. } => {
+                Job::Scoring { .. } => {
                     self.finish(&claim, score, "d").await;
                 }
-                Work::Smoke { .. } | Work::Game { .. } => panic!("no upload waits, no game"),
+                Job::Validation { .. } | Job::Game { .. } => panic!("expected no validation run and no game"),
             }
         }
     }
 
-    /// Our fault, as often as it takes to end an evaluation of one shard; its id.
-    pub async fn break_next(&mut self) -> EvaluationId {
+    /// Reports platform faults until an evaluation with one shard has ended. Returns its id.
+    pub async fn fail_next(&mut self) -> EvaluationId {
         let mut broken = None;
         for _ in 0..MAX_ATTEMPTS {
-            let Some(Claimed { claim, work }) = self.claim().await else {
-                panic!("work is queued")
+            let Some(ClaimedJob { claim, job }) = self.claim().await else {
+                panic!("a job is queued")
             };
-            let Work::Shard {
+            let Job::Shard {
                 owner: RunOwner::Evaluation(id),
                 ..
-            } = work
+            } = job
             else {
-                panic!("expected a shard of an evaluation, claimed {work:?}")
+                panic!("expected a shard of an evaluation, claimed {job:?}")
             };
             assert_eq!(*broken.get_or_insert(id), id);
             let failed = self.store.release_failed(&claim, "disk full", self.now);
@@ -185,37 +185,37 @@ impl Fixture {
         broken.expect("it was claimed")
     }
 
-    pub async fn claim_smoke(&self) -> (Claim, Submission) {
+    pub async fn claim_validation(&self) -> (JobClaim, Submission) {
         match self.claim().await {
-            Some(Claimed {
+            Some(ClaimedJob {
                 claim,
-                work: Work::Smoke { submission, .. },
+                job: Job::Validation { submission, .. },
             }) => (claim, submission),
-            other => panic!("expected a smoke run, claimed {other:?}"),
+            other => panic!("expected a validation run, claimed {other:?}"),
         }
     }
 
-    pub async fn claim_shard(&self) -> (Claim, Run, Shard) {
+    pub async fn claim_shard(&self) -> (JobClaim, Run, Shard) {
         match self.claim().await {
-            Some(Claimed {
+            Some(ClaimedJob {
                 claim,
-                work: Work::Shard { run, shard, .. },
+                job: Job::Shard { run, shard, .. },
             }) => (claim, run, shard),
             other => panic!("expected a shard, claimed {other:?}"),
         }
     }
 
-    pub async fn claim_scoring(&self) -> (Claim, EvaluationId) {
+    pub async fn claim_scoring(&self) -> (JobClaim, EvaluationId) {
         match self.claim().await {
-            Some(Claimed {
+            Some(ClaimedJob {
                 claim,
-                work: Work::Finalise { evaluation, .. },
+                job: Job::Scoring { evaluation, .. },
             }) => (claim, evaluation),
-            other => panic!("expected a finalisation, claimed {other:?}"),
+            other => panic!("expected a scoring job, claimed {other:?}"),
         }
     }
 
-    pub async fn finish(&self, claim: &Claim, score: f64, dataset: &str) -> Committed {
+    pub async fn finish(&self, claim: &JobClaim, score: f64, dataset: &str) -> CommitOutcome {
         self.store
             .finish_evaluation(
                 claim,
@@ -228,7 +228,7 @@ impl Fixture {
             .unwrap()
     }
 
-    pub async fn play(&self, claim: &Claim, shard: &Shard, faults: u32) -> Committed {
+    pub async fn commit_shard(&self, claim: &JobClaim, shard: &Shard, faults: u32) -> CommitOutcome {
         self.store
             .commit_shard(claim, commit(shard, faults), self.now)
             .await
@@ -240,10 +240,10 @@ impl Fixture {
     }
 }
 
-/// The first stage of the store's season, which plays by this plan from now on.
-pub async fn stage_of(store: &Store, plan: &RunPlan, now: Timestamp) -> StageId {
-    let (rules, settings) = rules_of(plan);
-    // Open for long, so that a clock may be set back.
+/// The first stage of the store's season, with this plan from now on.
+pub async fn configure_first_stage(store: &Store, plan: &RunPlan, now: Timestamp) -> StageId {
+    let (rules, settings) = rules_and_settings(plan);
+    // Open for a long time, so that tests can set the clock back.
     let since = match store.stages().await.unwrap().is_empty() {
         true => now - SignedDuration::from_hours(24 * 90),
         false => now,
@@ -255,8 +255,8 @@ pub async fn stage_of(store: &Store, plan: &RunPlan, now: Timestamp) -> StageId 
     store.stages().await.unwrap()[0].id
 }
 
-/// What a stage that plays by this plan is told.
-pub fn rules_of(plan: &RunPlan) -> (StageRules, StageSettings) {
+/// Rules and settings of a stage with this plan.
+pub fn rules_and_settings(plan: &RunPlan) -> (StageRules, StageSettings) {
     let rules = StageRules {
         runtimes: None,
         ruleset: Ruleset::CURRENT,
@@ -274,7 +274,7 @@ pub fn rules_of(plan: &RunPlan) -> (StageRules, StageSettings) {
     (rules, settings)
 }
 
-/// What `.sqlx/` holds of each query, and where.
+/// The description of each query in `.sqlx/`, with its path.
 pub fn query_data() -> Vec<(PathBuf, serde_json::Value)> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../.sqlx");
     std::fs::read_dir(folder)
@@ -287,7 +287,7 @@ pub fn query_data() -> Vec<(PathBuf, serde_json::Value)> {
         .collect()
 }
 
-/// What stands for the hash of a dataset's archive.
+/// Placeholder for the hash of a dataset's archive.
 pub fn blake3_of(dataset: &str) -> String {
     blake3::hash(dataset.as_bytes()).to_string()
 }
@@ -323,7 +323,7 @@ pub fn small() -> RunPlan {
     }
 }
 
-/// What a worker that played `shard` commits; its first `faults` episodes ended by an agent fault.
+/// Commit of a worker that ran `shard`; its first `faults` episodes ended by an agent fault.
 pub fn commit(shard: &Shard, faults: u32) -> ShardCommit {
     let outcomes = (shard.first_episode..shard.end_episode)
         .enumerate()
@@ -340,7 +340,7 @@ pub fn commit(shard: &Shard, faults: u32) -> ShardCommit {
 pub fn outcome(task: Task, episode: u32, faulty: bool) -> EpisodeOutcome {
     let fault = faulty.then(|| AgentFault {
         fault: AgentFaultKind::NonFinite,
-        contest: task.into(),
+        agent_task: task.into(),
         episode: Some(episode),
         step: Some(3),
         line: Some("{\"type\":\"act\"}".into()),
@@ -381,16 +381,16 @@ pub fn result(score: f64) -> EvaluationResult {
     }
 }
 
-/// What somebody brings who follows the link of this code. Their token has the code's hash, hashed.
-pub fn joining(code_hash: [u8; 32], name: &str) -> Joining {
-    Joining {
+/// The acceptance of the invitation with this code. The hash of the user's token is the hash of the code's hash.
+pub fn join_request(code_hash: [u8; 32], name: &str) -> JoinRequest {
+    JoinRequest {
         code_hash,
         name: Some(name.parse().unwrap()),
         password: None,
         team: None,
         accepted_terms: None,
         token_hash: *blake3::hash(&code_hash).as_bytes(),
-        token_kind: TokenKind::Key,
+        token_kind: TokenKind::ApiToken,
         token_name: "first".into(),
         token_expires_at: None,
     }

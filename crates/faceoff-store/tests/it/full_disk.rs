@@ -1,4 +1,4 @@
-//! Writes that fail, as they do on a full disk, and what must be as before once they work again.
+//! Failing writes, as on a full disk, and the recovery afterwards.
 
 use crate::fixture::*;
 use faceoff_store::*;
@@ -9,10 +9,10 @@ const ROLLS_BACK: &str = "CREATE TRIGGER full BEFORE INSERT ON teams WHEN NEW.na
                           BEGIN SELECT RAISE(ROLLBACK, 'the disk is full'); END";
 
 #[tokio::test]
-async fn a_write_that_sqlite_rolled_back_does_not_wedge_the_writer() {
-    let f = Fixture::new().await;
-    let mut past_the_store = f.connection().await;
-    past_the_store.execute(ROLLS_BACK).await.unwrap();
+async fn rolled_back_write_does_not_block_the_writer() {
+    let f = TestStore::new().await;
+    let mut connection = f.connection().await;
+    connection.execute(ROLLS_BACK).await.unwrap();
     for attempt in 0..3 {
         let name = "Full".parse().unwrap();
         let failed = f
@@ -27,94 +27,94 @@ async fn a_write_that_sqlite_rolled_back_does_not_wedge_the_writer() {
 }
 
 #[tokio::test]
-async fn a_unit_that_met_a_full_disk_rests_and_has_lost_no_try() {
-    let mut f = Fixture::new().await;
+async fn job_on_full_disk_pauses_without_losing_an_attempt() {
+    let mut f = TestStore::new().await;
     let team = f.team("Alpha").await;
     f.upload(&team).await;
-    // more often than a failing unit, or one whose workers die, is tried
+    // more often than a failing job, or one whose workers die, is attempted
     for _ in 0..60 {
-        let claim = f.claim().await.expect("it has rested").claim;
-        f.store.release_full(&claim, f.now).await.unwrap();
-        assert!(f.claim().await.is_none(), "it rests");
+        let claim = f.claim().await.expect("its pause is over").claim;
+        f.store.release_disk_full(&claim, f.now).await.unwrap();
+        assert!(f.claim().await.is_none(), "the job pauses");
         f.later(10);
     }
     f.validate().await;
 }
 
 #[tokio::test]
-async fn health_tells_of_a_unit_that_never_finds_room_until_it_does() {
-    let mut f = Fixture::new().await;
+async fn health_reports_job_that_repeatedly_lacks_space() {
+    let mut f = TestStore::new().await;
     let team = f.team("Alpha").await;
     f.upload(&team).await;
-    let without_room = async |f: &Fixture| match f.store.health(f.now).await.queue {
-        QueueHealth::Moving { without_room, .. } => without_room,
+    let out_of_space = async |f: &TestStore| match f.store.health(f.now).await.queue {
+        QueueHealth::Running { out_of_space, .. } => out_of_space,
         other => panic!("{other:?}"),
     };
-    for told in [0, 0, 1, 1] {
-        let claim = f.claim().await.expect("it has rested").claim;
-        f.store.release_full(&claim, f.now).await.unwrap();
-        assert_eq!(without_room(&f).await, told);
+    for expected in [0, 0, 1, 1] {
+        let claim = f.claim().await.expect("its pause is over").claim;
+        f.store.release_disk_full(&claim, f.now).await.unwrap();
+        assert_eq!(out_of_space(&f).await, expected);
         f.later(10);
     }
-    // A shutdown says nothing of room.
-    let claim = f.claim().await.expect("it has rested").claim;
+    // A shutdown is no sign of missing space.
+    let claim = f.claim().await.expect("its pause is over").claim;
     f.store.release(&claim, f.now).await.unwrap();
-    assert_eq!(without_room(&f).await, 1);
+    assert_eq!(out_of_space(&f).await, 1);
     f.validate().await;
-    assert_eq!(without_room(&f).await, 0);
+    assert_eq!(out_of_space(&f).await, 0);
 }
 
 #[tokio::test]
-async fn a_lease_that_could_not_be_renewed_is_its_holders_after_the_pause() {
-    let mut f = Fixture::new().await;
+async fn renewed_leases_stay_with_their_holder() {
+    let mut f = TestStore::new().await;
     let team = f.team("Alpha").await;
     f.upload(&team).await;
     let held = f.claim().await.unwrap().claim;
     f.later(10 * i64::from(LEASE_S));
     f.store.renew_all_leases(LEASE_S, f.now).await.unwrap();
-    assert!(f.claim().await.is_none(), "it is taken");
+    assert!(f.claim().await.is_none(), "it is still leased");
     assert!(f.store.heartbeat(&held, 0, LEASE_S, f.now).await.unwrap());
 }
 
 #[tokio::test]
-async fn health_tells_whether_the_queue_moves() {
-    let mut f = Fixture::new().await;
+async fn health_reports_stuck_queue() {
+    let mut f = TestStore::new().await;
     let team = f.team("Alpha").await;
     f.upload(&team).await;
-    let queue = async |f: &Fixture| f.store.health(f.now).await.queue;
-    let just_queued = QueueHealth::Moving {
+    let queue = async |f: &TestStore| f.store.health(f.now).await.queue;
+    let just_queued = QueueHealth::Running {
         running: 0,
         waiting: 1,
-        without_room: 0,
+        out_of_space: 0,
     };
     assert_eq!(queue(&f).await, just_queued);
     let since = f.now;
     f.later(61);
-    let nobody_came = QueueHealth::Stuck { waiting: 1, since };
-    assert_eq!(queue(&f).await, nobody_came);
+    let stuck = QueueHealth::Stuck { waiting: 1, since };
+    assert_eq!(queue(&f).await, stuck);
 
-    f.store.looked_for_work(f.now);
-    assert_eq!(queue(&f).await, just_queued, "somebody looks for work");
+    f.store.record_poll(f.now);
+    assert_eq!(queue(&f).await, just_queued, "a worker polls for jobs");
     f.later(61);
-    assert_eq!(queue(&f).await, nobody_came);
+    assert_eq!(queue(&f).await, stuck);
     let claimed = f.claim().await.unwrap();
-    let running = QueueHealth::Moving {
+    let running = QueueHealth::Running {
         running: 1,
         waiting: 0,
-        without_room: 0,
+        out_of_space: 0,
     };
     assert_eq!(queue(&f).await, running);
     drop(claimed);
 
-    let no_room = Room::new(vec![f.folder.path().to_owned()], u64::MAX);
-    let store = f.store.clone().with_room(no_room);
-    let paused = QueueHealth::Paused { waiting: 0 };
+    let no_space = FreeSpace::new(vec![f.folder.path().to_owned()], u64::MAX);
+    let store = f.store.clone().with_free_space(no_space);
+    let paused = QueueHealth::DiskFull { waiting: 0 };
     assert_eq!(store.health(f.now).await.queue, paused);
 }
 
 #[tokio::test]
-async fn health_tells_that_the_database_cannot_be_written() {
-    let mut f = Fixture::new().await;
+async fn health_reports_unwritable_database() {
+    let mut f = TestStore::new().await;
     assert!(f.store.health(f.now).await.database_writable);
     f.store.close().await;
     f.later(1);

@@ -1,4 +1,4 @@
-//! The database's log stays short, whoever reads.
+//! The database's write-ahead log stays bounded while it is read.
 
 use crate::fixture::*;
 use faceoff_store::*;
@@ -6,36 +6,36 @@ use sqlx::{Executor, SqliteConnection};
 use std::{fs, path::PathBuf, sync::Arc};
 use tokio::{sync::Semaphore, task::JoinSet};
 
-/// What one transaction may add to a log that is being emptied, generously.
+/// Generous bound of what one transaction may add to a log that is being emptied.
 const SLACK_BYTES: u64 = 4 << 20;
 
-fn log_file(f: &Fixture) -> PathBuf {
+fn log_file(f: &TestStore) -> PathBuf {
     f.folder.path().join("faceoff.sqlite3-wal")
 }
 
-fn log_bytes(f: &Fixture) -> u64 {
+fn log_bytes(f: &TestStore) -> u64 {
     fs::metadata(log_file(f)).map_or(0, |found| found.len())
 }
 
-/// Writes half a megabyte: another one each time, since SQLite does not write what is there already.
-async fn write(f: &Fixture, run: faceoff_types::RunId, number: u8) {
+/// Writes half a megabyte, different each time, since SQLite does not write unchanged pages.
+async fn write(f: &TestStore, run: faceoff_types::RunId, number: u8) {
     let text = char::from(b'a' + number % 26).to_string();
     let summary = format!("\"{}\"", text.repeat(512 << 10));
     f.store
-        .keep_episode_summary(run, 1, &summary, f.now)
+        .store_episode_summary(run, 1, &summary, f.now)
         .await
         .unwrap();
 }
 
-/// A run that something can be written of.
-async fn run(f: &Fixture) -> faceoff_types::RunId {
+/// A run to store summaries for.
+async fn run(f: &TestStore) -> faceoff_types::RunId {
     let submission = f.ready_team("Alpha").await;
     f.evaluate(submission.id, &plan()).await.run
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-async fn readers_that_never_pause_do_not_let_the_log_grow() {
-    let f = Fixture::new().await;
+async fn log_stays_bounded_under_constant_reads() {
+    let f = TestStore::new().await;
     let run = run(&f).await;
     let today = f.now.to_zoned(jiff::tz::TimeZone::UTC).date();
     let mut readers = JoinSet::new();
@@ -53,7 +53,7 @@ async fn readers_that_never_pause_do_not_let_the_log_grow() {
     let mut longest = 0;
     // five times the bound
     for number in 0..160 {
-        // between two writes there are always readers
+        // there are reads between any two writes
         reads.acquire_many(4).await.unwrap().forget();
         write(&f, run, number).await;
         longest = longest.max(log_bytes(&f));
@@ -61,13 +61,13 @@ async fn readers_that_never_pause_do_not_let_the_log_grow() {
     readers.shutdown().await;
     assert!(longest > 0, "something was written");
     assert!(
-        longest <= LOG_BOUND_BYTES + SLACK_BYTES,
+        longest <= MAX_LOG_BYTES + SLACK_BYTES,
         "{longest} bytes of log"
     );
 }
 
 /// A read transaction as of another process.
-async fn long_reader(f: &Fixture) -> SqliteConnection {
+async fn long_reader(f: &TestStore) -> SqliteConnection {
     let mut reader = f.connection().await;
     reader.execute("BEGIN").await.unwrap();
     reader.execute("SELECT COUNT(*) FROM events").await.unwrap();
@@ -75,33 +75,33 @@ async fn long_reader(f: &Fixture) -> SqliteConnection {
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-async fn a_log_that_another_process_has_held_is_emptied_when_it_lets_go() {
-    let f = Fixture::new().await;
+async fn log_is_emptied_after_a_long_read_transaction() {
+    let f = TestStore::new().await;
     let run = run(&f).await;
     let mut other = long_reader(&f).await;
     let mut written = 0;
-    while log_bytes(&f) <= LOG_BOUND_BYTES {
+    while log_bytes(&f) <= MAX_LOG_BYTES {
         write(&f, run, written).await;
         written += 1;
         assert!(written < 200, "the reader should hold the log");
     }
     f.store.checkpoint().await.unwrap();
     assert!(
-        log_bytes(&f) > LOG_BOUND_BYTES,
-        "it is held, and nobody waits for long"
+        log_bytes(&f) > MAX_LOG_BYTES,
+        "the log is in use, and the checkpoint does not wait for it"
     );
-    // the reader's state is as it was
+    // the reader ends its transaction
     other.execute("COMMIT").await.unwrap();
-    // one that was begun by the last write may be under way still
-    while log_bytes(&f) > LOG_BOUND_BYTES {
+    // a checkpoint that the last write started may still be running
+    while log_bytes(&f) > MAX_LOG_BYTES {
         f.store.checkpoint().await.unwrap();
         tokio::task::yield_now().await;
     }
 }
 
 #[tokio::test]
-async fn what_is_streamed_holds_no_reader() {
-    let f = Fixture::new().await;
+async fn artifact_streams_hold_no_read_connection() {
+    let f = TestStore::new().await;
     let file = f.folder.path().join("dataset");
     fs::write(&file, vec![7; 1 << 20]).unwrap();
     f.store
@@ -110,7 +110,7 @@ async fn what_is_streamed_holds_no_reader() {
         .await
         .unwrap();
     let mut downloads = Vec::new();
-    // more than there are connections
+    // more than the pool has connections
     for _ in 0..32 {
         downloads.push(f.store.artifacts().read("datasets/a").await.unwrap());
     }
@@ -119,6 +119,6 @@ async fn what_is_streamed_holds_no_reader() {
         write(&f, run, number).await;
     }
     f.store.season().await.unwrap();
-    assert!(log_bytes(&f) <= LOG_BOUND_BYTES + SLACK_BYTES);
+    assert!(log_bytes(&f) <= MAX_LOG_BYTES + SLACK_BYTES);
     drop(downloads);
 }

@@ -1,4 +1,4 @@
-//! Whatever workers do and in whatever order, every shard ends with exactly one committed result.
+//! For any order of worker actions, every shard ends with exactly one committed result.
 
 use crate::fixture::*;
 use faceoff_store::*;
@@ -6,9 +6,9 @@ use faceoff_types::ShardId;
 use proptest::prelude::*;
 use std::collections::HashMap;
 
-/// What a worker may do; the number picks one of the claims ever given, lost ones included.
+/// Action of a worker; the number picks one of all earlier claims, lost ones included.
 #[derive(Debug, Clone)]
-enum Act {
+enum Action {
     Claim,
     Commit(usize),
     Heartbeat(usize),
@@ -18,95 +18,95 @@ enum Act {
     Restart,
 }
 
-fn act() -> impl Strategy<Value = Act> {
+fn action() -> impl Strategy<Value = Action> {
     prop_oneof![
-        6 => Just(Act::Claim),
-        5 => any::<usize>().prop_map(Act::Commit),
-        2 => any::<usize>().prop_map(Act::Heartbeat),
-        2 => any::<usize>().prop_map(Act::Fail),
-        1 => any::<usize>().prop_map(Act::Release),
-        3 => (1..40_i64).prop_map(Act::Wait),
-        1 => Just(Act::Restart),
+        6 => Just(Action::Claim),
+        5 => any::<usize>().prop_map(Action::Commit),
+        2 => any::<usize>().prop_map(Action::Heartbeat),
+        2 => any::<usize>().prop_map(Action::Fail),
+        1 => any::<usize>().prop_map(Action::Release),
+        3 => (1..40_i64).prop_map(Action::Wait),
+        1 => Just(Action::Restart),
     ]
 }
 
 #[derive(Default)]
-struct Played {
-    claims: Vec<Claimed>,
-    /// commits that were told "now", per shard
+struct History {
+    claims: Vec<ClaimedJob>,
+    /// Number of stored commits of each shard.
     commits: HashMap<ShardId, u32>,
 }
 
-impl Played {
-    fn pick(&self, number: usize) -> Option<&Claimed> {
+impl History {
+    fn pick(&self, number: usize) -> Option<&ClaimedJob> {
         self.claims.get(number.checked_rem(self.claims.len())?)
     }
 
-    async fn commit(&mut self, f: &Fixture, number: usize) {
-        let Some(Claimed { claim, work }) = self.pick(number).cloned() else {
+    async fn commit(&mut self, f: &TestStore, number: usize) {
+        let Some(ClaimedJob { claim, job }) = self.pick(number).cloned() else {
             return;
         };
-        match work {
-            Work::Shard { shard, .. } => {
-                if f.play(&claim, &shard, 0).await == Committed::Now {
+        match job {
+            Job::Shard { shard, .. } => {
+                if f.commit_shard(&claim, &shard, 0).await == CommitOutcome::Stored {
                     *self.commits.entry(shard.id).or_default() += 1;
                 }
             }
-            Work::Finalise { .. } => {
+            Job::Scoring { .. } => {
                 f.finish(&claim, 1.0, "d").await;
             }
-            Work::Smoke { .. } | Work::Game { .. } => unreachable!("the only smoke run is over"),
+            Job::Validation { .. } | Job::Game { .. } => unreachable!("the only validation run is over"),
         }
     }
 }
 
-async fn play(acts: Vec<Act>) {
-    let mut f = Fixture::new().await;
+async fn run_actions(actions: Vec<Action>) {
+    let mut f = TestStore::new().await;
     let submission = f.ready_team("Alpha").await;
     let evaluation = f.evaluate(submission.id, &plan()).await;
-    let mut played = Played::default();
-    for act in acts {
-        match act {
-            Act::Claim => {
-                if let Some(work) = f.claim().await {
-                    played.claims.push(work);
+    let mut history = History::default();
+    for action in actions {
+        match action {
+            Action::Claim => {
+                if let Some(claimed) = f.claim().await {
+                    history.claims.push(claimed);
                 }
             }
-            Act::Commit(number) => played.commit(&f, number).await,
-            Act::Heartbeat(number) => {
-                if let Some(Claimed { claim, .. }) = played.pick(number) {
+            Action::Commit(number) => history.commit(&f, number).await,
+            Action::Heartbeat(number) => {
+                if let Some(ClaimedJob { claim, .. }) = history.pick(number) {
                     f.store.heartbeat(claim, 1, LEASE_S, f.now).await.unwrap();
                 }
             }
-            Act::Fail(number) => {
-                if let Some(Claimed { claim, .. }) = played.pick(number) {
+            Action::Fail(number) => {
+                if let Some(ClaimedJob { claim, .. }) = history.pick(number) {
                     f.store
-                        .release_failed(claim, "a fault of ours", f.now)
+                        .release_failed(claim, "a platform fault", f.now)
                         .await
                         .unwrap();
                 }
             }
-            Act::Release(number) => {
-                if let Some(Claimed { claim, .. }) = played.pick(number) {
+            Action::Release(number) => {
+                if let Some(ClaimedJob { claim, .. }) = history.pick(number) {
                     f.store.release(claim, f.now).await.unwrap();
                 }
             }
-            Act::Wait(seconds) => f.later(seconds),
-            Act::Restart => f.store = f.reopen().await,
+            Action::Wait(seconds) => f.later(seconds),
+            Action::Restart => f.store = f.reopen().await,
         }
     }
-    // a healthy worker comes along: whatever happened, the evaluation ends
+    // a healthy worker ends the evaluation in any case
     f.later(3600);
-    while let Some(work) = f.claim().await {
-        played.claims.push(work);
-        played.commit(&f, played.claims.len() - 1).await;
+    while let Some(claimed) = f.claim().await {
+        history.claims.push(claimed);
+        history.commit(&f, history.claims.len() - 1).await;
     }
     let state = f.state(evaluation.id).await;
     let shards = f.store.shards(evaluation.run).await.unwrap();
     match state {
         EvaluationState::Finished { .. } => {
             for shard in &shards {
-                assert_eq!(played.commits.get(&shard.id), Some(&1), "{shard:?}");
+                assert_eq!(history.commits.get(&shard.id), Some(&1), "{shard:?}");
                 assert!(shard.recording.is_some());
             }
             assert_eq!(f.store.outcomes(evaluation.run).await.unwrap().len(), 12);
@@ -115,7 +115,7 @@ async fn play(acts: Vec<Act>) {
             assert!(
                 shards
                     .iter()
-                    .all(|s| played.commits.get(&s.id).is_none_or(|n| *n == 1))
+                    .all(|s| history.commits.get(&s.id).is_none_or(|n| *n == 1))
             );
         }
         other => panic!("the evaluation is stuck: {other:?}"),
@@ -126,8 +126,8 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 40, failure_persistence: None, ..Default::default() })]
 
     #[test]
-    fn every_shard_is_committed_once(acts in prop::collection::vec(act(), 0..60)) {
+    fn shards_are_committed_exactly_once(actions in prop::collection::vec(action(), 0..60)) {
         let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().unwrap();
-        runtime.block_on(play(acts));
+        runtime.block_on(run_actions(actions));
     }
 }

@@ -1,4 +1,4 @@
-//! `kill -9` in the middle of writes: what was acknowledged is there, and nothing is half there.
+//! `kill -9` during writes: acknowledged writes survive, and no write is partial.
 
 use crate::fixture::*;
 use faceoff_store::*;
@@ -12,34 +12,34 @@ use std::{
 };
 
 const FOLDER: &str = "FACEOFF_STORE_TEST_FOLDER";
-/// Set: every round ends with clearing away, and is without the organiser's acts upon results, which last long.
+/// If set, every round ends with file removal, and skips the organiser's operations on results, which take long.
 const CLEARS: &str = "FACEOFF_STORE_TEST_CLEARS";
 
-/// Writes until it is killed, telling of every acknowledged write. Started by the test below.
+/// Writes until it is killed, and prints every acknowledged write. Started by the tests below.
 #[tokio::test]
-#[ignore = "the child process of survives_kill_9"]
-async fn child() {
+#[ignore = "the child process of the tests below"]
+async fn child_process_writes_until_killed() {
     let Ok(folder) = std::env::var(FOLDER) else {
         return;
     };
     let folder = Path::new(&folder);
     let clears = std::env::var_os(CLEARS).is_some();
     let store = Store::open(folder).await.unwrap();
-    // a day of its own for each round, and leases of earlier lives are over
+    // each round has its own day, and leases of earlier processes have expired
     let mut now: jiff::Timestamp = "2026-03-01T10:00:00Z".parse().unwrap();
     let small = RunPlan {
         episodes_per_task: 2,
         episodes_per_shard: 1,
         ..plan()
     };
-    let stage = stage_of(&store, &small, now).await;
+    let stage = configure_first_stage(&store, &small, now).await;
     if let Some(newest) = store.newest_day(stage).await.unwrap() {
-        now = now.max(newest.cut_at);
+        now = now.max(newest.cutoff_at);
     }
     let file = tempfile::NamedTempFile::new().unwrap();
-    // longer than one write, so that a kill can hit its middle
+    // larger than one write, so that a kill can interrupt it
     std::fs::write(file.path(), vec![b'x'; 300_000]).unwrap();
-    let tell = |text: String| {
+    let report = |text: String| {
         let mut out = std::io::stdout().lock();
         writeln!(out, "\n{text}")
             .and_then(|()| out.flush())
@@ -47,7 +47,7 @@ async fn child() {
     };
     let run = uuid::Uuid::now_v7();
     for round in 0.. {
-        sign_off(&store, &format!("s {} {round}", run.simple()), now, &tell).await;
+        sign_off(&store, &format!("s {} {round}", run.simple()), now, &report).await;
         let mut token_hash = [0; 32];
         token_hash[..16].copy_from_slice(uuid::Uuid::now_v7().as_bytes());
         let name: TeamName = format!("t {} {round}", run.simple()).parse().unwrap();
@@ -55,12 +55,12 @@ async fn child() {
             .create_team(Actor::Organiser, &name, token_hash, now)
             .await
             .unwrap();
-        tell(format!("team {}", team.id));
-        // A person joins, and another leaves: each is done or not done.
+        report(format!("team {}", team.id));
+        // A user joins, and in every second round leaves: each is atomic.
         let code = *blake3::hash(&token_hash).as_bytes();
         let invitation = NewInvitation {
             code_hash: code,
-            invited_as: InvitedAs::Member(team.id),
+            role: InvitationRole::Member(team.id),
             note: "a test".into(),
             expires_at: now + jiff::SignedDuration::from_hours(1),
         };
@@ -68,15 +68,15 @@ async fn child() {
             .invite(Actor::Organiser, invitation, now)
             .await
             .unwrap();
-        let joined = store.join(joining(code, name.as_str()), now).await.unwrap();
-        tell(format!("joined {}", joined.person.id));
+        let joined = store.join(join_request(code, name.as_str()), now).await.unwrap();
+        report(format!("joined {}", joined.user.id));
         if round % 2 == 1 {
-            let person = joined.person.id;
+            let person = joined.user.id;
             store
-                .remove_person(Actor::Organiser, person, now)
+                .remove_user(Actor::Organiser, person, now)
                 .await
                 .unwrap();
-            tell(format!("left {person}"));
+            report(format!("left {person}"));
         }
         store
             .create_submission(
@@ -90,69 +90,69 @@ async fn child() {
             .unwrap();
         now += jiff::SignedDuration::from_hours(24);
         loop {
-            let Some(Claimed { claim, work }) = store.claim("child", LEASE_S, now).await.unwrap()
+            let Some(ClaimedJob { claim, job }) = store.claim("child", LEASE_S, now).await.unwrap()
             else {
                 break;
             };
-            match work {
-                Work::Smoke { submission, .. } => {
-                    let outcome = SmokeOutcome::Valid {
+            match job {
+                Job::Validation { submission, .. } => {
+                    let outcome = ValidationOutcome::Valid {
                         runtime: "native".into(),
                         agent_name: "a".into(),
                         timing: Vec::new(),
                         log: String::new(),
                     };
-                    store.commit_smoke(&claim, outcome, now).await.unwrap();
-                    tell(format!("valid {}", submission.id));
+                    store.commit_validation(&claim, outcome, now).await.unwrap();
+                    report(format!("valid {}", submission.id));
                     match store.start_day(Actor::Organiser, stage, now).await {
                         Ok(started) => {
                             for evaluation in started {
-                                tell(format!("evaluation {}", evaluation.id));
+                                report(format!("evaluation {}", evaluation.id));
                             }
                         }
-                        Err(StoreError::DayHasCut { .. }) => {}
+                        Err(StoreError::CutoffPassed { .. }) => {}
                         Err(error) => panic!("{error}"),
                     }
                 }
-                Work::Shard { run, shard, .. } => {
+                Job::Shard { run, shard, .. } => {
                     let mut commit = commit(&shard, 0);
                     let recording = claim.recording_key(run.id);
                     let key = format!("{recording}/steps");
                     commit.recording = Some(recording);
                     store.artifacts().put_file(&key, file.path()).await.unwrap();
                     let committed = store.commit_shard(&claim, commit, now).await.unwrap();
-                    assert_eq!(committed, Committed::Now);
-                    tell(format!("shard {}", shard.id));
+                    assert_eq!(committed, CommitOutcome::Stored);
+                    report(format!("shard {}", shard.id));
                 }
-                Work::Game { .. } => panic!("no game is queued"),
-                Work::Finalise { evaluation, .. } => {
+                Job::Game { .. } => panic!("no game is queued"),
+                Job::Scoring { evaluation, .. } => {
                     let key = format!("datasets/{evaluation}/{}.zip", claim.nonce);
                     store.artifacts().put_file(&key, file.path()).await.unwrap();
                     let finished = store
                         .finish_evaluation(&claim, &result(1.0), &key, &blake3_of("d"), now)
                         .await
                         .unwrap();
-                    assert_eq!(finished, Committed::Now);
-                    tell(format!("finished {evaluation}"));
+                    assert_eq!(finished, CommitOutcome::Stored);
+                    report(format!("finished {evaluation}"));
                     if clears {
                         continue;
                     }
-                    // The organiser's acts: each is done or not done.
+                    // The organiser's operations, each of which is atomic.
                     let Ok(played) = store.evaluation(evaluation).await else {
-                        // Of a trial or a proposal.
-                        apply_played(&store, now, &tell).await;
+                        // It belongs to a trial or a proposal.
+                        apply_played(&store, now, &report).await;
                         continue;
                     };
                     if played.extra_for.is_some() {
                         continue;
                     }
                     if played.rerun_of.is_some() {
-                        let again = Reevaluation::Evaluation(evaluation);
+                        let scope = Reevaluation::Evaluation(evaluation);
                         let proposed =
-                            store.propose_reevaluation(Actor::Organiser, again, "why", now);
+                            store.propose_reevaluation(Actor::Organiser, scope, "why", now);
                         match proposed.await {
-                            Ok(proposal) => tell(format!("proposal {}", proposal.id)),
-                            // Its day is under way.
+                            Ok(proposal) => report(format!("proposal {}", proposal.id)),
+                            // Its day is not released.
                             Err(StoreError::Conflict(_)) => {}
                             Err(error) => panic!("{error}"),
                         }
@@ -161,34 +161,34 @@ async fn child() {
                     let team = played.team;
                     let disqualified = store.disqualify_team(Actor::Organiser, team, "a test", now);
                     disqualified.await.unwrap();
-                    tell(format!("disqualified {team}"));
+                    report(format!("disqualified {team}"));
                     let reinstated = store.reinstate_team(Actor::Organiser, team, "done", now);
                     reinstated.await.unwrap();
                     let voided = store.void_evaluation(Actor::Organiser, evaluation, "why", now);
                     voided.await.unwrap();
-                    tell(format!("voided {evaluation}"));
+                    report(format!("voided {evaluation}"));
                     let rerun = store.rerun_evaluation(Actor::Organiser, evaluation, now);
-                    tell(format!("evaluation {}", rerun.await.unwrap().id));
-                    organise(&store, stage, played.of, now, &tell).await;
+                    report(format!("evaluation {}", rerun.await.unwrap().id));
+                    organise(&store, stage, played.stage_day, now, &report).await;
                 }
             }
         }
         if clears {
-            clear_away(&store, stage, team.id, now, &tell).await;
+            remove_files(&store, stage, team.id, now, &report).await;
         }
     }
 }
 
-/// The organiser's acts upon boards and days.
+/// The organiser's operations on boards and days.
 async fn organise(
     store: &Store,
     stage: StageId,
     of: StageDay,
     now: jiff::Timestamp,
-    tell: &impl Fn(String),
+    report: &impl Fn(String),
 ) {
-    // A life that was killed may have left them frozen.
-    if store.boards_frozen(stage).await.unwrap().is_none() {
+    // A killed process may have left them frozen.
+    if store.board_freeze(stage).await.unwrap().is_none() {
         let frozen = store.freeze_boards(Actor::Organiser, stage, "why", now);
         frozen.await.unwrap();
     }
@@ -196,13 +196,13 @@ async fn organise(
     unfrozen.await.unwrap();
     let trial = store.propose_trial(Actor::Organiser, stage, None, "why", now);
     let trial = trial.await.unwrap().id;
-    tell(format!("proposal {trial}"));
+    report(format!("proposal {trial}"));
     store
         .drop_proposal(Actor::Organiser, trial, now)
         .await
         .unwrap();
-    tell(format!("dropped {trial}"));
-    // The day before, if nobody has played it; not that of a day that was made up for itself.
+    report(format!("dropped {trial}"));
+    // The day before, if it was missed. Not repeated for a missed day.
     if !store.missed_days().await.unwrap().is_empty() {
         return;
     }
@@ -214,21 +214,21 @@ async fn organise(
     {
         Ok(started) => {
             for evaluation in started {
-                tell(format!("evaluation {}", evaluation.id));
+                report(format!("evaluation {}", evaluation.id));
             }
         }
-        Err(StoreError::DayHasCut { .. } | StoreError::Conflict(_)) => {}
+        Err(StoreError::CutoffPassed { .. } | StoreError::Conflict(_)) => {}
         Err(error) => panic!("{error}"),
     }
 }
 
-/// Keeps the last dataset of each team, and deletes a submission of one that has played nothing.
-async fn clear_away(
+/// Keeps the last dataset of each team, and deletes a submission that was never evaluated.
+async fn remove_files(
     store: &Store,
     stage: StageId,
     team: TeamId,
     now: jiff::Timestamp,
-    tell: &impl Fn(String),
+    report: &impl Fn(String),
 ) {
     let retention = Some(Retention {
         last: Some(1),
@@ -240,57 +240,57 @@ async fn clear_away(
     };
     let changed = store.change_stage(Actor::Organiser, stage, change, now);
     changed.await.unwrap();
-    tell(format!("keeps {stage}"));
+    report(format!("keeps {stage}"));
     store.apply_retentions(now).await.unwrap();
     for team in store.teams().await.unwrap() {
         for evaluation in store.evaluations_of(team.id).await.unwrap() {
             if evaluation.dataset_removed.is_some() {
-                tell(format!("removed {}", evaluation.id));
+                report(format!("removed {}", evaluation.id));
             }
         }
     }
-    // The second one takes the place of the first.
+    // The second submission replaces the first as the active one.
     let quota = UploadQuota::default();
     let mut uploaded = Vec::new();
     for _ in 0..2 {
         let upload = store.create_submission(Actor::Organiser, team, bundle(), &quota, now);
         uploaded.push(upload.await.unwrap().id);
     }
-    while let Some(Claimed { claim, work }) = store.claim("child", LEASE_S, now).await.unwrap() {
-        let Work::Smoke { .. } = work else {
-            panic!("expected a smoke run, claimed {work:?}")
+    while let Some(ClaimedJob { claim, job }) = store.claim("child", LEASE_S, now).await.unwrap() {
+        let Job::Validation { .. } = job else {
+            panic!("expected a validation run, claimed {job:?}")
         };
-        let outcome = SmokeOutcome::Valid {
+        let outcome = ValidationOutcome::Valid {
             runtime: "native".into(),
             agent_name: "b".into(),
             timing: Vec::new(),
             log: String::new(),
         };
-        store.commit_smoke(&claim, outcome, now).await.unwrap();
+        store.commit_validation(&claim, outcome, now).await.unwrap();
     }
     let first = uploaded[0];
     match store
         .delete_submission(Actor::Organiser, first, "by an organiser: why", now)
         .await
     {
-        Ok(_) => tell(format!("deleted {first}")),
-        // A life that was killed has left something to be decided.
+        Ok(_) => report(format!("deleted {first}")),
+        // A killed process has left an undecided proposal.
         Err(StoreError::Conflict(_)) => {}
         Err(error) => panic!("{error}"),
     }
-    let later = now + FILES_KEPT;
+    let later = now + FILES_KEPT_FOR;
     store.remove_files_of_removed(later).await.unwrap();
 }
 
-/// Has proposals that are played count, and replaces what counts then by an extra turn.
-async fn apply_played(store: &Store, now: jiff::Timestamp, tell: &impl Fn(String)) {
-    for (proposal, drafts) in open_proposals(store).await {
-        if !drafts.iter().all(|draft| draft.state.is_over()) {
+/// Applies finished proposals, and then replaces a counting evaluation by an extra one.
+async fn apply_played(store: &Store, now: jiff::Timestamp, report: &impl Fn(String)) {
+    for (proposal, evaluations) in open_proposals(store).await {
+        if !evaluations.iter().all(|evaluation| evaluation.state.is_over()) {
             continue;
         }
         match store.apply_proposal(Actor::Organiser, proposal, now).await {
-            Ok(_) => tell(format!("applied {proposal}")),
-            // A trial that a kill has left.
+            Ok(_) => report(format!("applied {proposal}")),
+            // A trial of a killed process.
             Err(StoreError::Conflict(_)) => {
                 let dropped = store.drop_proposal(Actor::Organiser, proposal, now);
                 dropped.await.unwrap();
@@ -298,27 +298,27 @@ async fn apply_played(store: &Store, now: jiff::Timestamp, tell: &impl Fn(String
             }
             Err(error) => panic!("{error}"),
         }
-        let applied = store.evaluation(drafts[0].id).await.unwrap();
-        let (of, team) = (applied.of, applied.team);
-        let extra = store.extra_turn(Actor::Organiser, of, team, "why", true, now);
-        tell(format!("evaluation {}", extra.await.unwrap().id));
+        let applied = store.evaluation(evaluations[0].id).await.unwrap();
+        let (of, team) = (applied.stage_day, applied.team);
+        let extra = store.add_extra_evaluation(Actor::Organiser, of, team, "why", true, now);
+        report(format!("evaluation {}", extra.await.unwrap().id));
     }
 }
 
-async fn open_proposals(store: &Store) -> Vec<(ProposalId, Vec<Draft>)> {
+async fn open_proposals(store: &Store) -> Vec<(ProposalId, Vec<ProposedEvaluation>)> {
     let mut open = Vec::new();
     for proposal in store.proposals().await.unwrap() {
-        if proposal.settled.is_none() {
-            let (_, drafts) = store.proposal(proposal.id).await.unwrap();
-            open.push((proposal.id, drafts));
+        if proposal.outcome.is_none() {
+            let (_, evaluations) = store.proposal(proposal.id).await.unwrap();
+            open.push((proposal.id, evaluations));
         }
     }
     open
 }
 
-/// A stage of an hour, without a day, from its making to the signature under it.
-async fn sign_off(store: &Store, name: &str, now: jiff::Timestamp, tell: &impl Fn(String)) {
-    let (rules, settings) = rules_of(&small());
+/// Creates a stage of one hour without days, and signs it off.
+async fn sign_off(store: &Store, name: &str, now: jiff::Timestamp, report: &impl Fn(String)) {
+    let (rules, settings) = rules_and_settings(&small());
     let hour = jiff::SignedDuration::from_hours(1);
     let new = NewStage {
         name: name.parse().unwrap(),
@@ -332,49 +332,49 @@ async fn sign_off(store: &Store, name: &str, now: jiff::Timestamp, tell: &impl F
         .create_stage(Actor::Organiser, new, now)
         .await
         .unwrap();
-    let signed = store.finalise_stage(Actor::Organiser, made.id, now + hour);
-    tell(format!("finalised {}", signed.await.unwrap().id));
+    let signed = store.sign_off_stage(Actor::Organiser, made.id, now + hour);
+    report(format!("finalised {}", signed.await.unwrap().id));
 }
 
 #[tokio::test]
-async fn survives_kill_9() {
+async fn store_survives_kill_9() {
     survive(&[1, 3, 5, 8, 2, 13, 4, 21, 7, 17, 6, 30], false).await;
 }
 
 #[tokio::test]
-async fn what_the_organiser_does_survives_kill_9() {
+async fn organiser_operations_survive_kill_9() {
     let acknowledged = survive(&[60, 31, 47, 80], false).await;
-    for what in ["disqualified", "voided", "proposal", "dropped", "applied"] {
-        let told = |write: &String| write.starts_with(what);
-        assert!(acknowledged.iter().any(told), "no life came to {what}");
+    for operation in ["disqualified", "voided", "proposal", "dropped", "applied"] {
+        let is_reported = |write: &String| write.starts_with(operation);
+        assert!(acknowledged.iter().any(is_reported), "no process reached {operation}");
     }
 }
 
 #[tokio::test]
-async fn what_is_cleared_away_survives_kill_9() {
+async fn file_removal_survives_kill_9() {
     let mut acknowledged = HashSet::new();
-    // The first rounds of a folder are short: these kills come in the middle of clearing away.
+    // The first rounds in a folder are short: these kills interrupt the file removal.
     for first in [13, 14, 37, 38, 67] {
         acknowledged.extend(survive(&[first, 25], true).await);
     }
-    for what in ["keeps", "removed", "deleted"] {
-        let told = |write: &String| write.starts_with(what);
-        assert!(acknowledged.iter().any(told), "no life came to {what}");
+    for operation in ["keeps", "removed", "deleted"] {
+        let is_reported = |write: &String| write.starts_with(operation);
+        assert!(acknowledged.iter().any(is_reported), "no process reached {operation}");
     }
 }
 
-/// Lives that are killed after so many lines, on the same folder; all that they told.
-async fn survive(lives: &[usize], clears: bool) -> HashSet<String> {
+/// Runs processes on the same folder and kills each after the given number of lines. Returns all reported writes.
+async fn survive(kill_after_lines: &[usize], clears: bool) -> HashSet<String> {
     let folder = tempfile::tempdir().unwrap();
     let mut acknowledged = HashSet::new();
-    // the kill comes while the child writes on; where, differs from life to life
-    for lines_to_live in lives.iter().copied() {
+    // the child continues to write when it is killed, each time at another point
+    for line_count in kill_after_lines.iter().copied() {
         let mut command = Command::new(std::env::current_exe().unwrap());
         if clears {
             command.env(CLEARS, "1");
         }
         let mut child = command
-            .args(["--exact", "kill::child", "--ignored", "--nocapture"])
+            .args(["--exact", "kill::child_process_writes_until_killed", "--ignored", "--nocapture"])
             .env(FOLDER, folder.path())
             .stdout(Stdio::piped())
             .stderr(Stdio::null())
@@ -383,8 +383,8 @@ async fn survive(lives: &[usize], clears: bool) -> HashSet<String> {
         let lines = BufReader::new(child.stdout.take().unwrap())
             .lines()
             .map_while(Result::ok);
-        let told = lines.filter(|line| {
-            line.split_once(' ').is_some_and(|(what, id)| {
+        let reports = lines.filter(|line| {
+            line.split_once(' ').is_some_and(|(operation, id)| {
                 id.parse::<uuid::Uuid>().is_ok()
                     && [
                         "team",
@@ -404,13 +404,13 @@ async fn survive(lives: &[usize], clears: bool) -> HashSet<String> {
                         "removed",
                         "deleted",
                     ]
-                    .contains(&what)
+                    .contains(&operation)
             })
         });
-        let seen: Vec<String> = told.take(lines_to_live).collect();
+        let seen: Vec<String> = reports.take(line_count).collect();
         child.kill().unwrap();
         child.wait().unwrap();
-        assert_eq!(seen.len(), lines_to_live, "the child ended by itself");
+        assert_eq!(seen.len(), line_count, "the child ended before it was killed");
         acknowledged.extend(seen);
 
         let store = Store::open(folder.path()).await.unwrap();
@@ -419,14 +419,14 @@ async fn survive(lives: &[usize], clears: bool) -> HashSet<String> {
         for write in &acknowledged {
             assert!(
                 stored.contains(write),
-                "{write} was acknowledged and is gone"
+                "{write} was acknowledged and is missing"
             );
         }
     }
     acknowledged
 }
 
-/// The writes that the database has, in the child's words.
+/// The writes in the database, as the child reports them.
 async fn stored(folder: &Path) -> HashSet<String> {
     let mut connection = connect(folder).await;
     let rows: Vec<String> = sqlx::query_scalar(
@@ -458,7 +458,7 @@ async fn connect(folder: &Path) -> SqliteConnection {
     SqliteConnection::connect(&url).await.unwrap()
 }
 
-/// What must hold at any time, whoever was killed.
+/// Checks the invariants that must hold after any kill.
 async fn check_consistency(folder: &Path, store: &Store) {
     let mut connection = connect(folder).await;
     let integrity: String = sqlx::query_scalar("PRAGMA integrity_check")
@@ -472,7 +472,7 @@ async fn check_consistency(folder: &Path, store: &Store) {
         .unwrap();
     assert!(orphans.is_empty());
     let rules = [
-        ("a submission without its smoke run",
+        ("a submission without its validation run",
          "SELECT COUNT(*) FROM submissions s WHERE NOT EXISTS
               (SELECT 1 FROM smoke_runs r JOIN units u ON u.id = r.unit_id WHERE r.submission_id = s.id)"),
         ("an evaluation without its contestant or all of its shards",
@@ -483,34 +483,34 @@ async fn check_consistency(folder: &Path, store: &Store) {
         ("a shard committed but not done, or done but not committed",
          "SELECT COUNT(*) FROM shards s JOIN units u ON u.id = s.unit_id
               WHERE (s.committed_at IS NOT NULL) <> (u.state = 'done')"),
-        ("a run played with an open shard, or not played without one",
+        ("a complete run with an open shard, or an incomplete one without",
          "SELECT COUNT(*) FROM runs r WHERE (r.state = 'played')
                  = EXISTS (SELECT 1 FROM shards s WHERE s.run_id = r.id AND s.committed_at IS NULL)"),
-        ("a finalisation too early or missing",
+        ("a scoring job too early or missing",
          "SELECT COUNT(*) FROM evaluations e
               WHERE EXISTS (SELECT 1 FROM finalisations f WHERE f.evaluation_id = e.id)
                  = EXISTS (SELECT 1 FROM shards s WHERE s.run_id = e.run_id AND s.committed_at IS NULL)"),
-        ("a finished evaluation whose finalisation is open",
+        ("a finished evaluation whose scoring job is open",
          "SELECT COUNT(*) FROM evaluations e JOIN finalisations f ON f.evaluation_id = e.id
               JOIN units u ON u.id = f.unit_id WHERE (e.state = 'finished') <> (u.state = 'done')"),
         ("a day that is over and not released",
          "SELECT COUNT(*) FROM days d WHERE d.released_at IS NULL
               AND NOT EXISTS (SELECT 1 FROM evaluations e WHERE e.stage_id = d.stage_id AND e.day = d.day
                               AND e.state = 'open')"),
-        ("a day that is released and not over, but for what is played again",
+        ("a released day with open evaluations other than reruns",
          "SELECT COUNT(*) FROM days d WHERE d.released_at IS NOT NULL
               AND EXISTS (SELECT 1 FROM evaluations e WHERE e.stage_id = d.stage_id AND e.day = d.day
                           AND e.state = 'open' AND e.rerun_of IS NULL AND e.extra_for IS NULL)"),
-        ("a valid submission of a team that has none active",
+        ("a valid submission of a team without an active one",
          "SELECT COUNT(*) FROM submissions s WHERE s.state = 'valid'
               AND NOT EXISTS (SELECT 1 FROM active_submissions a WHERE a.team_id = s.team_id)"),
-        ("somebody who joined without a link or a token, or left with one that is good",
+        ("a user who joined without an invitation or a token, or left with a valid one",
          "SELECT COUNT(*) FROM people p
               WHERE (SELECT COUNT(*) FROM invitations i WHERE i.accepted_by = p.id) <> 1
                  OR (SELECT COUNT(*) FROM tokens t WHERE t.person_id = p.id) <> 1
                  OR (p.left_at IS NULL) <> EXISTS (SELECT 1 FROM tokens t WHERE t.person_id = p.id
                                                    AND t.revoked_at IS NULL)"),
-        ("an invitation, a person, or their leaving without its event",
+        ("an invitation, a user, or a departure without its event",
          "SELECT (SELECT COUNT(*) FROM invitations) + (SELECT COUNT(*) FROM people)
                + (SELECT COUNT(*) FROM people WHERE left_at IS NOT NULL)
                - (SELECT COUNT(*) FROM events WHERE kind IN ('invited', 'person_joined', 'person_left'))"),
@@ -519,14 +519,14 @@ async fn check_consistency(folder: &Path, store: &Store) {
                + (SELECT COUNT(*) FROM teams WHERE disqualified_at IS NOT NULL)
                - (SELECT COUNT(*) FROM events WHERE kind IN ('evaluation_voided', 'team_disqualified'))
                + (SELECT COUNT(*) FROM events WHERE kind = 'team_reinstated')"),
-        ("a proposal without its drafts, or half settled",
+        ("a proposal without evaluations, or half applied",
          "SELECT COUNT(*) FROM proposals p
               WHERE NOT EXISTS (SELECT 1 FROM drafts d WHERE d.proposal_id = p.id)
                  OR (p.outcome IS NOT NULL AND EXISTS
                      (SELECT 1 FROM drafts d WHERE d.proposal_id = p.id AND d.state = 'open'))
                  OR (p.outcome IS 'applied') <> EXISTS
                      (SELECT 1 FROM drafts d JOIN evaluations e ON e.id = d.id WHERE d.proposal_id = p.id)"),
-        ("an act without its event",
+        ("an operation without its event",
          "SELECT (SELECT COUNT(*) FROM evaluations WHERE extra_for IS NOT NULL AND rerun_of IS NULL)
                + (SELECT COUNT(*) FROM days WHERE missed_for IS NOT NULL)
                + (SELECT COUNT(*) FROM proposals) + (SELECT COUNT(*) FROM proposals WHERE outcome IS NOT NULL)
@@ -534,13 +534,13 @@ async fn check_consistency(folder: &Path, store: &Store) {
                - (SELECT COUNT(*) FROM events WHERE kind IN ('extra_turn_given', 'missed_day_started', 'proposal_made',
                                                              'proposal_applied', 'proposal_dropped', 'boards_frozen'))
                + (SELECT COUNT(*) FROM events WHERE kind = 'boards_unfrozen')"),
-        ("what was removed without its event",
+        ("a removal without its event",
          "SELECT (SELECT COUNT(*) FROM submissions WHERE bundle_removed_for IS NOT NULL)
                + (SELECT COUNT(*) FROM evaluations WHERE dataset_removed_at IS NOT NULL)
                + (SELECT COUNT(*) FROM stage_retentions)
                - (SELECT COUNT(*) FROM events WHERE kind IN ('submission_deleted', 'archive_removed', 'dataset_removed',
                                                              'stage_retention_changed'))"),
-        ("a signature without its event",
+        ("a sign-off without its event",
          "SELECT (SELECT COUNT(*) FROM stages WHERE finalised_at IS NOT NULL)
                - (SELECT COUNT(*) FROM events WHERE kind = 'stage_finalised')"),
         ("a change without its event",
@@ -563,10 +563,10 @@ async fn check_consistency(folder: &Path, store: &Store) {
     .fetch_all(&mut connection)
     .await
     .unwrap();
-    for (dataset, is_promised, is_gone) in datasets {
-        let is_there = store.artifacts().read(&dataset).await.is_ok();
-        assert!(is_there || !is_promised, "{dataset} is promised and gone");
-        assert!(!is_there || !is_gone, "{dataset} has gone and is there");
+    for (dataset, is_available, is_deleted) in datasets {
+        let exists = store.artifacts().read(&dataset).await.is_ok();
+        assert!(exists || !is_available, "{dataset} should be available and is missing");
+        assert!(!exists || !is_deleted, "{dataset} is marked as deleted and exists");
     }
     let recordings: Vec<String> =
         sqlx::query_scalar("SELECT recording FROM shards WHERE recording IS NOT NULL")
@@ -579,6 +579,6 @@ async fn check_consistency(folder: &Path, store: &Store) {
             .read(&format!("{recording}/steps"))
             .await
             .unwrap();
-        assert_eq!(bytes, 300_000, "a committed shard's recording is whole");
+        assert_eq!(bytes, 300_000, "a committed shard's recording is complete");
     }
 }

@@ -1,5 +1,5 @@
-//! A data folder of the version before runs and events: rows in every state, brought over by the
-//! migration, read through the store, and worked on to the end.
+//! A data folder of the version before runs and events: rows in every state are migrated, read through
+//! the store, and processed to the end.
 
 use crate::fixture::*;
 use faceoff_store::*;
@@ -13,7 +13,7 @@ use sqlx::{
 use std::{path::Path, str::FromStr};
 use uuid::Uuid;
 
-/// Migrations that the old program had.
+/// Migrations of the old program.
 const OLD: [&str; 4] = [
     "0001_competition.sql",
     "0002_summaries.sql",
@@ -39,7 +39,7 @@ struct Old {
     connection: SqliteConnection,
 }
 
-/// A unit of work in one of its states.
+/// A job in one of its states; the old program called it a work unit.
 #[derive(Clone, Copy)]
 enum Unit {
     Queued,
@@ -83,7 +83,7 @@ impl Old {
     }
 
     /// A team with a submission of the same number.
-    async fn team(&mut self, number: u32, state: &str, smoke: Unit) {
+    async fn team(&mut self, number: u32, state: &str, validation: Unit) {
         let hash = blake3::hash(&number.to_le_bytes()).to_hex();
         let (id, now) = (text(number), MORNING);
         self.run(format!(
@@ -102,7 +102,7 @@ impl Old {
             bundle().blake3
         ))
         .await;
-        self.unit("smoke", smoke, number, "submission_id", &id, number + 900)
+        self.unit("smoke", validation, number, "submission_id", &id, number + 900)
             .await;
     }
 
@@ -156,8 +156,8 @@ impl Old {
         .await;
     }
 
-    /// An evaluation `number` (a hundred, whose shards follow it) of the plan of six shards, of the
-    /// team `number / 100`; the shards of `committed` are, with this many faults each.
+    /// Evaluation `number` (a multiple of 100, followed by its shards) with the plan of six shards, of team
+    /// `number / 100`. The first shards are committed, with the numbers of faults in `committed`.
     async fn evaluation(
         &mut self,
         number: u32,
@@ -238,9 +238,8 @@ impl Old {
         .await;
     }
 
-    /// An ablation `number` (a thousand, whose runs follow it) of the team `number / 1000`; the first
-    /// runs have these units, the others are `rest`. A unit that is done has outcomes, but for
-    /// `stopped`.
+    /// Ablation `number` (a multiple of 1000, followed by its runs) of team `number / 1000`. The first runs
+    /// have the jobs `first`, the others `rest`. Jobs that are done have outcomes, unless `stopped`.
     async fn ablation(
         &mut self,
         number: u32,
@@ -289,7 +288,7 @@ fn old_recording(evaluation: u32, position: u32) -> String {
 
 const OPEN_ENDS: &str = "NULL, NULL, NULL, NULL, NULL, NULL";
 
-/// Everything that an old folder may hold. Teams by what became of them.
+/// A folder of the old program with teams, submissions, evaluations and ablations in all states.
 async fn old_folder(folder: &Path) {
     let mut old = Old::new(folder).await;
     let done = Unit::Done(0);
@@ -362,7 +361,7 @@ async fn old_folder(folder: &Path) {
     )
     .await;
     old.scoring(1700, Unit::Dropped).await;
-    // ablations: open, finished, ended by the agent, ended by us
+    // ablations: open, finished, ended by an agent fault, ended by a platform fault
     let first = [Unit::Done(2), Unit::Leased(1, 0, 1)];
     old.ablation(11_000, "NULL, NULL", &first, Unit::Queued, false)
         .await;
@@ -387,28 +386,28 @@ async fn old_folder(folder: &Path) {
     old.connection.close().await.unwrap();
 }
 
-async fn migrated() -> Fixture {
+async fn migrated() -> TestStore {
     let folder = tempfile::tempdir().unwrap();
     old_folder(folder.path()).await;
     let store = Store::open(folder.path()).await.unwrap();
-    Fixture {
+    TestStore {
         store,
         folder,
-        // leases of the old program run for another hour
+        // leases of the old program last for another hour
         now: "2026-03-01T08:30:00Z".parse().unwrap(),
     }
 }
 
 #[tokio::test]
-async fn every_old_row_is_there_and_says_what_it_said() {
+async fn migration_keeps_all_old_rows() {
     let f = migrated().await;
     let submission = async |number| f.store.submission(id(number)).await.unwrap();
     assert_eq!(submission(1).await.state, SubmissionState::Validating);
-    // The tokens that teams have are good.
+    // The teams' tokens are valid.
     let token = *blake3::hash(&11_u32.to_le_bytes()).as_bytes();
-    let holder = f.store.holder(token, TokenKind::Key, f.now).await.unwrap();
+    let holder = f.store.verify_token(token, TokenKind::ApiToken, f.now).await.unwrap();
     let team = f.store.team(id(11)).await.unwrap();
-    assert_eq!(holder.map(|holder| holder.who), Ok(Who::Team(team)));
+    assert_eq!(holder.map(|holder| holder.principal), Ok(Principal::Team(team)));
     let reason = "no answer".to_owned();
     assert_eq!(
         submission(3).await.state,
@@ -462,7 +461,7 @@ async fn every_old_row_is_there_and_says_what_it_said() {
         assert_eq!(evaluation.state, state, "{number}");
         assert_eq!(evaluation.plan, plan());
         let day = if number == 1400 { (2, 28) } else { (3, 1) };
-        assert_eq!(evaluation.of.date, date(2026, day.0, day.1));
+        assert_eq!(evaluation.stage_day.date, date(2026, day.0, day.1));
         assert_eq!(f.store.shards(evaluation.run).await.unwrap().len(), 6);
     }
     let run = f.store.evaluation(id(1400)).await.unwrap().run;
@@ -473,7 +472,7 @@ async fn every_old_row_is_there_and_says_what_it_said() {
     assert_eq!(summaries[&run], "{\"old\":1}");
     let board = f.board().await;
     assert_eq!((board.len(), board[0].evaluation), (1, id(1400)));
-    // faults and log are those of the shards, which were kept
+    // faults and log are those of the shards, which are kept
     let failed = f.store.evaluation(id(1500)).await.unwrap();
     let RunFaults { faults, log } = f.store.run_faults(failed.run).await.unwrap();
     assert_eq!(faults.len(), 4);
@@ -483,11 +482,11 @@ async fn every_old_row_is_there_and_says_what_it_said() {
     );
 
     let days = [date(2026, 2, 28), date(2026, 3, 1)];
-    // each began with its first evaluation; one is released, of the other three are under way
+    // each day starts with its first evaluation; one is released, the other has three open evaluations
     let stage = f.store.stages().await.unwrap().remove(0).id;
     let day = |date, released_at| Day {
-        of: StageDay { stage, date },
-        cut_at: finished_at,
+        stage_day: StageDay { stage, date },
+        cutoff_at: finished_at,
         deadline_at: None,
         released_at,
     };
@@ -506,7 +505,7 @@ async fn every_old_row_is_there_and_says_what_it_said() {
 }
 
 #[tokio::test]
-async fn what_was_played_is_a_first_stage_with_a_revision_for_each_of_its_rules() {
+async fn migration_creates_first_stage_with_revisions() {
     let folder = tempfile::tempdir().unwrap();
     old_folder(folder.path()).await;
     let file = folder.path().join("faceoff.sqlite3");
@@ -524,12 +523,12 @@ async fn what_was_played_is_a_first_stage_with_a_revision_for_each_of_its_rules(
     assert_eq!(stage.name.as_str(), "Qualifying");
     assert_eq!((stage.names_seeds, stage.configured), (false, true));
     let revisions = store.stage_revisions(stage.id).await.unwrap();
-    let told: Vec<_> = revisions
+    let found: Vec<_> = revisions
         .iter()
         .map(|one| (one.number, one.rules.profile, one.rules.ruleset))
         .collect();
     assert_eq!(
-        told,
+        found,
         [
             (1, Profile::Ideal, Ruleset::First),
             (2, Profile::Evaluation, Ruleset::First)
@@ -539,17 +538,17 @@ async fn what_was_played_is_a_first_stage_with_a_revision_for_each_of_its_rules(
     assert_eq!((revision(1400).await, revision(1100).await), (1, 2));
     assert_eq!(store.board(stage.id, 1).await.unwrap().len(), 1);
 
-    // The same configuration as before, but the ruleset is that of the new program.
-    let (rules, settings) = rules_of(&plan());
+    // The same configuration as before, but with the ruleset of the new program.
+    let (rules, settings) = rules_and_settings(&plan());
     let now = "2026-03-01T08:30:00Z".parse().unwrap();
-    let told = store.configure_stage(rules.clone(), settings, Zone::UTC, now);
-    told.await.unwrap();
+    let configured = store.configure_stage(rules.clone(), settings, Zone::UTC, now);
+    configured.await.unwrap();
     let stage = store.stages().await.unwrap().remove(0);
     assert_eq!((stage.rules.number, stage.rules.rules), (3, rules));
 }
 
 #[tokio::test]
-async fn old_ablations_are_there_run_by_run() {
+async fn migration_splits_old_ablations_into_runs() {
     let f = migrated().await;
     let newest = async |team| f.store.newest_ablation(id(team)).await.unwrap().unwrap();
     let finished_at = jiff::Timestamp::from_millisecond(MORNING + 9000).unwrap();
@@ -597,11 +596,11 @@ async fn old_ablations_are_there_run_by_run() {
 }
 
 #[tokio::test]
-async fn a_lease_of_the_old_program_holds_and_its_failures_stay_counted() {
+async fn migration_keeps_leases_and_failure_counts() {
     let mut f = migrated().await;
-    // the shard of hit from episode 2 on was leased, with two failures
-    let claim = Claim {
-        unit: id(1202),
+    // the shard of the hit task from episode 2 on is leased, with two failures
+    let claim = JobClaim {
+        job: id(1202),
         nonce: id(51_202),
         worker: "old/slot-0".into(),
         lease_until: f.now,
@@ -611,30 +610,30 @@ async fn a_lease_of_the_old_program_holds_and_its_failures_stay_counted() {
     assert_eq!(
         claim.recording_key(run),
         format!("recordings/{}/{}/{}", text(1200), text(1202), text(51_202)),
-        "where the old program put it"
+        "the key of the old program"
     );
     let shard = f.store.shards(run).await.unwrap().remove(1);
-    assert_eq!(f.play(&claim, &shard, 0).await, Committed::Now);
+    assert_eq!(f.commit_shard(&claim, &shard, 0).await, CommitOutcome::Stored);
 
-    let claim = Claim {
-        unit: id(1203),
+    let claim = JobClaim {
+        job: id(1203),
         nonce: id(51_203),
         ..claim
     };
     let failures = MAX_ATTEMPTS - 2;
     for failure in 1..=failures {
-        let again = if failure == 1 {
+        let repeated = if failure == 1 {
             claim.clone()
         } else {
             loop {
                 let (claim, ..) = f.claim_shard().await;
-                if claim.unit == id::<Uuid>(1203) {
+                if claim.job == id::<Uuid>(1203) {
                     break claim;
                 }
             }
         };
         f.store
-            .release_failed(&again, "no disk", f.now)
+            .release_failed(&repeated, "no disk", f.now)
             .await
             .unwrap();
         f.later(60);
@@ -646,27 +645,27 @@ async fn a_lease_of_the_old_program_holds_and_its_failures_stay_counted() {
 }
 
 #[tokio::test]
-async fn work_goes_on_where_the_old_program_left_it() {
+async fn migrated_queue_continues() {
     let mut f = migrated().await;
     assert!(f.store.end_leases_of("old", f.now).await.unwrap() > 0);
     f.later(3600);
     let secret = Seed::from_bytes(SECRET);
-    let (mut smoke, mut shards, mut of_ablations) = (0, 0, 0);
-    while let Some(Claimed { claim, work }) = f.claim().await {
-        match work {
-            Work::Smoke { submission, .. } => {
-                smoke += 1;
+    let (mut validations, mut shards, mut of_ablations) = (0, 0, 0);
+    while let Some(ClaimedJob { claim, job }) = f.claim().await {
+        match job {
+            Job::Validation { submission, .. } => {
+                validations += 1;
                 assert!([id(1), id(2)].contains(&submission.id));
-                let outcome = SmokeOutcome::Valid {
+                let outcome = ValidationOutcome::Valid {
                     runtime: "native".into(),
                     agent_name: "a".into(),
                     timing: Vec::new(),
                     log: String::new(),
                 };
-                let committed = f.store.commit_smoke(&claim, outcome, f.now).await;
-                assert_eq!(committed.unwrap(), Committed::Now);
+                let committed = f.store.commit_validation(&claim, outcome, f.now).await;
+                assert_eq!(committed.unwrap(), CommitOutcome::Stored);
             }
-            Work::Shard {
+            Job::Shard {
                 owner,
                 run,
                 shard,
@@ -680,7 +679,7 @@ async fn work_goes_on_where_the_old_program_left_it() {
                         assert_eq!(of_ablations, 0, "ablations wait");
                         assert_eq!(seeds.episodes, secret.day(date(2026, 3, 1)));
                     }
-                    RunOwner::Draft { .. } => panic!("there were no proposals"),
+                    RunOwner::ProposedEvaluation { .. } => panic!("there were no proposals"),
                     RunOwner::Ablation(ablation) => {
                         of_ablations += 1;
                         assert_eq!(ablation, id(11_000));
@@ -692,16 +691,16 @@ async fn work_goes_on_where_the_old_program_left_it() {
                 assert_eq!(seeds.mismatch, secret.model_mismatch());
                 assert_eq!(run.keeps_recordings, played.recording.is_some());
                 let committed = f.store.commit_shard(&claim, played, f.now).await;
-                assert_eq!(committed.unwrap(), Committed::Now);
+                assert_eq!(committed.unwrap(), CommitOutcome::Stored);
             }
-            Work::Game { .. } => panic!("no game is queued"),
-            Work::Finalise { recordings, .. } => {
+            Job::Game { .. } => panic!("no game is queued"),
+            Job::Scoring { recordings, .. } => {
                 assert_eq!(recordings.len(), 6);
                 f.finish(&claim, 1.0, "datasets/new.zip").await;
             }
         }
     }
-    assert_eq!((smoke, shards, of_ablations), (2, 6 + 5, 17));
+    assert_eq!((validations, shards, of_ablations), (2, 6 + 5, 17));
     for number in [1100, 1200, 1300] {
         assert!(matches!(
             f.state(id(number)).await,
@@ -711,7 +710,7 @@ async fn work_goes_on_where_the_old_program_left_it() {
     let ablation = f.store.newest_ablation(id(11)).await.unwrap().unwrap();
     assert!(matches!(ablation.state, AblationState::Finished { .. }));
     assert_eq!(f.board().await.len(), 4);
-    // its last evaluation released the day, which has had its cut
+    // the last evaluation released the day, whose cutoff has passed
     assert_eq!(
         f.store
             .newest_day(f.stage(&plan()).await)
@@ -721,17 +720,17 @@ async fn work_goes_on_where_the_old_program_left_it() {
             .released_at,
         Some(f.now)
     );
-    let again = f
+    let repeated = f
         .store
         .start_day(Actor::Organiser, f.stage(&plan()).await, f.now)
         .await;
     assert!(
-        matches!(again, Err(StoreError::DayHasCut { .. })),
-        "{again:?}"
+        matches!(repeated, Err(StoreError::CutoffPassed { .. })),
+        "{repeated:?}"
     );
     let rerun = f.store.rerun_evaluation(Actor::Organiser, id(1600), f.now);
     assert_eq!(rerun.await.unwrap().submission, id(16));
-    // recordings: old ones go a day after their evaluation's end, as new ones do
+    // old recordings are deleted a day after the end of their evaluation, like new ones
     f.later(86_400);
     assert_eq!(f.store.remove_old_recordings(f.now).await.unwrap(), 7);
     let started = f

@@ -1,10 +1,10 @@
-//! Trials and re-evaluations: what is played without counting, until it is applied.
+//! Trials and proposed re-evaluations, which do not count unless they are applied.
 
 use crate::fixture::*;
 use faceoff_store::*;
 use faceoff_types::*;
 
-const WHY: &str = "the camera was dirty";
+const REASON: &str = "the camera was dirty";
 
 #[track_caller]
 fn refused<T: std::fmt::Debug>(done: Result<T, StoreError>, words: &[&str]) {
@@ -16,31 +16,31 @@ fn refused<T: std::fmt::Debug>(done: Result<T, StoreError>, words: &[&str]) {
     }
 }
 
-async fn trial(f: &Fixture, stage: StageId) -> Result<Proposal, StoreError> {
+async fn trial(f: &TestStore, stage: StageId) -> Result<Proposal, StoreError> {
     f.store
-        .propose_trial(Actor::Organiser, stage, None, WHY, f.now)
+        .propose_trial(Actor::Organiser, stage, None, REASON, f.now)
         .await
 }
 
-async fn propose(f: &Fixture, what: Reevaluation) -> Result<Proposal, StoreError> {
+async fn propose(f: &TestStore, scope: Reevaluation) -> Result<Proposal, StoreError> {
     f.store
-        .propose_reevaluation(Actor::Organiser, what, WHY, f.now)
+        .propose_reevaluation(Actor::Organiser, scope, REASON, f.now)
         .await
 }
 
-async fn apply(f: &Fixture, id: ProposalId) -> Result<Proposal, StoreError> {
+async fn apply(f: &TestStore, id: ProposalId) -> Result<Proposal, StoreError> {
     f.store.apply_proposal(Actor::Organiser, id, f.now).await
 }
 
-async fn drop_it(f: &Fixture, id: ProposalId) -> Result<Proposal, StoreError> {
+async fn discard(f: &TestStore, id: ProposalId) -> Result<Proposal, StoreError> {
     f.store.drop_proposal(Actor::Organiser, id, f.now).await
 }
 
-async fn drafts(f: &Fixture, id: ProposalId) -> Vec<Draft> {
+async fn evaluations(f: &TestStore, id: ProposalId) -> Vec<ProposedEvaluation> {
     f.store.proposal(id).await.unwrap().1
 }
 
-async fn rows(f: &Fixture) -> Vec<(String, f64)> {
+async fn rows(f: &TestStore) -> Vec<(String, f64)> {
     let board = f.board().await;
     let row = |row: &BoardRecord| (row.team.name.to_string(), row.result.score);
     board.iter().map(row).collect()
@@ -51,34 +51,34 @@ fn row(name: &str, score: f64) -> (String, f64) {
 }
 
 /// Two teams, each with a result of 1.0 on a released day.
-async fn played_day(f: &Fixture) -> ([Submission; 2], StageDay) {
+async fn played_day(f: &TestStore) -> ([Submission; 2], StageDay) {
     let agents = [f.ready_team("Alpha").await, f.ready_team("Beta").await];
-    let of = f.evaluate(agents[0].id, &small()).await.of;
-    f.play_to(1.0).await;
+    let of = f.evaluate(agents[0].id, &small()).await.stage_day;
+    f.run_all(1.0).await;
     (agents, of)
 }
 
 #[tokio::test]
-async fn a_trial_takes_no_turn_reaches_no_board_and_waits_behind_what_counts() {
-    let mut f = Fixture::new().await;
+async fn trial_runs_last_and_reaches_no_board() {
+    let mut f = TestStore::new().await;
     let agents = [f.ready_team("Alpha").await, f.ready_team("Beta").await];
     let stage = f.stage(&small()).await;
     let tried = trial(&f, stage).await.unwrap();
-    assert_eq!((tried.kind, tried.settled), (ProposalKind::Trial, None));
-    let states: Vec<_> = drafts(&f, tried.id).await;
+    assert_eq!((tried.kind, tried.outcome), (ProposalKind::Trial, None));
+    let states: Vec<_> = evaluations(&f, tried.id).await;
     assert_eq!(states.len(), 2);
     assert!(
         states
             .iter()
             .all(|one| one.state == EvaluationState::Queued)
     );
-    assert!(f.store.days().await.unwrap().is_empty(), "no day has begun");
-    // Both still have their turn, and it comes first.
+    assert!(f.store.days().await.unwrap().is_empty(), "no day has started");
+    // The evaluations of the day run first.
     let day = f.evaluate(agents[0].id, &small()).await;
     for _ in 0..2 {
         let (claim, run, shard) = f.claim_shard().await;
-        assert_eq!(run.seed, SeedLabel::StageDay(day.of));
-        f.play(&claim, &shard, 0).await;
+        assert_eq!(run.seed, SeedLabel::StageDay(day.stage_day));
+        f.commit_shard(&claim, &shard, 0).await;
         let (claim, _) = f.claim_scoring().await;
         f.finish(&claim, 1.0, "d").await;
     }
@@ -86,15 +86,15 @@ async fn a_trial_takes_no_turn_reaches_no_board_and_waits_behind_what_counts() {
     for score in [8.0, 9.0] {
         let (claim, run, shard) = f.claim_shard().await;
         assert_eq!(run.seed, SeedLabel::Trial(tried.id), "episodes of its own");
-        f.play(&claim, &shard, 0).await;
+        f.commit_shard(&claim, &shard, 0).await;
         let (claim, _) = f.claim_scoring().await;
         f.finish(&claim, score, "t").await;
     }
     assert!(f.claim().await.is_none());
-    let scores: Vec<f64> = drafts(&f, tried.id)
+    let scores: Vec<f64> = evaluations(&f, tried.id)
         .await
         .into_iter()
-        .map(|draft| match draft.state {
+        .map(|evaluation| match evaluation.state {
             EvaluationState::Finished { result, .. } => result.score,
             state => panic!("{state:?}"),
         })
@@ -103,12 +103,12 @@ async fn a_trial_takes_no_turn_reaches_no_board_and_waits_behind_what_counts() {
     assert_eq!(rows(&f).await, [row("Alpha", 1.0), row("Beta", 1.0)]);
     for agent in &agents {
         let own = f.store.evaluations_of(agent.team).await.unwrap();
-        assert_eq!(own.len(), 1, "its team sees nothing of it");
+        assert_eq!(own.len(), 1, "the trial is not visible to its team");
     }
-    refused(apply(&f, tried.id).await, &["nothing to apply"]);
-    drop_it(&f, tried.id).await.unwrap();
-    refused(drop_it(&f, tried.id).await, &["was dropped at"]);
-    // Its datasets and its recordings go as those of evaluations do: a day later.
+    refused(apply(&f, tried.id).await, &["cannot be applied"]);
+    discard(&f, tried.id).await.unwrap();
+    refused(discard(&f, tried.id).await, &["was dropped at"]);
+    // Its datasets and recordings are deleted a day later, like those of evaluations.
     assert_eq!(f.store.remove_dropped_datasets(f.now).await.unwrap(), 0);
     f.later(25 * 3600);
     assert_eq!(f.store.remove_dropped_datasets(f.now).await.unwrap(), 2);
@@ -117,29 +117,29 @@ async fn a_trial_takes_no_turn_reaches_no_board_and_waits_behind_what_counts() {
 }
 
 #[tokio::test]
-async fn what_cannot_be_tried_is_refused() {
-    let mut f = Fixture::new().await;
+async fn impossible_trial_is_refused() {
+    let mut f = TestStore::new().await;
     let stage = f.stage(&small()).await;
     refused(trial(&f, stage).await, &["no team has a valid submission"]);
     let team = f.team("Alpha").await;
     let upload = f.upload(&team).await;
     let one = f
         .store
-        .propose_trial(Actor::Organiser, stage, Some(upload.id), WHY, f.now);
+        .propose_trial(Actor::Organiser, stage, Some(upload.id), REASON, f.now);
     refused(one.await, &["valid"]);
     f.validate().await;
     let one = f
         .store
-        .propose_trial(Actor::Organiser, stage, Some(upload.id), WHY, f.now);
+        .propose_trial(Actor::Organiser, stage, Some(upload.id), REASON, f.now);
     let one = one.await.unwrap();
     refused(
         f.store.close_season(Actor::Organiser, f.now).await,
         &["1", "trials"],
     );
-    // Stopped in the middle, and its worker learns of it.
+    // It is dropped while a shard runs, and the worker is notified.
     let (claim, _, shard) = f.claim_shard().await;
-    drop_it(&f, one.id).await.unwrap();
-    assert_eq!(f.play(&claim, &shard, 0).await, Committed::LeaseLost);
+    discard(&f, one.id).await.unwrap();
+    assert_eq!(f.commit_shard(&claim, &shard, 0).await, CommitOutcome::LeaseLost);
     assert!(f.claim().await.is_none());
     let closing = StageChange {
         closes_at: Some(Some(f.now + jiff::SignedDuration::from_secs(1))),
@@ -155,8 +155,8 @@ async fn what_cannot_be_tried_is_refused() {
 }
 
 #[tokio::test]
-async fn a_day_is_evaluated_again_beside_what_counts_until_it_is_applied() {
-    let mut f = Fixture::new().await;
+async fn reevaluation_counts_only_once_applied() {
+    let mut f = TestStore::new().await;
     let (agents, of) = played_day(&f).await;
     let first = f.store.evaluations_of_day(of).await.unwrap();
     let proposed = propose(&f, Reevaluation::Day(of)).await.unwrap();
@@ -164,11 +164,11 @@ async fn a_day_is_evaluated_again_beside_what_counts_until_it_is_applied() {
     refused(apply(&f, proposed.id).await, &["2 of its evaluations"]);
     let mut labels = Vec::new();
     let mut score = 2.0;
-    while let Some(Claimed { claim, work }) = f.claim().await {
-        match work {
-            Work::Shard { run, shard, .. } => {
+    while let Some(ClaimedJob { claim, job }) = f.claim().await {
+        match job {
+            Job::Shard { run, shard, .. } => {
                 labels.push(run.seed);
-                f.play(&claim, &shard, 0).await;
+                f.commit_shard(&claim, &shard, 0).await;
             }
             _ => {
                 f.finish(&claim, score, "again").await;
@@ -183,22 +183,22 @@ async fn a_day_is_evaluated_again_beside_what_counts_until_it_is_applied() {
     f.later(60);
     let frozen = f
         .store
-        .freeze_boards(Actor::Organiser, of.stage, WHY, f.now);
+        .freeze_boards(Actor::Organiser, of.stage, REASON, f.now);
     frozen.await.unwrap();
     refused(apply(&f, proposed.id).await, &["frozen"]);
     let live = f.store.unfreeze_boards(Actor::Organiser, of.stage, f.now);
     live.await.unwrap();
     let applied = apply(&f, proposed.id).await.unwrap();
-    assert_eq!(applied.settled, Some(Settled::Applied(f.now)));
+    assert_eq!(applied.outcome, Some(ProposalOutcome::Applied(f.now)));
     assert_eq!(rows(&f).await, [row("Alpha", 2.0), row("Beta", 3.0)]);
     for (old, agent) in first.iter().zip(&agents) {
         let old = f.store.evaluation(old.id).await.unwrap();
-        let why = format!("evaluated again: {WHY}");
+        let why = format!("evaluated again: {REASON}");
         assert_eq!(old.voided.unwrap().reason, why);
         let own = f.store.evaluations_of(agent.team).await.unwrap();
         let new = own.iter().find(|one| one.voided.is_none()).unwrap();
         assert_eq!(
-            (new.rerun_of, new.of, new.submission),
+            (new.rerun_of, new.stage_day, new.submission),
             (Some(old.id), of, agent.id)
         );
         let EvaluationState::Finished { finished_at, .. } = new.state else {
@@ -207,54 +207,54 @@ async fn a_day_is_evaluated_again_beside_what_counts_until_it_is_applied() {
         assert_eq!(finished_at, f.now, "it counts from now on");
     }
     refused(apply(&f, proposed.id).await, &["was applied at"]);
-    refused(drop_it(&f, proposed.id).await, &["was applied at"]);
+    refused(discard(&f, proposed.id).await, &["was applied at"]);
 }
 
 #[tokio::test]
-async fn a_proposal_whose_place_is_taken_is_refused_whole() {
-    let f = Fixture::new().await;
+async fn proposal_with_voided_original_is_refused_whole() {
+    let f = TestStore::new().await;
     let (agents, of) = played_day(&f).await;
     let proposed = propose(&f, Reevaluation::Day(of)).await.unwrap();
-    f.play_to(2.0).await;
+    f.run_all(2.0).await;
     let of_beta = f.store.evaluations_of(agents[1].team).await.unwrap()[0].id;
     let voided = f
         .store
-        .void_evaluation(Actor::Organiser, of_beta, WHY, f.now);
+        .void_evaluation(Actor::Organiser, of_beta, REASON, f.now);
     voided.await.unwrap();
-    refused(apply(&f, proposed.id).await, &["counts no more"]);
+    refused(apply(&f, proposed.id).await, &["does not count any more"]);
     assert_eq!(
         rows(&f).await,
         [row("Alpha", 1.0)],
-        "nothing of it is applied"
+        "it is not applied in part"
     );
-    // Another proposal has what counts now.
-    drop_it(&f, proposed.id).await.unwrap();
+    // A new proposal covers what counts now.
+    discard(&f, proposed.id).await.unwrap();
     let proposed = propose(&f, Reevaluation::Day(of)).await.unwrap();
-    f.play_to(2.0).await;
+    f.run_all(2.0).await;
     apply(&f, proposed.id).await.unwrap();
     assert_eq!(rows(&f).await, [row("Alpha", 2.0)]);
     refused(
         propose(&f, Reevaluation::Evaluation(of_beta)).await,
-        &["nothing of that counts"],
+        &["no result counts"],
     );
 }
 
 #[tokio::test]
-async fn one_evaluation_is_evaluated_again_with_what_its_agent_does_this_time() {
-    let mut f = Fixture::new().await;
+async fn reevaluation_replaces_result_by_agent_failure() {
+    let mut f = TestStore::new().await;
     let (agents, _) = played_day(&f).await;
     let of_alpha = f.store.evaluations_of(agents[0].team).await.unwrap()[0].id;
     let proposed = propose(&f, Reevaluation::Evaluation(of_alpha))
         .await
         .unwrap();
-    assert_eq!(drafts(&f, proposed.id).await.len(), 1);
+    assert_eq!(evaluations(&f, proposed.id).await.len(), 1);
     let (claim, _, shard) = f.claim_shard().await;
     let stopped = ShardCommit {
         stopped_by_faults: true,
         ..commit(&shard, 1)
     };
     f.store.commit_shard(&claim, stopped, f.now).await.unwrap();
-    let state = drafts(&f, proposed.id).await.remove(0).state;
+    let state = evaluations(&f, proposed.id).await.remove(0).state;
     assert!(
         matches!(state, EvaluationState::AgentFailed { .. }),
         "{state:?}"
@@ -263,10 +263,10 @@ async fn one_evaluation_is_evaluated_again_with_what_its_agent_does_this_time() 
     assert_eq!(
         rows(&f).await,
         [row("Beta", 1.0)],
-        "it has no result any more"
+        "Alpha has no result any more"
     );
 
-    // What we break of a proposal changes nothing.
+    // Platform faults in a proposal change nothing.
     let of_beta = f.store.evaluations_of(agents[1].team).await.unwrap()[0].id;
     let proposed = propose(&f, Reevaluation::Evaluation(of_beta))
         .await
@@ -277,7 +277,7 @@ async fn one_evaluation_is_evaluated_again_with_what_its_agent_does_this_time() 
         failed.await.unwrap();
         f.later(60);
     }
-    let state = drafts(&f, proposed.id).await.remove(0).state;
+    let state = evaluations(&f, proposed.id).await.remove(0).state;
     assert!(
         matches!(state, EvaluationState::PlatformFailed { .. }),
         "{state:?}"
@@ -288,8 +288,8 @@ async fn one_evaluation_is_evaluated_again_with_what_its_agent_does_this_time() 
 }
 
 #[tokio::test]
-async fn other_rules_are_played_on_the_same_episodes_for_their_own_board() {
-    let f = Fixture::new().await;
+async fn reevaluation_by_new_rules_has_its_own_board() {
+    let f = TestStore::new().await;
     let (_, of) = played_day(&f).await;
     refused(
         propose(&f, Reevaluation::Rules(of)).await,
@@ -307,8 +307,8 @@ async fn other_rules_are_played_on_the_same_episodes_for_their_own_board() {
         (run.plan.max_faults, run.seed),
         (9, SeedLabel::StageDay(of))
     );
-    f.play(&claim, &shard, 0).await;
-    f.play_to(5.0).await;
+    f.commit_shard(&claim, &shard, 0).await;
+    f.run_all(5.0).await;
     apply(&f, proposed.id).await.unwrap();
     let scores = async |revision| -> Vec<f64> {
         let board = f.store.board(stage, revision).await.unwrap();
@@ -327,11 +327,11 @@ async fn other_rules_are_played_on_the_same_episodes_for_their_own_board() {
 }
 
 #[tokio::test]
-async fn a_day_under_way_is_not_evaluated_again() {
-    let f = Fixture::new().await;
+async fn open_day_is_not_reevaluated() {
+    let f = TestStore::new().await;
     let agent = f.ready_team("Alpha").await;
-    let of = f.evaluate(agent.id, &small()).await.of;
-    refused(propose(&f, Reevaluation::Day(of)).await, &["under way"]);
+    let of = f.evaluate(agent.id, &small()).await.stage_day;
+    refused(propose(&f, Reevaluation::Day(of)).await, &["not released"]);
     let none = StageDay {
         date: of.date.tomorrow().unwrap(),
         ..of
@@ -341,14 +341,14 @@ async fn a_day_under_way_is_not_evaluated_again() {
         matches!(no_day, Err(StoreError::NotFound("day"))),
         "{no_day:?}"
     );
-    let nothing = propose(&f, Reevaluation::Evaluation(EvaluationId::new())).await;
+    let unknown = propose(&f, Reevaluation::Evaluation(EvaluationId::new())).await;
     assert!(
-        matches!(nothing, Err(StoreError::NotFound("evaluation"))),
-        "{nothing:?}"
+        matches!(unknown, Err(StoreError::NotFound("evaluation"))),
+        "{unknown:?}"
     );
-    let nothing = apply(&f, ProposalId::new()).await;
+    let unknown = apply(&f, ProposalId::new()).await;
     assert!(
-        matches!(nothing, Err(StoreError::NotFound("proposal"))),
-        "{nothing:?}"
+        matches!(unknown, Err(StoreError::NotFound("proposal"))),
+        "{unknown:?}"
     );
 }

@@ -1,10 +1,9 @@
-//! How SQLite goes about the queries: a list that grows with the season must not be scanned for one
-//! row of it.
+//! Query plans: tables that grow with the season must not be scanned.
 
 use crate::fixture::*;
 use sqlx::{Row, SqlSafeStr};
 
-/// What grows with teams × days.
+/// Tables that grow with teams × days.
 const LARGE: [&str; 8] = [
     "evaluations",
     "runs",
@@ -16,7 +15,7 @@ const LARGE: [&str; 8] = [
     "webhook_deliveries",
 ];
 
-/// Indexes of what is open or still kept: a scan of one reads nothing that is over.
+/// Partial indexes of open or still stored rows: a scan of one reads only those.
 const SMALL_INDEXES: [&str; 7] = [
     "units_open",
     "evaluations_open",
@@ -27,26 +26,26 @@ const SMALL_INDEXES: [&str; 7] = [
     "webhook_deliveries_due",
 ];
 
-/// Queries that may read a whole index or table, by words of theirs, each with its reason.
+/// Queries that may read a whole index or table, identified by a fragment, each with its reason.
 const MAY_SCAN: [(&str, &str); 4] = [
     (
         "/* backup */",
-        "a command of its own beside the server, which copies all of it anyway",
+        "a separate command, which copies everything anyway",
     ),
     ("substr(worker, 1", "once at a worker's start"),
     (
         "kind NOT IN ('shard_committed'",
-        "one row: an index of its own ends with it",
+        "one row: it is the last of its own index",
     ),
     (
         "FROM events ORDER BY id DESC LIMIT 1",
-        "one row: the table ends with it",
+        "one row: it is the last of the table",
     ),
 ];
 
 #[tokio::test]
-async fn no_query_scans_a_table_that_grows_with_the_season() {
-    let f = Fixture::new().await;
+async fn queries_do_not_scan_growing_tables() {
+    let f = TestStore::new().await;
     let mut connection = f.connection().await;
     let mut boards = 0;
     for (_, data) in query_data() {
@@ -72,7 +71,7 @@ async fn no_query_scans_a_table_that_grows_with_the_season() {
             }
         }
     }
-    assert_eq!(boards, 1, "the board is among them");
+    assert_eq!(boards, 1, "the board query is checked, too");
 }
 
 /// The table behind an alias of a query (`FROM evaluations e`).

@@ -1,4 +1,4 @@
-//! Claims, leases, commits and our own faults.
+//! Claims, leases, commits and platform faults.
 
 use crate::fixture::*;
 use faceoff_store::*;
@@ -6,8 +6,8 @@ use faceoff_types::{SeedLabel, Task};
 use std::collections::HashSet;
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 4)]
-async fn many_claimers_never_share_a_unit() {
-    let f = Fixture::new().await;
+async fn concurrent_claims_never_share_a_job() {
+    let f = TestStore::new().await;
     let submission = f.ready_team("Alpha").await;
     let plan = RunPlan {
         episodes_per_task: 20,
@@ -25,26 +25,26 @@ async fn many_claimers_never_share_a_unit() {
             };
             let now = f.now;
             tokio::spawn(async move {
-                let mut units = Vec::new();
+                let mut jobs = Vec::new();
                 let worker = format!("slot {index}");
-                while let Some(work) = store.claim(&worker, LEASE_S, now).await.unwrap() {
-                    units.push(work.claim.unit);
+                while let Some(claimed) = store.claim(&worker, LEASE_S, now).await.unwrap() {
+                    jobs.push(claimed.claim.job);
                 }
-                units
+                jobs
             })
         })
         .collect();
-    let mut units = Vec::new();
+    let mut jobs = Vec::new();
     for claimer in claimers {
-        units.extend(claimer.await.unwrap());
+        jobs.extend(claimer.await.unwrap());
     }
-    assert_eq!(units.len(), 60);
-    assert_eq!(units.into_iter().collect::<HashSet<_>>().len(), 60);
+    assert_eq!(jobs.len(), 60);
+    assert_eq!(jobs.into_iter().collect::<HashSet<_>>().len(), 60);
 }
 
 #[tokio::test]
-async fn an_expired_lease_is_leased_again_and_its_holder_told() {
-    let mut f = Fixture::new().await;
+async fn expired_lease_is_reassigned_and_old_holder_refused() {
+    let mut f = TestStore::new().await;
     let submission = f.ready_team("Alpha").await;
     f.evaluate(submission.id, &plan()).await;
     let (first, _, shard) = f.claim_shard().await;
@@ -53,132 +53,132 @@ async fn an_expired_lease_is_leased_again_and_its_holder_told() {
     f.later(i64::from(LEASE_S) - 1);
     let (other, _, second_shard) = f.claim_shard().await;
     assert_ne!(shard.id, second_shard.id, "a renewed lease holds");
-    assert_ne!(first.unit, other.unit);
+    assert_ne!(first.job, other.job);
     f.later(1);
-    let (heir, _, inherited) = f.claim_shard().await;
+    let (successor, _, inherited) = f.claim_shard().await;
     assert_eq!(
-        (heir.unit, &inherited),
-        (first.unit, &shard),
-        "at its end it does not"
+        (successor.job, &inherited),
+        (first.job, &shard),
+        "an expired lease is reassigned"
     );
     assert!(!f.store.heartbeat(&first, 1, LEASE_S, f.now).await.unwrap());
-    assert_eq!(f.play(&first, &shard, 0).await, Committed::LeaseLost);
+    assert_eq!(f.commit_shard(&first, &shard, 0).await, CommitOutcome::LeaseLost);
     f.store.release(&first, f.now).await.unwrap();
     f.store
         .release_failed(&first, "too late", f.now)
         .await
         .unwrap();
     assert!(
-        f.store.heartbeat(&heir, 1, LEASE_S, f.now).await.unwrap(),
-        "the heir is untouched"
+        f.store.heartbeat(&successor, 1, LEASE_S, f.now).await.unwrap(),
+        "the new lease is not affected"
     );
-    assert_eq!(f.play(&heir, &shard, 0).await, Committed::Now);
-    assert_eq!(f.play(&first, &shard, 0).await, Committed::LeaseLost);
+    assert_eq!(f.commit_shard(&successor, &shard, 0).await, CommitOutcome::Stored);
+    assert_eq!(f.commit_shard(&first, &shard, 0).await, CommitOutcome::LeaseLost);
 }
 
 #[tokio::test]
-async fn what_is_played_can_be_left_to_others() {
-    let f = Fixture::new().await;
+async fn job_filter_limits_claims() {
+    let f = TestStore::new().await;
     let submission = f.ready_team("Alpha").await;
     let evaluation = f.evaluate(submission.id, &plan()).await;
     let team = f.team("Beta").await;
     f.upload(&team).await;
-    let claim = async |lot| f.store.claim_of(lot, "slot", LEASE_S, f.now).await.unwrap();
-    let rest = claim(Lot::Rest).await.unwrap();
-    assert!(matches!(rest.work, Work::Smoke { .. }), "{rest:?}");
-    assert!(claim(Lot::Rest).await.is_none(), "shards wait, for others");
-    while let Some(Claimed { claim, work }) = claim(Lot::Plays).await {
-        let Work::Shard { shard, .. } = work else {
+    let claim = async |filter| f.store.claim_matching(filter, "slot", LEASE_S, f.now).await.unwrap();
+    let validation = claim(JobFilter::ValidationAndScoring).await.unwrap();
+    assert!(matches!(validation.job, Job::Validation { .. }), "{validation:?}");
+    assert!(claim(JobFilter::ValidationAndScoring).await.is_none(), "shards are not claimed");
+    while let Some(ClaimedJob { claim, job }) = claim(JobFilter::ShardsAndGames).await {
+        let Job::Shard { shard, .. } = job else {
             panic!("expected a shard");
         };
-        f.play(&claim, &shard, 0).await;
+        f.commit_shard(&claim, &shard, 0).await;
     }
-    let scoring = claim(Lot::Rest).await.unwrap();
+    let scoring = claim(JobFilter::ValidationAndScoring).await.unwrap();
     assert!(
-        matches!(scoring.work, Work::Finalise { evaluation: of, .. } if of == evaluation.id),
+        matches!(scoring.job, Job::Scoring { evaluation: scored, .. } if scored == evaluation.id),
         "{scoring:?}"
     );
 }
 
 #[tokio::test]
-async fn of_those_who_are_given_the_same_order_one_begins() {
-    let mut f = Fixture::new().await;
+async fn lease_transfer_succeeds_for_one_worker() {
+    let mut f = TestStore::new().await;
     let submission = f.ready_team("Alpha").await;
     f.evaluate(submission.id, &plan()).await;
-    let given = f.store.claim("given out", LEASE_S, f.now).await;
-    let Claimed { claim, .. } = given.unwrap().unwrap();
+    let claimed = f.store.claim("reserved", LEASE_S, f.now).await;
+    let ClaimedJob { claim, .. } = claimed.unwrap().unwrap();
     f.later(i64::from(LEASE_S) - 1);
-    let hand_over = async |to: &str| f.store.hand_over(&claim, to, LEASE_S, f.now).await.unwrap();
-    assert!(hand_over("one").await);
-    assert!(!hand_over("another").await);
+    let transfer = async |to: &str| f.store.transfer_lease(&claim, to, LEASE_S, f.now).await.unwrap();
+    assert!(transfer("one").await);
+    assert!(!transfer("another").await);
     assert!(
-        hand_over("one").await,
-        "the same one may ask again: it may not have heard the answer"
+        transfer("one").await,
+        "the same worker can repeat the call, since a response can get lost"
     );
     let store = f.store.clone();
-    let is_held = async || store.is_held(claim.unit, claim.nonce).await.unwrap();
-    assert!(is_held().await);
+    let is_leased = async || store.is_leased(claim.job, claim.nonce).await.unwrap();
+    assert!(is_leased().await);
     assert_eq!(
-        f.store.end_leases_of("given out", f.now).await.unwrap(),
+        f.store.end_leases_of("reserved", f.now).await.unwrap(),
         0,
-        "it is another's now"
+        "another worker holds the lease"
     );
     assert_eq!(
-        f.store.give_back_all_of("given out", f.now).await.unwrap(),
+        f.store.release_leases_of("reserved", f.now).await.unwrap(),
         0,
-        "it is another's now"
+        "another worker holds the lease"
     );
-    // Whoever gave it out is too late to take it back; what nobody has begun goes to the next.
-    let take_back = async |claim: &Claim| f.store.take_back(claim, f.now).await.unwrap();
-    assert!(!take_back(&claim).await);
-    assert!(is_held().await);
-    let given = f.store.claim("given out", LEASE_S, f.now).await;
-    let unbegun = given.unwrap().unwrap().claim;
-    assert!(take_back(&unbegun).await);
-    assert!(!take_back(&unbegun).await, "once");
+    // A started job cannot be released; one that was not started goes to the next claim.
+    let release_unstarted = async |claim: &JobClaim| f.store.release_unstarted(claim, f.now).await.unwrap();
+    assert!(!release_unstarted(&claim).await);
+    assert!(is_leased().await);
+    let claimed = f.store.claim("reserved", LEASE_S, f.now).await;
+    let unstarted = claimed.unwrap().unwrap().claim;
+    assert!(release_unstarted(&unstarted).await);
+    assert!(!release_unstarted(&unstarted).await, "once");
     let next = f.claim().await.unwrap().claim;
-    assert_eq!(next.unit, unbegun.unit);
+    assert_eq!(next.job, unstarted.job);
     f.store.release(&next, f.now).await.unwrap();
-    // With the lease's time anew.
+    // The transfer renewed the lease.
     f.later(i64::from(LEASE_S) - 1);
     let mut others = Vec::new();
     while let Some(other) = f.claim().await {
-        others.push(other.claim.unit);
+        others.push(other.claim.job);
     }
-    assert!(!others.contains(&claim.unit));
+    assert!(!others.contains(&claim.job));
     f.store.release(&claim, f.now).await.unwrap();
-    assert!(!is_held().await);
+    assert!(!is_leased().await);
     assert!(
         !f.store
-            .hand_over(&claim, "late", LEASE_S, f.now)
+            .transfer_lease(&claim, "late", LEASE_S, f.now)
             .await
             .unwrap()
     );
 }
 
 #[tokio::test]
-async fn a_dead_workers_units_are_free_at_once_and_only_those() {
-    let f = Fixture::new().await;
+async fn dead_workers_leases_end_at_once() {
+    let f = TestStore::new().await;
     let submission = f.ready_team("Alpha").await;
     f.evaluate(submission.id, &plan()).await;
     let mut claims = Vec::new();
     for worker in ["dead/slot-0", "dead/slot-1", "deadly/slot-0", "dead"] {
-        let work = f
+        let claimed = f
             .store
             .claim(worker, LEASE_S, f.now)
             .await
             .unwrap()
             .unwrap();
-        claims.push(work.claim.clone());
+        claims.push(claimed.claim.clone());
     }
     assert_eq!(f.store.end_leases_of("dead", f.now).await.unwrap(), 3);
     assert_eq!(f.store.end_leases_of("dead", f.now).await.unwrap(), 0);
-    let mut again = Vec::new();
-    while let Some(work) = f.claim().await {
-        again.push(work.claim.unit);
+    let mut reclaimed = Vec::new();
+    while let Some(claimed) = f.claim().await {
+        reclaimed.push(claimed.claim.job);
     }
-    assert_eq!(again.len(), 5, "three of the dead and two that nobody had");
-    assert!(!again.contains(&claims[2].unit));
+    assert_eq!(reclaimed.len(), 5, "three of the dead worker and two unclaimed ones");
+    assert!(!reclaimed.contains(&claims[2].job));
     assert!(
         f.store
             .heartbeat(&claims[2], 0, LEASE_S, f.now)
@@ -188,26 +188,26 @@ async fn a_dead_workers_units_are_free_at_once_and_only_those() {
 }
 
 #[tokio::test]
-async fn work_finished_after_the_lease_counts_if_nobody_took_the_unit() {
-    let mut f = Fixture::new().await;
+async fn late_commit_counts_without_a_new_lease() {
+    let mut f = TestStore::new().await;
     let submission = f.ready_team("Alpha").await;
     f.evaluate(submission.id, &plan()).await;
     let (claim, _, shard) = f.claim_shard().await;
     f.later(3600);
-    assert_eq!(f.play(&claim, &shard, 0).await, Committed::Now);
+    assert_eq!(f.commit_shard(&claim, &shard, 0).await, CommitOutcome::Stored);
 }
 
 #[tokio::test]
-async fn committing_twice_changes_nothing() {
-    let f = Fixture::new().await;
+async fn second_commit_changes_nothing() {
+    let f = TestStore::new().await;
     let submission = f.ready_team("Alpha").await;
     let evaluation = f.evaluate(submission.id, &plan()).await;
     let (claim, _, shard) = f.claim_shard().await;
-    assert_eq!(f.play(&claim, &shard, 0).await, Committed::Now);
+    assert_eq!(f.commit_shard(&claim, &shard, 0).await, CommitOutcome::Stored);
     let mut other = commit(&shard, 2);
     other.recording = Some("recordings/other".into());
-    let again = f.store.commit_shard(&claim, other, f.now).await.unwrap();
-    assert_eq!(again, Committed::Before);
+    let repeated = f.store.commit_shard(&claim, other, f.now).await.unwrap();
+    assert_eq!(repeated, CommitOutcome::AlreadyStored);
     let stored = f.store.outcomes(evaluation.run).await.unwrap();
     assert_eq!(stored, commit(&shard, 0).outcomes);
     let shards = f.store.shards(evaluation.run).await.unwrap();
@@ -216,8 +216,8 @@ async fn committing_twice_changes_nothing() {
 }
 
 #[tokio::test]
-async fn outcomes_that_do_not_cover_the_shard_are_refused() {
-    let f = Fixture::new().await;
+async fn outcomes_must_cover_tsuccessor_shard() {
+    let f = TestStore::new().await;
     let submission = f.ready_team("Alpha").await;
     let evaluation = f.evaluate(submission.id, &plan()).await;
     let (claim, _, shard) = f.claim_shard().await;
@@ -235,13 +235,13 @@ async fn outcomes_that_do_not_cover_the_shard_are_refused() {
     assert!(f.store.outcomes(evaluation.run).await.unwrap().is_empty());
     assert_eq!(
         f.store.commit_shard(&claim, good, f.now).await.unwrap(),
-        Committed::Now
+        CommitOutcome::Stored
     );
 }
 
 #[tokio::test]
-async fn finalisations_and_then_smoke_runs_come_before_shards_if_all_were_served_alike() {
-    let f = Fixture::new().await;
+async fn scoring_and_validation_precede_shards() {
+    let f = TestStore::new().await;
     let alpha = f.ready_team("Alpha").await;
     let beta = f.ready_team("Beta").await;
     let small = RunPlan {
@@ -252,23 +252,23 @@ async fn finalisations_and_then_smoke_runs_come_before_shards_if_all_were_served
     let first = f.evaluate(alpha.id, &small).await;
     f.evaluate(beta.id, &small).await;
     let (claim, run, shard) = f.claim_shard().await;
-    assert_eq!(run.id, first.run, "evaluations in order");
-    f.play(&claim, &shard, 0).await;
+    assert_eq!(run.id, first.run, "evaluations are run in order");
+    f.commit_shard(&claim, &shard, 0).await;
     let team = f.team("Gamma").await;
     f.upload(&team).await;
     f.claim_scoring().await;
-    f.claim_smoke().await;
+    f.claim_validation().await;
     f.claim_shard().await;
     assert!(f.claim().await.is_none());
 }
 
 #[tokio::test]
-async fn a_unit_given_back_at_a_shutdown_is_free_at_once_and_has_lost_nothing() {
-    let f = Fixture::new().await;
+async fn job_released_at_shutdown_loses_no_attempt() {
+    let f = TestStore::new().await;
     let team = f.team("Alpha").await;
     let submission = f.upload(&team).await;
     for _ in 0..2 * MAX_LEASES {
-        let (claim, _) = f.claim_smoke().await;
+        let (claim, _) = f.claim_validation().await;
         f.store.release(&claim, f.now).await.unwrap();
     }
     let state = f.store.submission(submission.id).await.unwrap().state;
@@ -276,8 +276,8 @@ async fn a_unit_given_back_at_a_shutdown_is_free_at_once_and_has_lost_nothing() 
 }
 
 #[tokio::test]
-async fn our_faults_cost_a_pause_and_after_some_the_evaluation_is_played_again() {
-    let mut f = Fixture::new().await;
+async fn platform_faults_pause_shard_then_rerun_evaluation() {
+    let mut f = TestStore::new().await;
     let submission = f.ready_team("Alpha").await;
     let evaluation = f.evaluate(submission.id, &plan()).await;
     let (victim, _, shard) = f.claim_shard().await;
@@ -288,7 +288,7 @@ async fn our_faults_cost_a_pause_and_after_some_the_evaluation_is_played_again()
     let mut open = Vec::new();
     for _ in 1..6 {
         let (claim, _, other) = f.claim_shard().await;
-        assert_ne!(other.id, shard.id, "the failed shard rests");
+        assert_ne!(other.id, shard.id, "the failed shard pauses");
         open.push(claim);
     }
     assert!(f.claim().await.is_none());
@@ -297,8 +297,8 @@ async fn our_faults_cost_a_pause_and_after_some_the_evaluation_is_played_again()
         for claim in &open {
             assert!(f.store.heartbeat(claim, 0, 1000, f.now).await.unwrap());
         }
-        let (claim, _, again) = f.claim_shard().await;
-        assert_eq!(again.id, shard.id);
+        let (claim, _, repeated) = f.claim_shard().await;
+        assert_eq!(repeated.id, shard.id);
         assert!(
             !f.state(evaluation.id).await.is_over(),
             "before failure {failure}"
@@ -318,20 +318,20 @@ async fn our_faults_cost_a_pause_and_after_some_the_evaluation_is_played_again()
     for claim in &open {
         assert!(!f.store.heartbeat(claim, 0, LEASE_S, f.now).await.unwrap());
     }
-    assert!(f.claim().await.is_none(), "what we broke rests");
+    assert!(f.claim().await.is_none(), "the rerun pauses");
     f.later(i64::from(RERUN_PAUSES_S[0]));
     let (_, run, first) = f.claim_shard().await;
     assert_ne!(run.id, evaluation.run);
     assert_eq!(
         (run.plan, run.seed),
-        (plan(), SeedLabel::StageDay(evaluation.of))
+        (plan(), SeedLabel::StageDay(evaluation.stage_day))
     );
     assert_eq!((first.task, first.first_episode), (Task::Hit, 0));
 }
 
 #[tokio::test]
-async fn what_we_cannot_score_is_played_again() {
-    let mut f = Fixture::new().await;
+async fn failed_scoring_reruns_the_evaluation() {
+    let mut f = TestStore::new().await;
     let submission = f.ready_team("Alpha").await;
     let small = RunPlan {
         tasks: vec![Task::Hit],
@@ -340,14 +340,14 @@ async fn what_we_cannot_score_is_played_again() {
     };
     let evaluation = f.evaluate(submission.id, &small).await;
     let (claim, _, shard) = f.claim_shard().await;
-    f.play(&claim, &shard, 0).await;
+    f.commit_shard(&claim, &shard, 0).await;
     for _ in 0..MAX_ATTEMPTS {
         let (claim, _) = f.claim_scoring().await;
         f.store
             .release_failed(&claim, "no space left", f.now)
             .await
             .unwrap();
-        assert_eq!(f.finish(&claim, 1.0, "d").await, Committed::LeaseLost);
+        assert_eq!(f.finish(&claim, 1.0, "d").await, CommitOutcome::LeaseLost);
         f.later(60);
     }
     assert!(matches!(
@@ -359,12 +359,12 @@ async fn what_we_cannot_score_is_played_again() {
 }
 
 #[tokio::test]
-async fn a_smoke_run_that_we_cannot_do_ends_with_our_excuse() {
-    let mut f = Fixture::new().await;
+async fn failed_validation_run_ends_as_platform_fault() {
+    let mut f = TestStore::new().await;
     let team = f.team("Alpha").await;
     let submission = f.upload(&team).await;
     for _ in 0..MAX_ATTEMPTS {
-        let (claim, submission) = f.claim_smoke().await;
+        let (claim, submission) = f.claim_validation().await;
         assert_eq!(submission.state, SubmissionState::Validating);
         f.store
             .release_failed(&claim, "no cgroup", f.now)
@@ -383,8 +383,8 @@ async fn a_smoke_run_that_we_cannot_do_ends_with_our_excuse() {
 }
 
 #[tokio::test]
-async fn a_unit_that_kills_its_workers_is_given_up() {
-    let mut f = Fixture::new().await;
+async fn job_that_kills_its_workers_is_given_up() {
+    let mut f = TestStore::new().await;
     let submission = f.ready_team("Alpha").await;
     let small = RunPlan {
         tasks: vec![Task::Hit],

@@ -1,4 +1,4 @@
-//! Teams that register, divisions, announcements and questions.
+//! Team registrations, divisions, announcements and questions.
 
 use crate::fixture::*;
 use faceoff_store::*;
@@ -22,7 +22,7 @@ fn words(error: &StoreError, words: &[&str]) {
     }
 }
 
-async fn open(f: &Fixture) {
+async fn open(f: &TestStore) {
     f.store
         .change_season(Actor::Organiser, Some(true), None, f.now)
         .await
@@ -30,8 +30,8 @@ async fn open(f: &Fixture) {
 }
 
 #[tokio::test]
-async fn a_registration_waits_for_the_organisers_and_its_link_with_it() {
-    let f = Fixture::new().await;
+async fn registration_link_is_valid_once_approved() {
+    let f = TestStore::new().await;
     f.team("Alpha").await;
     let register = async |new| f.store.register(new, f.now).await;
     let closed = register(registration(1, "Beta")).await.unwrap_err();
@@ -43,8 +43,8 @@ async fn a_registration_waits_for_the_organisers_and_its_link_with_it() {
     let taken = register(registration(2, "beta")).await;
     assert!(matches!(taken, Err(StoreError::TeamNameTaken(_))));
 
-    let early = f.store.join(joining([1; 32], "Ada"), f.now).await;
-    words(&early.unwrap_err(), &["Beta", "waits for the organisers"]);
+    let early = f.store.join(join_request([1; 32], "Ada"), f.now).await;
+    words(&early.unwrap_err(), &["Beta", "is pending"]);
     let until = f.now + SignedDuration::from_hours(1);
     let (approved, team) = f
         .store
@@ -54,7 +54,7 @@ async fn a_registration_waits_for_the_organisers_and_its_link_with_it() {
     let at = f.now;
     let state = RegistrationState::Approved { at, team: team.id };
     assert_eq!(approved.state, state);
-    let joined = f.store.join(joining([1; 32], "Ada"), f.now).await.unwrap();
+    let joined = f.store.join(join_request([1; 32], "Ada"), f.now).await.unwrap();
     assert_eq!(joined.team, Some(team));
     let twice = f
         .store
@@ -70,26 +70,26 @@ async fn a_registration_waits_for_the_organisers_and_its_link_with_it() {
     };
     refuse().await.unwrap();
     words(&refuse().await.unwrap_err(), &["was refused"]);
-    let refused = f.store.join(joining([3; 32], "Eve"), f.now).await;
+    let refused = f.store.join(join_request([3; 32], "Eve"), f.now).await;
     words(&refused.unwrap_err(), &["refused: full"]);
     register(registration(4, "Gamma")).await.unwrap();
 }
 
 #[tokio::test]
-async fn so_many_registrations_wait() {
-    let f = Fixture::new().await;
+async fn pending_registrations_are_limited() {
+    let f = TestStore::new().await;
     open(&f).await;
-    for number in 0..u8::try_from(MAX_WAITING).unwrap() {
+    for number in 0..u8::try_from(MAX_PENDING_REGISTRATIONS).unwrap() {
         let new = registration(number, &format!("Team {number}"));
         f.store.register(new, f.now).await.unwrap();
     }
     let many = f.store.register(registration(255, "Late"), f.now).await;
-    words(&many.unwrap_err(), &["no more than that"]);
+    words(&many.unwrap_err(), &["which is the limit"]);
 }
 
 #[tokio::test]
-async fn divisions_keep_their_order_and_their_teams() {
-    let f = Fixture::new().await;
+async fn divisions_keep_their_order_and_teams() {
+    let f = TestStore::new().await;
     let names = |names: &[&str]| -> Vec<DivisionName> {
         names.iter().map(|name| name.parse().unwrap()).collect()
     };
@@ -103,7 +103,7 @@ async fn divisions_keep_their_order_and_their_teams() {
     let stored = f.store.divisions().await.unwrap();
     assert_eq!(stored, names(&["Students", "Open"]));
     let twice = set(names(&["Open", "OPEN"])).await.unwrap_err();
-    words(&twice, &["“OPEN” is there twice"]);
+    words(&twice, &["“OPEN” is listed twice"]);
     let mut new = registration(1, "Beta");
     new.profile.division = Some("open".parse().unwrap());
     open(&f).await;
@@ -114,14 +114,14 @@ async fn divisions_keep_their_order_and_their_teams() {
         .approve_registration(Actor::Organiser, beta.id, until, f.now)
         .await
         .unwrap();
-    let inhabited = set(names(&["Students"])).await.unwrap_err();
-    words(&inhabited, &["teams are in “Open”"]);
+    let in_use = set(names(&["Students"])).await.unwrap_err();
+    words(&in_use, &["“Open” has 1 teams"]);
     assert_eq!(f.store.divisions().await.unwrap(), stored);
 }
 
 #[tokio::test]
-async fn everybody_is_told_and_teams_ask() {
-    let mut f = Fixture::new().await;
+async fn announcements_and_questions_are_stored() {
+    let mut f = TestStore::new().await;
     let alpha = f.team("Alpha").await;
     for title in ["first", "second"] {
         f.store
@@ -130,8 +130,8 @@ async fn everybody_is_told_and_teams_ask() {
             .unwrap();
         f.later(1);
     }
-    let told = f.store.announcements(1).await.unwrap();
-    assert_eq!((told.len(), told[0].title.as_str()), (1, "second"));
+    let newest = f.store.announcements(1).await.unwrap();
+    assert_eq!((newest.len(), newest[0].title.as_str()), (1, "second"));
 
     let ask = async || {
         f.store
@@ -142,7 +142,7 @@ async fn everybody_is_told_and_teams_ask() {
     for _ in 1..MAX_OPEN_QUESTIONS {
         ask().await.unwrap();
     }
-    words(&ask().await.unwrap_err(), &["no more than that"]);
+    words(&ask().await.unwrap_err(), &["which is the limit"]);
     for is_public in [false, true] {
         let answered = f
             .store

@@ -3,18 +3,18 @@ use faceoff_store::*;
 use faceoff_types::{EvaluationId, StageDay};
 use jiff::civil::date;
 
-async fn rerun(f: &Fixture, id: EvaluationId) -> Result<Evaluation, StoreError> {
+async fn rerun(f: &TestStore, id: EvaluationId) -> Result<Evaluation, StoreError> {
     f.store.rerun_evaluation(Actor::Organiser, id, f.now).await
 }
 
-async fn released_at(f: &Fixture) -> Option<jiff::Timestamp> {
+async fn released_at(f: &TestStore) -> Option<jiff::Timestamp> {
     let newest = f.store.newest_day(f.stage(&plan()).await).await.unwrap();
-    newest.expect("the day had its cut").released_at
+    newest.expect("the day has started").released_at
 }
 
 #[tokio::test]
-async fn a_day_is_released_by_the_end_of_its_last_evaluation() {
-    let mut f = Fixture::new().await;
+async fn day_is_released_by_its_last_evaluation() {
+    let mut f = TestStore::new().await;
     let submissions = [f.ready_team("alpha").await, f.ready_team("beta").await];
     let mut evaluations = Vec::new();
     for submission in &submissions {
@@ -31,7 +31,7 @@ async fn a_day_is_released_by_the_end_of_its_last_evaluation() {
         None
     );
     f.later(86_400);
-    assert_eq!(released_at(&f).await, None, "a run that outlasts its day");
+    assert_eq!(released_at(&f).await, None, "an evaluation can outlast its day");
     assert_eq!(f.finish_next().await, evaluations[1]);
     let end = f.now;
     f.later(60);
@@ -56,8 +56,8 @@ async fn a_day_is_released_by_the_end_of_its_last_evaluation() {
 }
 
 #[tokio::test]
-async fn the_agents_own_end_and_the_organisers_release_the_day_as_well() {
-    let f = Fixture::new().await;
+async fn day_is_released_by_agent_failure_and_cancellation() {
+    let f = TestStore::new().await;
     let failing = f.ready_team("failing").await;
     let stopped = f.ready_team("stopped").await;
     let strict = RunPlan {
@@ -67,7 +67,7 @@ async fn the_agents_own_end_and_the_organisers_release_the_day_as_well() {
     f.evaluate(failing.id, &strict).await;
     let stopped = f.evaluate(stopped.id, &strict).await.id;
     let (claim, _, shard) = f.claim_shard().await;
-    f.play(&claim, &shard, 1).await;
+    f.commit_shard(&claim, &shard, 1).await;
     assert_eq!(released_at(&f).await, None);
     let stop = f
         .store
@@ -77,27 +77,27 @@ async fn the_agents_own_end_and_the_organisers_release_the_day_as_well() {
 }
 
 #[tokio::test]
-async fn what_we_broke_is_played_again_before_the_release_and_only_so_often() {
-    let mut f = Fixture::new().await;
+async fn platform_faults_rerun_before_release_with_a_limit() {
+    let mut f = TestStore::new().await;
     let submission = f.ready_team("alpha").await;
     let first = f.evaluate(submission.id, &small()).await;
-    // A newer upload and a choice change nothing: the cut's submission plays.
+    // A newer upload does not matter: the submission of the cutoff is rerun.
     f.later(1);
     let team = f.store.team(submission.team).await.unwrap();
     f.upload(&team).await;
     f.validate().await;
-    let mut broken = Vec::new();
+    let mut failed = Vec::new();
     for pause_s in RERUN_PAUSES_S {
-        broken.push(f.break_next().await);
+        failed.push(f.fail_next().await);
         assert_eq!(released_at(&f).await, None);
-        assert!(f.claim().await.is_none(), "it rests");
+        assert!(f.claim().await.is_none(), "the rerun pauses");
         f.later(i64::from(pause_s) - 1);
         assert!(f.claim().await.is_none(), "for {pause_s} s");
         f.later(1);
     }
     let all = f.store.evaluations_of(team.id).await.unwrap();
     assert_eq!(all.len(), 3);
-    assert_eq!(broken, [all[2].id, all[1].id]);
+    assert_eq!(failed, [all[2].id, all[1].id]);
     assert_eq!(first.id, all[2].id);
     assert_eq!(
         (all[1].rerun_of, all[0].rerun_of),
@@ -107,30 +107,30 @@ async fn what_we_broke_is_played_again_before_the_release_and_only_so_often() {
     for evaluation in &all {
         assert_eq!(evaluation.submission, submission.id);
         assert_eq!(
-            (evaluation.of.date, &evaluation.plan),
-            (first.of.date, &first.plan)
+            (evaluation.stage_day.date, &evaluation.plan),
+            (first.stage_day.date, &first.plan)
         );
     }
-    let Some(Claimed {
+    let Some(ClaimedJob {
         claim,
-        work: Work::Shard {
+        job: Job::Shard {
             seeds,
-            bundle: plays,
+            bundle: evaluated,
             ..
         },
     }) = f.claim().await
     else {
-        panic!("the last try is queued")
+        panic!("the last rerun is queued")
     };
     assert_eq!(
         seeds.episodes,
-        secret.stage(first.of.stage).day(first.of.date)
+        secret.stage(first.stage_day.stage).day(first.stage_day.date)
     );
-    assert_eq!(plays, bundle());
+    assert_eq!(evaluated, bundle());
     f.store.release(&claim, f.now).await.unwrap();
 
-    // The last try fails too: the day ends all the same.
-    assert_eq!(f.break_next().await, all[0].id);
+    // The last rerun fails too: the day ends all the same.
+    assert_eq!(f.fail_next().await, all[0].id);
     assert_eq!(released_at(&f).await, Some(f.now));
     f.later(86_400);
     assert!(f.claim().await.is_none());
@@ -138,22 +138,22 @@ async fn what_we_broke_is_played_again_before_the_release_and_only_so_often() {
 }
 
 #[tokio::test]
-async fn a_try_that_succeeds_releases_the_day() {
-    let mut f = Fixture::new().await;
+async fn successful_rerun_releases_the_day() {
+    let mut f = TestStore::new().await;
     let submission = f.ready_team("alpha").await;
     f.evaluate(submission.id, &small()).await;
-    let broken = f.break_next().await;
+    let failed = f.fail_next().await;
     f.later(i64::from(RERUN_PAUSES_S[0]));
     let finished = f.finish_next().await;
     let finished = f.store.evaluation(finished).await.unwrap();
-    assert_eq!(finished.rerun_of, Some(broken));
+    assert_eq!(finished.rerun_of, Some(failed));
     assert_eq!(finished.released_at, Some(f.now));
     assert_eq!(f.board().await[0].evaluation, finished.id);
 }
 
 #[tokio::test]
-async fn after_the_release_only_the_cuts_submission_plays_the_day_again() {
-    let mut f = Fixture::new().await;
+async fn rerun_after_release_uses_submission_of_cutoff() {
+    let mut f = TestStore::new().await;
     let submission = f.ready_team("alpha").await;
     let stopped = f.evaluate(submission.id, &small()).await;
     let stop = f
@@ -164,40 +164,40 @@ async fn after_the_release_only_the_cuts_submission_plays_the_day_again() {
     f.later(1);
     let team = f.store.team(submission.team).await.unwrap();
     f.upload(&team).await;
-    let best_of_n = f.validate().await;
-    assert!(best_of_n.active);
-    let again = rerun(&f, stopped.id).await.unwrap();
+    let newer = f.validate().await;
+    assert!(newer.active);
+    let second_run = rerun(&f, stopped.id).await.unwrap();
     assert_eq!(
-        (again.submission, again.of.date),
-        (submission.id, stopped.of.date)
+        (second_run.submission, second_run.stage_day.date),
+        (submission.id, stopped.stage_day.date)
     );
-    assert_eq!(again.rerun_of, Some(stopped.id));
+    assert_eq!(second_run.rerun_of, Some(stopped.id));
     let twice = rerun(&f, stopped.id).await;
     assert!(
         matches!(twice, Err(StoreError::Conflict(_))),
-        "one at a time"
+        "only one rerun at a time"
     );
-    // Broken after the release, it is the organiser's to have played again.
-    assert_eq!(f.break_next().await, again.id);
+    // After the release, platform faults cause no automatic rerun; an organiser can request one.
+    assert_eq!(f.fail_next().await, second_run.id);
     f.later(3600);
     assert!(f.claim().await.is_none());
-    let again = rerun(&f, again.id).await.unwrap();
-    assert_eq!(again.submission, submission.id);
+    let third_run = rerun(&f, second_run.id).await.unwrap();
+    assert_eq!(third_run.submission, submission.id);
     f.finish_next().await;
     let twice = rerun(&f, stopped.id).await;
     assert!(
         matches!(twice, Err(StoreError::Conflict(_))),
         "it has its score"
     );
-    // The new one plays another day, on other episodes.
+    // The newer submission is evaluated on a later day, on other episodes.
     f.later(86_400);
-    let next = f.evaluate(best_of_n.id, &small()).await;
-    assert_ne!(next.of.date, stopped.of.date);
+    let next = f.evaluate(newer.id, &small()).await;
+    assert_ne!(next.stage_day.date, stopped.stage_day.date);
 }
 
 #[tokio::test]
-async fn a_closed_season_takes_nothing_more_and_stays_closed() {
-    let mut site = Fixture::new().await;
+async fn closed_season_refuses_everything() {
+    let mut site = TestStore::new().await;
     let submission = site.ready_team("alpha").await;
     let evaluation = site.evaluate(submission.id, &plan()).await;
     let busy = site
@@ -261,7 +261,7 @@ async fn a_closed_season_takes_nothing_more_and_stays_closed() {
     );
     let ablation = site
         .store
-        .create_ablation(Actor::Organiser, submission.id, &plan, site.now);
+        .request_ablation(Actor::Organiser, submission.id, &plan, site.now);
     closed(ablation.await.unwrap_err());
     assert_eq!(
         site.store
@@ -273,8 +273,8 @@ async fn a_closed_season_takes_nothing_more_and_stays_closed() {
 }
 
 #[tokio::test]
-async fn a_season_keeps_the_name_it_is_given() {
-    let site = Fixture::new().await;
+async fn season_keeps_its_name() {
+    let site = TestStore::new().await;
     assert_eq!(site.store.season().await.unwrap().name, "Season 1");
     for _ in 0..2 {
         site.store
@@ -283,7 +283,7 @@ async fn a_season_keeps_the_name_it_is_given() {
             .unwrap();
     }
     let events = site.store.events_after(0, 10).await.unwrap();
-    assert_eq!(events.len(), 1, "its name before is no event: {events:?}");
+    assert_eq!(events.len(), 1, "an unchanged name is no event: {events:?}");
     assert_eq!(
         site.reopen().await.season().await.unwrap().name,
         "Spring 2026"
@@ -291,8 +291,8 @@ async fn a_season_keeps_the_name_it_is_given() {
 }
 
 #[tokio::test]
-async fn a_summary_is_kept_with_its_version() {
-    let site = Fixture::new().await;
+async fn episode_summary_is_stored_with_its_version() {
+    let site = TestStore::new().await;
     let submission = site.ready_team("alpha").await;
     let run = site.evaluate(submission.id, &plan()).await.run;
     let stored = async |version| {
@@ -301,7 +301,7 @@ async fn a_summary_is_kept_with_its_version() {
     };
     let keep = |version, summary| {
         site.store
-            .keep_episode_summary(run, version, summary, site.now)
+            .store_episode_summary(run, version, summary, site.now)
     };
     assert_eq!(stored(1).await, None);
     keep(1, "{}").await.unwrap();

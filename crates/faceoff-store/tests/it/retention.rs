@@ -1,4 +1,4 @@
-//! What is kept of a stage's files, what goes, and what is kept whatever anybody says.
+//! Retention of a stage's files, deletion of submissions, and the protection of evidence.
 
 use crate::fixture::*;
 use faceoff_store::*;
@@ -8,24 +8,24 @@ use sqlx::{Connection, SqliteConnection, migrate::Migrator, sqlite::SqliteConnec
 
 const DAY_S: i64 = 24 * 3600;
 
-/// Has all teams play today, each with a dataset of its own of `bytes` bytes; the evaluations by their teams' names.
-async fn play_day(f: &Fixture, scores: &[(&Submission, f64)], bytes: usize) -> Vec<EvaluationId> {
+/// Evaluates all teams today, each with a dataset of `bytes` bytes. Returns the evaluations in the order of `scores`.
+async fn run_day(f: &TestStore, scores: &[(&Submission, f64)], bytes: usize) -> Vec<EvaluationId> {
     let stage = f.stage(&small()).await;
     let started = f.store.start_day(Actor::Organiser, stage, f.now).await;
     started.unwrap();
-    while let Some(Claimed { claim, work }) = f.claim().await {
-        match work {
-            Work::Shard { shard, .. } => {
-                f.play(&claim, &shard, 0).await;
+    while let Some(ClaimedJob { claim, job }) = f.claim().await {
+        match job {
+            Job::Shard { shard, .. } => {
+                f.commit_shard(&claim, &shard, 0).await;
             }
-            Work::Finalise { evaluation, .. } => {
+            Job::Scoring { evaluation, .. } => {
                 let submission = f.store.evaluation(evaluation).await.unwrap().submission;
                 let of_team = scores.iter().find(|(one, _)| one.id == submission);
                 let key = format!("datasets/{evaluation}/1.zip");
                 store_file(f, &key, bytes).await;
                 f.finish(&claim, of_team.unwrap().1, &key).await;
             }
-            Work::Smoke { .. } | Work::Game { .. } => panic!("no upload waits, no game"),
+            Job::Validation { .. } | Job::Game { .. } => panic!("no upload waits, no game"),
         }
     }
     let mut played = Vec::new();
@@ -36,8 +36,8 @@ async fn play_day(f: &Fixture, scores: &[(&Submission, f64)], bytes: usize) -> V
     played
 }
 
-/// Has a stage close in an hour, and signs it off then.
-async fn sign_off(f: &mut Fixture, stage: StageId) {
+/// Closes a stage in an hour, and signs it off then.
+async fn sign_off(f: &mut TestStore, stage: StageId) {
     let closes = StageChange {
         closes_at: Some(Some(f.now + SignedDuration::from_hours(1))),
         ..StageChange::default()
@@ -48,25 +48,25 @@ async fn sign_off(f: &mut Fixture, stage: StageId) {
         .unwrap();
     f.later(3600);
     f.store
-        .finalise_stage(Actor::Organiser, stage, f.now)
+        .sign_off_stage(Actor::Organiser, stage, f.now)
         .await
         .unwrap();
 }
 
-async fn store_file(f: &Fixture, key: &str, bytes: usize) {
+async fn store_file(f: &TestStore, key: &str, bytes: usize) {
     let file = f.folder.path().join("file");
     std::fs::write(&file, vec![7; bytes]).unwrap();
     f.store.artifacts().put_file(key, &file).await.unwrap();
 }
 
-/// A team whose archive is stored.
-async fn stored_team(f: &Fixture, name: &str) -> Submission {
+/// A team with a valid submission whose bundle is stored.
+async fn stored_team(f: &TestStore, name: &str) -> Submission {
     let team = f.team(name).await;
     upload(f, &team).await
 }
 
-/// Another upload of a team, found valid.
-async fn upload(f: &Fixture, team: &Team) -> Submission {
+/// Another valid submission of a team.
+async fn upload(f: &TestStore, team: &Team) -> Submission {
     let key = format!("bundles/{}/{}", team.id, uuid::Uuid::now_v7());
     store_file(f, &key, 10).await;
     let bundle = BundleRef {
@@ -82,7 +82,7 @@ async fn upload(f: &Fixture, team: &Team) -> Submission {
     f.validate().await
 }
 
-async fn keep(f: &Fixture, stage: StageId, retention: Retention) -> Result<Stage, StoreError> {
+async fn keep(f: &TestStore, stage: StageId, retention: Retention) -> Result<Stage, StoreError> {
     let change = StageChange {
         retention: Some(retention),
         ..StageChange::default()
@@ -99,24 +99,24 @@ fn last(last: u32) -> Retention {
     }
 }
 
-async fn removal(f: &Fixture, id: EvaluationId) -> Option<String> {
+async fn removal(f: &TestStore, id: EvaluationId) -> Option<String> {
     let removed = f.store.evaluation(id).await.unwrap().dataset_removed;
     removed.map(|removed| removed.reason)
 }
 
-async fn kept(f: &Fixture, evaluations: &[EvaluationId]) -> Vec<bool> {
-    let mut kept = Vec::new();
+async fn has_datasets(f: &TestStore, evaluations: &[EvaluationId]) -> Vec<bool> {
+    let mut found = Vec::new();
     for id in evaluations {
-        kept.push(removal(f, *id).await.is_none());
+        found.push(removal(f, *id).await.is_none());
     }
-    kept
+    found
 }
 
-async fn has_file(f: &Fixture, key: &str) -> bool {
+async fn has_file(f: &TestStore, key: &str) -> bool {
     f.store.artifacts().read(key).await.is_ok()
 }
 
-async fn stage_of_season(f: &Fixture) -> StageId {
+async fn stage_of_season(f: &TestStore) -> StageId {
     f.store.stages().await.unwrap()[0].id
 }
 
@@ -131,16 +131,16 @@ fn refused<T: std::fmt::Debug>(done: Result<T, StoreError>, words: &[&str]) {
 }
 
 #[tokio::test]
-async fn each_teams_last_evaluations_and_its_best_are_kept() {
-    let mut f = Fixture::new().await;
+async fn retention_keeps_last_and_best_of_each_team() {
+    let mut f = TestStore::new().await;
     let (alpha, beta) = (
         stored_team(&f, "Alpha").await,
         stored_team(&f, "Beta").await,
     );
     let mut days = Vec::new();
-    // Alpha is best on the second day, Beta on the last.
+    // Alpha's best day is the second, Beta's the last.
     for (a, b) in [(1.0, 1.0), (9.0, 2.0), (2.0, 3.0), (3.0, 4.0)] {
-        days.push(play_day(&f, &[(&alpha, a), (&beta, b)], 1000).await);
+        days.push(run_day(&f, &[(&alpha, a), (&beta, b)], 1000).await);
         f.later(DAY_S);
     }
     let stage = stage_of_season(&f).await;
@@ -150,82 +150,82 @@ async fn each_teams_last_evaluations_and_its_best_are_kept() {
         Retention::default()
     );
     let all = f.store.apply_retentions(f.now).await.unwrap();
-    assert!(all.is_nothing(), "by default everything is kept");
+    assert!(all.is_empty(), "by default everything is kept");
 
-    let would = f.store.would_remove(stage, &last(2), f.now).await.unwrap();
-    let expected = Removed {
+    let preview = f.store.preview_removal(stage, &last(2), f.now).await.unwrap();
+    let expected = RemovalSummary {
         datasets: 3,
         teams: 2,
-        archives: 0,
+        bundles: 0,
         bytes: 3000,
         unmeasured: 0,
-        not_before: None,
+        later_from: None,
     };
-    assert_eq!(would, expected);
-    assert!(f.store.apply_retentions(f.now).await.unwrap().is_nothing());
+    assert_eq!(preview, expected);
+    assert!(f.store.apply_retentions(f.now).await.unwrap().is_empty());
     keep(&f, stage, last(2)).await.unwrap();
     assert_eq!(f.store.apply_retentions(f.now).await.unwrap(), expected);
-    assert!(f.store.apply_retentions(f.now).await.unwrap().is_nothing());
+    assert!(f.store.apply_retentions(f.now).await.unwrap().is_empty());
     let of = |team: usize| days.iter().map(|day| day[team]).collect::<Vec<_>>();
-    assert_eq!(kept(&f, &of(0)).await, [false, true, true, true]);
-    assert_eq!(kept(&f, &of(1)).await, [false, false, true, true]);
+    assert_eq!(has_datasets(&f, &of(0)).await, [false, true, true, true]);
+    assert_eq!(has_datasets(&f, &of(1)).await, [false, false, true, true]);
     let reason = removal(&f, days[0][0]).await.unwrap();
     assert!(
         reason.contains("the last 2 and the best of each team"),
         "{reason}"
     );
-    // Its result stays, and no rule is another.
+    // The result stays, and there is no new revision.
     let state = f.state(days[0][0]).await;
     assert!(matches!(state, EvaluationState::Finished { result, .. } if result.score == 1.0));
     let now = f.store.stage(stage).await.unwrap();
     assert_eq!(now.rules.number, revision);
     let events = f.store.events_after(0, 10_000).await.unwrap();
-    let told = |event: &Event| matches!(event, Event::DatasetRemoved { .. });
+    let is_removal = |event: &Event| matches!(event, Event::DatasetRemoved { .. });
     assert_eq!(
-        events.iter().filter(|record| told(&record.event)).count(),
+        events.iter().filter(|record| is_removal(&record.event)).count(),
         3
     );
 
-    // A voided one counts neither as one of the last nor as the best.
+    // A voided evaluation is neither one of the last nor the best.
     let voided = f
         .store
         .void_evaluation(Actor::Organiser, days[1][0], "why", f.now);
     voided.await.unwrap();
     f.store.apply_retentions(f.now).await.unwrap();
-    assert_eq!(kept(&f, &of(0)).await, [false, false, true, true]);
-    // What is kept from now on comes back for nobody.
+    assert_eq!(has_datasets(&f, &of(0)).await, [false, false, true, true]);
+    // A longer retention does not restore removed datasets.
     keep(&f, stage, Retention::default()).await.unwrap();
-    assert!(f.store.apply_retentions(f.now).await.unwrap().is_nothing());
-    assert_eq!(kept(&f, &of(1)).await, [false, false, true, true]);
+    assert!(f.store.apply_retentions(f.now).await.unwrap().is_empty());
+    assert_eq!(has_datasets(&f, &of(1)).await, [false, false, true, true]);
 }
 
 #[tokio::test]
-async fn the_file_follows_the_row_whenever_the_process_dies() {
-    let mut f = Fixture::new().await;
+async fn dataset_file_is_deleted_despite_restarts() {
+    let mut f = TestStore::new().await;
     let alpha = stored_team(&f, "Alpha").await;
     let mut played = Vec::new();
     for score in [1.0, 2.0] {
-        played.extend(play_day(&f, &[(&alpha, score)], 10).await);
+        played.extend(run_day(&f, &[(&alpha, score)], 10).await);
         f.later(DAY_S);
     }
     let stage = stage_of_season(&f).await;
     keep(&f, stage, last(1)).await.unwrap();
     let key = format!("datasets/{}/1.zip", played[0]);
     f.store.apply_retentions(f.now).await.unwrap();
-    assert_eq!(kept(&f, &played).await, [false, true]);
+    assert_eq!(has_datasets(&f, &played).await, [false, true]);
     assert!(
         has_file(&f, &key).await,
-        "a backup that was begun before may still come to it"
+        "a backup that started before may still read it"
     );
-    // Whoever comes next finds what is to be removed.
+    // Another process finds what is to be deleted.
     f.store = f.reopen().await;
-    f.later(FILES_KEPT.as_secs() - 1);
+    f.later(FILES_KEPT_FOR.as_secs() - 1);
     assert_eq!(f.store.remove_files_of_removed(f.now).await.unwrap(), 0);
     f.later(1);
     assert_eq!(f.store.remove_files_of_removed(f.now).await.unwrap(), 1);
     assert!(!has_file(&f, &key).await);
     assert_eq!(f.store.remove_files_of_removed(f.now).await.unwrap(), 0);
-    // Killed between the file and the note that it has gone.
+    // A process was killed between deleting the file and recording it.
     let mut connection = f.connection().await;
     sqlx::query("UPDATE evaluations SET dataset_gone = 0")
         .execute(&mut connection)
@@ -237,35 +237,35 @@ async fn the_file_follows_the_row_whenever_the_process_dies() {
 }
 
 #[tokio::test]
-async fn nothing_goes_while_somebody_needs_it() {
-    let mut f = Fixture::new().await;
+async fn retention_waits_for_open_evaluations_and_trials() {
+    let mut f = TestStore::new().await;
     let alpha = stored_team(&f, "Alpha").await;
     for score in [1.0, 2.0, 3.0] {
-        play_day(&f, &[(&alpha, score)], 10).await;
+        run_day(&f, &[(&alpha, score)], 10).await;
         f.later(DAY_S);
     }
     let stage = stage_of_season(&f).await;
     keep(&f, stage, last(1)).await.unwrap();
-    let goes_nothing = async |f: &Fixture| {
-        assert!(f.store.apply_retentions(f.now).await.unwrap().is_nothing());
-        // What will go once it may is told all the same.
-        let would = f.store.would_remove(stage, &last(1), f.now).await.unwrap();
-        assert_eq!(would.datasets, 2);
+    let expect_no_removal = async |f: &TestStore| {
+        assert!(f.store.apply_retentions(f.now).await.unwrap().is_empty());
+        // The preview still shows what will be removed later.
+        let preview = f.store.preview_removal(stage, &last(1), f.now).await.unwrap();
+        assert_eq!(preview.datasets, 2);
     };
-    // A trial that is not dropped.
+    // A pending trial.
     let trial = f
         .store
         .propose_trial(Actor::Organiser, stage, None, "why", f.now)
         .await
         .unwrap();
-    goes_nothing(&f).await;
+    expect_no_removal(&f).await;
     f.store
         .drop_proposal(Actor::Organiser, trial.id, f.now)
         .await
         .unwrap();
-    // A day that is under way.
+    // An unreleased day.
     let evaluation = f.evaluate(alpha.id, &small()).await;
-    goes_nothing(&f).await;
+    expect_no_removal(&f).await;
     f.store
         .cancel_evaluation(Actor::Organiser, evaluation.id, "rain", f.now)
         .await
@@ -274,10 +274,10 @@ async fn nothing_goes_while_somebody_needs_it() {
 }
 
 #[tokio::test]
-async fn a_blind_stage_keeps_what_no_team_could_take_home() {
-    let mut f = Fixture::new().await;
+async fn retention_keeps_datasets_of_blind_stage() {
+    let mut f = TestStore::new().await;
     let alpha = stored_team(&f, "Alpha").await;
-    let (rules, settings) = rules_of(&small());
+    let (rules, settings) = rules_and_settings(&small());
     let blind = StageSettings {
         blind: true,
         ..settings
@@ -293,15 +293,15 @@ async fn a_blind_stage_keeps_what_no_team_could_take_home() {
             .await
             .unwrap();
         let (claim, _, shard) = f.claim_shard().await;
-        f.play(&claim, &shard, 0).await;
+        f.commit_shard(&claim, &shard, 0).await;
         let (claim, _) = f.claim_scoring().await;
         f.finish(&claim, score, "d").await;
         f.later(DAY_S);
     }
     keep(&f, stage, last(1)).await.unwrap();
-    assert!(f.store.apply_retentions(f.now).await.unwrap().is_nothing());
-    // Nor is the room told that they take.
-    let storage = f.store.storage(Some(alpha.team), Counted::Released).await;
+    assert!(f.store.apply_retentions(f.now).await.unwrap().is_empty());
+    // Their size is hidden, too.
+    let storage = f.store.storage(Some(alpha.team), StorageScope::Released).await;
     assert_eq!(storage.unwrap()[0].datasets, 0);
     let opened = StageChange {
         settings: Some(StageSettings {
@@ -318,18 +318,18 @@ async fn a_blind_stage_keeps_what_no_team_could_take_home() {
 }
 
 #[tokio::test]
-async fn all_of_a_stage_goes_at_its_time_and_after_its_sign_off() {
-    let mut f = Fixture::new().await;
+async fn retention_ends_at_its_date_or_after_sign_off() {
+    let mut f = TestStore::new().await;
     let alpha = stored_team(&f, "Alpha").await;
-    let played = play_day(&f, &[(&alpha, 1.0)], 10).await;
+    let played = run_day(&f, &[(&alpha, 1.0)], 10).await;
     let stage = stage_of_season(&f).await;
     let until = Retention {
         until: Some(f.now),
         ..Retention::default()
     };
-    // The time has come, and the stage is open.
-    let removed = f.store.would_remove(stage, &until, f.now).await.unwrap();
-    assert!(removed.is_nothing());
+    // The date has passed, but the stage is still open.
+    let removed = f.store.preview_removal(stage, &until, f.now).await.unwrap();
+    assert!(removed.is_empty());
     let closes = StageChange {
         closes_at: Some(Some(f.now + SignedDuration::from_hours(1))),
         ..StageChange::default()
@@ -339,7 +339,7 @@ async fn all_of_a_stage_goes_at_its_time_and_after_its_sign_off() {
         .await
         .unwrap();
     f.later(3600);
-    let removed = f.store.would_remove(stage, &until, f.now).await.unwrap();
+    let removed = f.store.preview_removal(stage, &until, f.now).await.unwrap();
     assert_eq!((removed.datasets, removed.teams), (1, 1));
 
     let days = Retention {
@@ -348,21 +348,21 @@ async fn all_of_a_stage_goes_at_its_time_and_after_its_sign_off() {
     };
     keep(&f, stage, days).await.unwrap();
     f.later(40 * DAY_S);
-    assert!(f.store.apply_retentions(f.now).await.unwrap().is_nothing());
+    assert!(f.store.apply_retentions(f.now).await.unwrap().is_empty());
     f.store
-        .finalise_stage(Actor::Organiser, stage, f.now)
+        .sign_off_stage(Actor::Organiser, stage, f.now)
         .await
         .unwrap();
     f.later(30 * DAY_S - 1);
-    assert!(f.store.apply_retentions(f.now).await.unwrap().is_nothing());
-    // It can be another after the sign-off, which nothing else can.
+    assert!(f.store.apply_retentions(f.now).await.unwrap().is_empty());
+    // The retention can be changed after the sign-off, unlike anything else.
     let longer = Retention {
         days_after_sign_off: Some(31),
         ..Retention::default()
     };
     keep(&f, stage, longer).await.unwrap();
     f.later(1);
-    assert!(f.store.apply_retentions(f.now).await.unwrap().is_nothing());
+    assert!(f.store.apply_retentions(f.now).await.unwrap().is_empty());
     let renamed = StageChange {
         name: Some("Other".parse().unwrap()),
         retention: Some(days),
@@ -375,20 +375,20 @@ async fn all_of_a_stage_goes_at_its_time_and_after_its_sign_off() {
     assert_eq!(
         f.store.stage_retention(stage).await.unwrap(),
         longer,
-        "all of it or nothing"
+        "the change is atomic"
     );
     f.later(DAY_S);
     assert_eq!(f.store.apply_retentions(f.now).await.unwrap().datasets, 1);
     let reason = removal(&f, played[0]).await.unwrap();
     assert!(reason.contains("31 days after the sign-off"), "{reason}");
-    // What it has active stays: it may enter another stage.
+    // The active submission stays: it may be evaluated in another stage.
     let own = f.store.submission(alpha.id).await.unwrap();
-    assert_eq!(own.archive_removed, None);
+    assert_eq!(own.bundle_removed, None);
 }
 
 #[tokio::test]
-async fn what_no_stage_can_have_is_refused_and_changes_nothing() {
-    let f = Fixture::new().await;
+async fn invalid_retention_is_refused() {
+    let f = TestStore::new().await;
     let stage = f.stage(&small()).await;
     for (wrong, words) in [
         (last(0), "expected 1 to 1000, got 0"),
@@ -417,14 +417,14 @@ async fn what_no_stage_can_have_is_refused_and_changes_nothing() {
 }
 
 #[tokio::test]
-async fn an_archive_goes_with_its_last_dataset_unless_somebody_enters_it() {
-    let mut f = Fixture::new().await;
+async fn bundle_is_removed_with_its_last_dataset_unless_active() {
+    let mut f = TestStore::new().await;
     let old = stored_team(&f, "Alpha").await;
     let team = f.store.team(old.team).await.unwrap();
-    play_day(&f, &[(&old, 1.0)], 10).await;
+    run_day(&f, &[(&old, 1.0)], 10).await;
     f.later(DAY_S);
     let new = upload(&f, &team).await;
-    let never_played = {
+    let never_evaluated = {
         let unused = upload(&f, &team).await;
         let chosen = f
             .store
@@ -433,55 +433,55 @@ async fn an_archive_goes_with_its_last_dataset_unless_somebody_enters_it() {
         unused
     };
     for score in [5.0, 6.0] {
-        play_day(&f, &[(&new, score)], 10).await;
+        run_day(&f, &[(&new, score)], 10).await;
         f.later(DAY_S);
     }
     let stage = stage_of_season(&f).await;
     keep(&f, stage, last(1)).await.unwrap();
     let removed = f.store.apply_retentions(f.now).await.unwrap();
     assert_eq!(
-        (removed.datasets, removed.archives, removed.bytes),
+        (removed.datasets, removed.bundles, removed.bytes),
         (2, 0, 20),
-        "until the sign-off it may have to play again"
+        "until the sign-off it may have to be rerun"
     );
     sign_off(&mut f, stage).await;
     let removed = f.store.apply_retentions(f.now).await.unwrap();
-    assert_eq!((removed.datasets, removed.archives), (0, 1));
+    assert_eq!((removed.datasets, removed.bundles), (0, 1));
     assert_eq!(removed.bytes, 10);
-    let gone = f.store.submission(old.id).await.unwrap();
-    let reason = gone.archive_removed.unwrap().reason;
+    let removed = f.store.submission(old.id).await.unwrap();
+    let reason = removed.bundle_removed.unwrap().reason;
     assert!(reason.contains("the last 1 and the best"), "{reason}");
-    assert_eq!(gone.deleted, None, "nobody wished it");
-    for kept in [&new, &never_played] {
-        let kept = f.store.submission(kept.id).await.unwrap();
-        assert_eq!(kept.archive_removed, None);
+    assert_eq!(removed.deleted, None, "it was not deleted on request");
+    for submission in [&new, &never_evaluated] {
+        let submission = f.store.submission(submission.id).await.unwrap();
+        assert_eq!(submission.bundle_removed, None);
     }
     f.later(DAY_S);
     f.store.remove_files_of_removed(f.now).await.unwrap();
     assert!(!has_file(&f, &old.bundle.key).await);
-    // It plays nothing again.
+    // It cannot be evaluated again.
     let chosen = f
         .store
         .activate_submission(Actor::Team(team.id), old.id, f.now);
     refused(
         chosen.await,
-        &["archive", "was removed", "cannot be played"],
+        &["bundle", "was removed", "cannot be evaluated again"],
     );
     let plan = small();
-    let taken_apart = f
+    let ablation = f
         .store
-        .create_ablation(Actor::Organiser, old.id, &plan, f.now);
-    refused(taken_apart.await, &["was removed"]);
-    assert!(f.claim().await.is_none(), "nothing half done is queued");
+        .request_ablation(Actor::Organiser, old.id, &plan, f.now);
+    refused(ablation.await, &["was removed"]);
+    assert!(f.claim().await.is_none(), "no job is queued");
 }
 
 #[tokio::test]
-async fn a_team_deletes_what_it_needs_no_more() {
-    let mut f = Fixture::new().await;
+async fn team_can_delete_unneeded_submission() {
+    let mut f = TestStore::new().await;
     let first = stored_team(&f, "Alpha").await;
     let team = f.store.team(first.team).await.unwrap();
     let actor = Actor::Team(team.id);
-    let delete = async |f: &Fixture, id: SubmissionId| {
+    let delete = async |f: &TestStore, id: SubmissionId| {
         f.store
             .delete_submission(Actor::Team(team.id), id, "by its team", f.now)
             .await
@@ -489,14 +489,14 @@ async fn a_team_deletes_what_it_needs_no_more() {
     refused(delete(&f, first.id).await, &["active", "withdraw it"]);
     let evaluation = f.evaluate(first.id, &small()).await;
     let second = upload(&f, &team).await;
-    refused(delete(&f, first.id).await, &["queued or playing"]);
-    f.play_to(4.0).await;
-    // A trial with it.
+    refused(delete(&f, first.id).await, &["being evaluated"]);
+    f.run_all(4.0).await;
+    // A trial of the submission.
     let trial = f
         .store
         .propose_trial(
             Actor::Organiser,
-            evaluation.of.stage,
+            evaluation.stage_day.stage,
             Some(first.id),
             "why",
             f.now,
@@ -515,19 +515,19 @@ async fn a_team_deletes_what_it_needs_no_more() {
     let deleted = delete(&f, first.id).await.unwrap();
     let by = deleted.deleted.unwrap();
     assert_eq!((by.at, by.by), (f.now, actor.clone()));
-    assert_eq!(deleted.archive_removed.unwrap().reason, "by its team");
+    assert_eq!(deleted.bundle_removed.unwrap().reason, "by its team");
     assert_eq!(deleted.bundle.blake3, first.bundle.blake3);
     assert_eq!(deleted.agent_name.as_deref(), Some("striker"));
     let log = f.store.submission_log(first.id).await.unwrap();
     assert_eq!(log.as_deref(), Some("hello\n"));
     let used = f.store.upload_usage(team.id, f.now).await.unwrap();
-    assert_eq!(used.stored_bytes, 10, "it has room again at once");
+    assert_eq!(used.stored_bytes, 10, "the quota is free again at once");
     assert_eq!(f.board().await[0].result.score, 4.0, "its result stays");
     refused(delete(&f, first.id).await, &["was deleted on", "team:"]);
 
-    // Its archive follows, and is no orphan of nobody's meanwhile.
+    // Its bundle file is deleted later, and is not an orphan meanwhile.
     assert!(has_file(&f, &first.bundle.key).await);
-    // (The files' times are the host's.)
+    // (File times come from the host's clock.)
     let hour = SignedDuration::from_hours(1);
     let orphans = f
         .store
@@ -537,7 +537,7 @@ async fn a_team_deletes_what_it_needs_no_more() {
     assert_eq!(f.store.remove_files_of_removed(f.now).await.unwrap(), 1);
     assert!(!has_file(&f, &first.bundle.key).await);
     assert!(has_file(&f, &second.bundle.key).await);
-    // It plays nothing again.
+    // It cannot be evaluated again.
     let chosen = f.store.activate_submission(actor, first.id, f.now);
     refused(chosen.await, &["was removed", "by its team"]);
     let voided = f
@@ -551,8 +551,8 @@ async fn a_team_deletes_what_it_needs_no_more() {
 }
 
 #[tokio::test]
-async fn what_has_no_archive_to_delete_says_so() {
-    let f = Fixture::new().await;
+async fn submission_without_bundle_cannot_be_deleted() {
+    let f = TestStore::new().await;
     let team = f.team("Alpha").await;
     let waiting = f.upload(&team).await;
     let delete = async |id: SubmissionId| {
@@ -562,18 +562,18 @@ async fn what_has_no_archive_to_delete_says_so() {
     };
     refused(
         delete(waiting.id).await,
-        &["smoke run is queued or running"],
+        &["validation run is queued or running"],
     );
-    let (claim, _) = f.claim_smoke().await;
-    let outcome = SmokeOutcome::Invalid {
+    let (claim, _) = f.claim_validation().await;
+    let outcome = ValidationOutcome::Invalid {
         runtime: None,
         agent_name: None,
         reason: "no manifest".into(),
         timing: Vec::new(),
         log: String::new(),
     };
-    f.store.commit_smoke(&claim, outcome, f.now).await.unwrap();
-    refused(delete(waiting.id).await, &["removes its archive by itself"]);
+    f.store.commit_validation(&claim, outcome, f.now).await.unwrap();
+    refused(delete(waiting.id).await, &["removes its bundle automatically"]);
     f.store.remove_refused_bundles(f.now).await.unwrap();
     refused(delete(waiting.id).await, &["nothing left to delete"]);
     let none = delete(SubmissionId::new()).await;
@@ -581,14 +581,14 @@ async fn what_has_no_archive_to_delete_says_so() {
 }
 
 #[tokio::test]
-async fn what_a_day_may_have_to_play_again_is_not_deleted() {
-    let f = Fixture::new().await;
+async fn submission_of_unreleased_day_cannot_be_deleted() {
+    let f = TestStore::new().await;
     let alpha = stored_team(&f, "Alpha").await;
     let beta = stored_team(&f, "Beta").await;
     f.evaluate(alpha.id, &small()).await;
-    // Alpha's is over, the day is not.
+    // One of the two evaluations is over, but the day is not.
     let (claim, _, shard) = f.claim_shard().await;
-    f.play(&claim, &shard, 0).await;
+    f.commit_shard(&claim, &shard, 0).await;
     let (claim, done) = f.claim_scoring().await;
     f.finish(&claim, 1.0, "d").await;
     let played = f.store.evaluation(done).await.unwrap().submission;
@@ -602,38 +602,38 @@ async fn what_a_day_may_have_to_play_again_is_not_deleted() {
         .delete_submission(Actor::Organiser, played, "why", f.now)
         .await;
     refused(refusal, &["a day that is not released"]);
-    f.play_to(2.0).await;
+    f.run_all(2.0).await;
     f.store
         .delete_submission(Actor::Organiser, played, "why", f.now)
         .await
         .unwrap();
-    // The other one's turn is not this one's to keep from it.
+    // The deleted submission does not prevent a re-evaluation of the other team.
     let stage = stage_of_season(&f).await;
-    let of = f.store.evaluation(done).await.unwrap().of;
+    let of = f.store.evaluation(done).await.unwrap().stage_day;
     assert_eq!(of.stage, stage);
-    let again = async |what| {
+    let propose = async |scope| {
         f.store
-            .propose_reevaluation(Actor::Organiser, what, "why", f.now)
+            .propose_reevaluation(Actor::Organiser, scope, "why", f.now)
             .await
     };
-    let proposal = again(Reevaluation::Day(of)).await.unwrap();
-    let drafts = f.store.proposal(proposal.id).await.unwrap().1;
-    assert_eq!(drafts.len(), 1);
-    assert_ne!(drafts[0].submission, played);
-    let alone = again(Reevaluation::Evaluation(done)).await;
-    refused(alone, &["was removed", "cannot be played again"]);
+    let proposal = propose(Reevaluation::Day(of)).await.unwrap();
+    let evaluations = f.store.proposal(proposal.id).await.unwrap().1;
+    assert_eq!(evaluations.len(), 1);
+    assert_ne!(evaluations[0].submission, played);
+    let alone = propose(Reevaluation::Evaluation(done)).await;
+    refused(alone, &["was removed", "cannot be evaluated again"]);
 }
 
 #[tokio::test]
-async fn evidence_is_kept_whatever_the_retention_or_the_team_says() {
-    let mut f = Fixture::new().await;
+async fn evidence_is_exempt_from_retention_and_deletion() {
+    let mut f = TestStore::new().await;
     let (alpha, beta) = (
         stored_team(&f, "Alpha").await,
         stored_team(&f, "Beta").await,
     );
     let mut first = Vec::new();
     for score in [1.0, 2.0] {
-        let played = play_day(&f, &[(&alpha, score), (&beta, score)], 10).await;
+        let played = run_day(&f, &[(&alpha, score), (&beta, score)], 10).await;
         if first.is_empty() {
             first = played;
         }
@@ -641,40 +641,40 @@ async fn evidence_is_kept_whatever_the_retention_or_the_team_says() {
     }
     let stage = stage_of_season(&f).await;
     let team = f.store.team(alpha.team).await.unwrap();
-    // Just before it is found out, the team clears away.
-    let cleared = upload(&f, &team).await;
+    // The team deletes a submission before it is disqualified.
+    let deleted_early = upload(&f, &team).await;
     upload(&f, &team).await;
-    let delete = async |f: &Fixture, id: SubmissionId| {
+    let delete = async |f: &TestStore, id: SubmissionId| {
         f.store
             .delete_submission(Actor::Team(team.id), id, "by its team", f.now)
             .await
     };
-    delete(&f, cleared.id).await.unwrap();
+    delete(&f, deleted_early.id).await.unwrap();
     f.store
         .disqualify_team(Actor::Organiser, team.id, "it spied", f.now)
         .await
         .unwrap();
     keep(&f, stage, last(1)).await.unwrap();
     let removed = f.store.apply_retentions(f.now).await.unwrap();
-    assert_eq!((removed.datasets, removed.teams), (1, 1), "Beta's alone");
-    assert_eq!(kept(&f, &first).await, [true, false]);
+    assert_eq!((removed.datasets, removed.teams), (1, 1), "only Beta's");
+    assert_eq!(has_datasets(&f, &first).await, [true, false]);
     refused(
         delete(&f, alpha.id).await,
         &["disqualified", "it spied", "evidence"],
     );
-    // So becomes what nobody is promised any more, as long as it is there.
-    let ruling = async |f: &Fixture| {
+    // Removed files become evidence, too, as long as they exist.
+    let ruling = async |f: &TestStore| {
         f.store
             .disqualify_team(Actor::Organiser, beta.team, "it slept", f.now)
             .await
     };
     ruling(&f).await.unwrap();
     let EvaluationState::Finished { dataset, .. } = f.state(first[1]).await else {
-        panic!("it was finished")
+        panic!("expected a finished evaluation")
     };
     f.later(2 * DAY_S);
     f.store.remove_files_of_removed(f.now).await.unwrap();
-    assert!(has_file(&f, &cleared.bundle.key).await, "it is evidence");
+    assert!(has_file(&f, &deleted_early.bundle.key).await, "it is evidence");
     assert!(has_file(&f, &dataset).await);
     f.store
         .reinstate_team(Actor::Organiser, beta.team, "it did not", f.now)
@@ -683,18 +683,18 @@ async fn evidence_is_kept_whatever_the_retention_or_the_team_says() {
     f.store.remove_files_of_removed(f.now).await.unwrap();
     assert!(!has_file(&f, &dataset).await);
 
-    // Reinstated it is a team like any other.
+    // After the reinstatement the usual rules apply.
     f.store
         .reinstate_team(Actor::Organiser, team.id, "it did not", f.now)
         .await
         .unwrap();
     assert_eq!(f.store.apply_retentions(f.now).await.unwrap().datasets, 1);
-    assert!(!has_file(&f, &cleared.bundle.key).await);
+    assert!(!has_file(&f, &deleted_early.bundle.key).await);
 }
 
 #[tokio::test]
-async fn a_team_that_an_organiser_retires_leaves_its_files() {
-    let f = Fixture::new().await;
+async fn team_retired_by_organiser_cannot_delete_files() {
+    let f = TestStore::new().await;
     let alpha = stored_team(&f, "Alpha").await;
     let team = f.store.team(alpha.team).await.unwrap();
     upload(&f, &team).await;
@@ -712,44 +712,44 @@ async fn a_team_that_an_organiser_retires_leaves_its_files() {
         .await
         .unwrap();
     delete().await.unwrap();
-    // By its own wish it leaves no evidence.
+    // A team that retires on its own can delete its files.
     retire(Actor::Team(team.id)).await.unwrap();
     delete().await.unwrap();
 }
 
 #[tokio::test]
-async fn storage_is_told_without_a_look_at_the_files() {
-    let mut f = Fixture::new().await;
+async fn storage_is_reported_without_reading_files() {
+    let mut f = TestStore::new().await;
     let alpha = stored_team(&f, "Alpha").await;
     let beta = stored_team(&f, "Beta").await;
-    play_day(&f, &[(&alpha, 1.0), (&beta, 1.0)], 1000).await;
+    run_day(&f, &[(&alpha, 1.0), (&beta, 1.0)], 1000).await;
     f.later(DAY_S);
-    let of = async |f: &Fixture, counted: Counted| {
+    let of = async |f: &TestStore, counted: StorageScope| {
         let all = f.store.storage(None, counted).await.unwrap();
         let one = f.store.storage(Some(alpha.team), counted).await.unwrap();
         assert_eq!(all[0], one[0]);
         assert_eq!((all.len(), one.len()), (2, 1));
         one[0].clone()
     };
-    let storage = of(&f, Counted::All).await;
+    let storage = of(&f, StorageScope::All).await;
     assert_eq!(storage.name.as_str(), "Alpha");
-    assert_eq!((storage.archives, storage.archive_bytes), (1, 10));
+    assert_eq!((storage.bundles, storage.bundle_bytes), (1, 10));
     assert_eq!((storage.datasets, storage.dataset_bytes), (1, 1000));
-    assert_eq!(of(&f, Counted::Released).await, storage);
+    assert_eq!(of(&f, StorageScope::Released).await, storage);
 
-    // How large a dataset of a day is that is under way, its team does not learn.
+    // The size of a dataset is hidden from its team until the day is released.
     f.evaluate(alpha.id, &small()).await;
     let (claim, _, shard) = f.claim_shard().await;
-    f.play(&claim, &shard, 0).await;
+    f.commit_shard(&claim, &shard, 0).await;
     let (claim, evaluation) = f.claim_scoring().await;
     let owner = f.store.evaluation(evaluation).await.unwrap().team;
     store_file(&f, "datasets/today.zip", 77).await;
     f.finish(&claim, 1.0, "datasets/today.zip").await;
-    let told = async |counted| f.store.storage(Some(owner), counted).await.unwrap()[0].clone();
-    assert_eq!(told(Counted::All).await.dataset_bytes, 1077);
-    assert_eq!(told(Counted::Released).await.dataset_bytes, 1000);
+    let storage_of_owner = async |counted| f.store.storage(Some(owner), counted).await.unwrap()[0].clone();
+    assert_eq!(storage_of_owner(StorageScope::All).await.dataset_bytes, 1077);
+    assert_eq!(storage_of_owner(StorageScope::Released).await.dataset_bytes, 1000);
 
-    // What older programs stored is measured once; one that is lost takes no room.
+    // Datasets of older versions are measured once; a lost one takes no space.
     let mut connection = f.connection().await;
     sqlx::query("UPDATE evaluations SET dataset_bytes = NULL WHERE state = 'finished'")
         .execute(&mut connection)
@@ -760,17 +760,17 @@ async fn storage_is_told_without_a_look_at_the_files() {
         .delete("datasets/today.zip")
         .await
         .unwrap();
-    let unmeasured = told(Counted::All).await;
+    let unmeasured = storage_of_owner(StorageScope::All).await;
     assert_eq!((unmeasured.dataset_bytes, unmeasured.unmeasured), (0, 2));
     assert_eq!(f.store.measure_datasets(f.now).await.unwrap(), 3);
     assert_eq!(f.store.measure_datasets(f.now).await.unwrap(), 0);
-    let measured = told(Counted::All).await;
+    let measured = storage_of_owner(StorageScope::All).await;
     assert_eq!((measured.dataset_bytes, measured.unmeasured), (1000, 0));
-    let none = f.store.storage(Some(TeamId::new()), Counted::All).await;
+    let none = f.store.storage(Some(TeamId::new()), StorageScope::All).await;
     assert!(none.unwrap().is_empty());
 }
 
-/// A data folder of the program before there were retentions.
+/// A data folder of a version before retentions.
 async fn old_folder(folder: &std::path::Path) {
     let all = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../migrations");
     let old = tempfile::tempdir().unwrap();
@@ -814,7 +814,7 @@ async fn old_folder(folder: &std::path::Path) {
 }
 
 #[tokio::test]
-async fn what_older_programs_have_stored_is_taken_over_as_it_was() {
+async fn migration_keeps_submissions_and_retirements() {
     let folder = tempfile::tempdir().unwrap();
     old_folder(folder.path()).await;
     let store = Store::open(folder.path()).await.unwrap();
@@ -826,20 +826,20 @@ async fn what_older_programs_have_stored_is_taken_over_as_it_was() {
         assert_eq!(valid.state, SubmissionState::Valid);
         assert_eq!(valid.label.as_deref(), Some("mine"));
         assert!(valid.active && valid.withdrawn_at.is_some());
-        assert_eq!((valid.archive_removed, valid.deleted), (None, None));
+        assert_eq!((valid.bundle_removed, valid.deleted), (None, None));
         let log = store.submission_log(valid.id).await.unwrap();
         assert_eq!(log.as_deref(), Some("its log"));
         let refused: SubmissionId = id(number * 10).parse().unwrap();
         let refused = store.submission(refused).await.unwrap();
-        assert!(refused.archive_removed.is_some());
+        assert!(refused.bundle_removed.is_some());
         let used = store.upload_usage(valid.team, now).await.unwrap();
         assert_eq!(used.stored_bytes, 7);
     }
-    // Nothing is removed a second time.
+    // Removed bundles are not deleted again.
     assert_eq!(store.remove_files_of_removed(now).await.unwrap(), 0);
-    // Who retired a team is in the log.
+    // The migration takes from the log who retired a team.
     let by_organiser = store.check_deletable(id(1).parse().unwrap(), now).await;
-    refused(by_organiser, &["an organiser has taken the team out"]);
-    let by_itself = store.check_deletable(id(2).parse().unwrap(), now).await;
-    refused(by_itself, &["it is active"]);
+    refused(by_organiser, &["an organiser withdrew the team"]);
+    let by_team = store.check_deletable(id(2).parse().unwrap(), now).await;
+    refused(by_team, &["it is active"]);
 }

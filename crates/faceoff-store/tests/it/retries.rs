@@ -1,13 +1,13 @@
-//! A range of episodes that is begun again by our fault says so to whoever plays it.
+//! A job knows how many earlier attempts ended by a platform fault.
 
 use crate::fixture::*;
 use faceoff_store::*;
 
-async fn claimed(f: &Fixture) -> (Claim, u32) {
+async fn claimed(f: &TestStore) -> (JobClaim, u32) {
     match f.claim().await {
-        Some(Claimed {
+        Some(ClaimedJob {
             claim,
-            work: Work::Shard {
+            job: Job::Shard {
                 platform_retries, ..
             },
         }) => (claim, platform_retries),
@@ -16,8 +16,8 @@ async fn claimed(f: &Fixture) -> (Claim, u32) {
 }
 
 #[tokio::test]
-async fn what_we_broke_counts_and_a_shutdown_does_not() {
-    let mut f = Fixture::new().await;
+async fn platform_faults_count_as_retries_and_shutdowns_do_not() {
+    let mut f = TestStore::new().await;
     let submission = f.ready_team("Alpha").await;
     let whole = RunPlan {
         tasks: vec![faceoff_types::Task::Hit],
@@ -29,7 +29,7 @@ async fn what_we_broke_counts_and_a_shutdown_does_not() {
     assert_eq!(retries, 0);
     f.store.release(&claim, f.now).await.unwrap();
     let (claim, retries) = claimed(&f).await;
-    assert_eq!(retries, 0, "a shutdown breaks nothing");
+    assert_eq!(retries, 0, "a shutdown is no fault");
 
     let failed = f.store.release_failed(&claim, "disk full", f.now).await;
     failed.unwrap();

@@ -1,11 +1,11 @@
-//! Runs keep the rules that they were begun under, and no board mixes two.
+//! Runs keep the ruleset that they were created with, and no board mixes two.
 
 use crate::fixture::*;
 use faceoff_store::*;
 use faceoff_types::*;
 
-/// Makes all that is there what an earlier program has left.
-async fn was_begun_under(f: &Fixture, earlier: Ruleset) {
+/// Rewrites all runs and revisions as if an earlier version had created them.
+async fn set_ruleset(f: &TestStore, earlier: Ruleset) {
     let mut connection = f.connection().await;
     for change in [
         "UPDATE runs SET ruleset = ?",
@@ -17,34 +17,34 @@ async fn was_begun_under(f: &Fixture, earlier: Ruleset) {
     }
 }
 
-/// Plays and scores the evaluation that comes next; under which rules its shards and its score were ordered.
-async fn play(f: &Fixture, score: f64) -> Ruleset {
+/// Runs and scores the next evaluation. Returns the ruleset of its shards and its scoring job.
+async fn run_evaluation(f: &TestStore, score: f64) -> Ruleset {
     let mut rulesets = Vec::new();
     for _ in 0..6 {
         let (claim, run, shard) = f.claim_shard().await;
         rulesets.push(run.ruleset);
-        f.play(&claim, &shard, 0).await;
+        f.commit_shard(&claim, &shard, 0).await;
     }
-    let Some(Claimed {
+    let Some(ClaimedJob {
         claim,
-        work: Work::Finalise { run, .. },
+        job: Job::Scoring { run, .. },
     }) = f.claim().await
     else {
-        panic!("expected a finalisation");
+        panic!("expected a scoring job");
     };
     assert!(rulesets.iter().all(|ruleset| *ruleset == run.ruleset));
     f.finish(&claim, score, &format!("{score}")).await;
     run.ruleset
 }
 
-async fn teams(f: &Fixture, revision: u32) -> Vec<String> {
+async fn teams(f: &TestStore, revision: u32) -> Vec<String> {
     let stage = f.store.stages().await.unwrap().remove(0).id;
     let board = f.store.board(stage, revision).await.unwrap();
     board.iter().map(|row| row.team.name.to_string()).collect()
 }
 
-/// By which of the stage's rules the board is, and what they are.
-async fn newest(f: &Fixture) -> (u32, Ruleset) {
+/// Revision and ruleset of the board.
+async fn newest(f: &TestStore) -> (u32, Ruleset) {
     let stage = f.store.stages().await.unwrap().remove(0);
     let number = f.store.board_revision(&stage).await.unwrap();
     let revisions = f.store.stage_revisions(stage.id).await.unwrap();
@@ -53,7 +53,7 @@ async fn newest(f: &Fixture) -> (u32, Ruleset) {
 }
 
 #[tokio::test]
-async fn what_is_under_way_at_an_upgrade_finishes_by_its_own_rules_on_its_own_board() {
+async fn runs_started_before_upgrade_keep_their_ruleset() {
     for earlier in Ruleset::ALL {
         if earlier != Ruleset::CURRENT {
             upgrade_from(earlier).await;
@@ -62,20 +62,20 @@ async fn what_is_under_way_at_an_upgrade_finishes_by_its_own_rules_on_its_own_bo
 }
 
 async fn upgrade_from(earlier: Ruleset) {
-    let mut f = Fixture::new().await;
+    let mut f = TestStore::new().await;
     let [alpha, beta] = [f.ready_team("Alpha").await, f.ready_team("Beta").await];
     f.evaluate(alpha.id, &plan()).await;
     assert_eq!(newest(&f).await, (1, Ruleset::CURRENT));
-    was_begun_under(&f, earlier).await;
-    assert_eq!(play(&f, 10.0).await, earlier);
+    set_ruleset(&f, earlier).await;
+    assert_eq!(run_evaluation(&f, 10.0).await, earlier);
     assert_eq!(newest(&f).await, (1, earlier));
 
-    // The new program starts, with the same configuration.
+    // The new version starts with the same configuration.
     f.later(24 * 3600);
     f.evaluate(alpha.id, &plan()).await;
     assert_eq!(newest(&f).await, (1, earlier), "until there is a result");
-    assert_eq!(play(&f, 20.0).await, earlier, "Beta's was queued before");
-    assert_eq!(play(&f, 30.0).await, Ruleset::CURRENT);
+    assert_eq!(run_evaluation(&f, 20.0).await, earlier, "Beta's was queued before");
+    assert_eq!(run_evaluation(&f, 30.0).await, Ruleset::CURRENT);
     assert_eq!(newest(&f).await, (2, Ruleset::CURRENT));
     assert_eq!(teams(&f, 1).await, ["Alpha", "Beta"]);
     assert_eq!(teams(&f, 2).await, ["Alpha"]);

@@ -1,11 +1,11 @@
-//! Stages that take agents of some runtimes only: at the cut, by whatever way it comes.
+//! Stages that accept only agents of some runtimes.
 
 use crate::fixture::*;
 use faceoff_store::*;
 use faceoff_types::*;
 
-/// Has the season's first stage take these only.
-async fn takes(f: &Fixture, stage: StageId, runtime: &str) {
+/// Lets a stage accept only this runtime.
+async fn accept_only(f: &TestStore, stage: StageId, runtime: &str) {
     let rules = StageRules {
         runtimes: Some([runtime.to_owned()].into_iter().collect()),
         ..f.store.stage(stage).await.unwrap().rules.rules
@@ -18,31 +18,31 @@ async fn takes(f: &Fixture, stage: StageId, runtime: &str) {
     changed.await.unwrap();
 }
 
-async fn not_taken(f: &Fixture) -> Vec<Subject> {
+async fn excluded(f: &TestStore) -> Vec<Subject> {
     let events = f.store.events_after(0, 1000).await.unwrap();
-    let left_out = events.into_iter().filter(|record| {
+    let exclusions = events.into_iter().filter(|record| {
         matches!(&record.event, Event::SubmissionNotTaken { reason, .. } if reason.contains("“Qualifying”"))
     });
-    left_out.map(|record| record.subject).collect()
+    exclusions.map(|record| record.subject).collect()
 }
 
 #[tokio::test]
-async fn a_scheduled_day_that_takes_nobody_has_its_cut_and_is_over() {
-    let f = Fixture::new().await;
+async fn scheduled_day_without_submissions_is_released() {
+    let f = TestStore::new().await;
     let native = f.ready_team("Alpha").await;
     let stage = f.stage(&plan()).await;
-    takes(&f, stage, "python3").await;
+    accept_only(&f, stage, "python3").await;
     let started = f.store.start_scheduled_day(stage, f.now).await.unwrap();
     assert_eq!(started, Some(Vec::new()));
-    assert_eq!(not_taken(&f).await, [Subject::Submission(native.id)]);
+    assert_eq!(excluded(&f).await, [Subject::Submission(native.id)]);
     let day = f.store.newest_day(stage).await.unwrap().unwrap();
     assert_eq!(day.released_at, Some(f.now));
-    assert!(f.claim().await.is_none(), "nothing is played");
+    assert!(f.claim().await.is_none(), "no job is queued");
 }
 
 #[tokio::test]
-async fn an_agent_that_was_checked_before_runtimes_were_told_is_taken_once_it_is_uploaded_again() {
-    let f = Fixture::new().await;
+async fn submission_with_unknown_runtime_must_be_uploaded_again() {
+    let f = TestStore::new().await;
     let team = f.team("Alpha").await;
     f.upload(&team).await;
     let old = f.validate().await;
@@ -53,22 +53,22 @@ async fn an_agent_that_was_checked_before_runtimes_were_told_is_taken_once_it_is
         .unwrap();
     let stage = f.stage(&plan()).await;
     let active = || async { f.store.active_submissions().await.unwrap().remove(0) };
-    let told = async || f.store.stage(stage).await.unwrap();
-    assert_eq!(told().await.check_takes(&active().await), Ok(()), "all are");
-    takes(&f, stage, "native").await;
-    let refused = told().await.check_takes(&active().await).unwrap_err();
+    let current = async || f.store.stage(stage).await.unwrap();
+    assert_eq!(current().await.check_accepts(&active().await), Ok(()), "all runtimes are accepted");
+    accept_only(&f, stage, "native").await;
+    let refused = current().await.check_accepts(&active().await).unwrap_err();
     assert!(refused.to_string().contains("upload it again"), "{refused}");
     let started = f.store.start_day(Actor::Organiser, stage, f.now).await;
     let Err(StoreError::Conflict(why)) = started else {
         panic!("expected a refusal, got {started:?}");
     };
-    assert!(why.contains("that the stage takes"), "{why}");
-    assert!(not_taken(&f).await.is_empty(), "nothing is done");
+    assert!(why.contains("that the stage accepts"), "{why}");
+    assert!(excluded(&f).await.is_empty(), "no exclusion is recorded");
 
     f.upload(&team).await;
     let new = f.validate().await;
-    assert_eq!(new.same_as, Some(old.id));
-    assert_eq!(told().await.check_takes(&active().await), Ok(()));
+    assert_eq!(new.duplicate_of, Some(old.id));
+    assert_eq!(current().await.check_accepts(&active().await), Ok(()));
     let started = f.store.start_day(Actor::Organiser, stage, f.now).await;
     assert_eq!(started.unwrap()[0].submission, new.id);
 }

@@ -1,4 +1,4 @@
-//! Stages: their days, their rules by revision, and what of them may be changed when.
+//! Stages: days, revisions of the rules, and permitted changes.
 
 use crate::fixture::*;
 use faceoff_store::*;
@@ -9,9 +9,9 @@ fn at(text: &str) -> Timestamp {
     text.parse().unwrap()
 }
 
-/// Open from the fixture's first moment until the third of March.
+/// A stage that is open from the initial time of the test store until 3 March.
 fn second() -> NewStage {
-    let (rules, settings) = rules_of(&small());
+    let (rules, settings) = rules_and_settings(&small());
     NewStage {
         name: "Warm-up".parse().unwrap(),
         opens_at: at("2026-03-01T10:00:00Z"),
@@ -22,16 +22,16 @@ fn second() -> NewStage {
     }
 }
 
-async fn made(f: &Fixture, new: NewStage) -> Stage {
+async fn create(f: &TestStore, new: NewStage) -> Stage {
     let made = f.store.create_stage(Actor::Organiser, new, f.now);
     made.await.unwrap()
 }
 
-async fn start(f: &Fixture, stage: StageId) -> Result<Vec<Evaluation>, StoreError> {
+async fn start(f: &TestStore, stage: StageId) -> Result<Vec<Evaluation>, StoreError> {
     f.store.start_day(Actor::Organiser, stage, f.now).await
 }
 
-async fn change(f: &Fixture, stage: StageId, change: StageChange) -> Result<Stage, StoreError> {
+async fn change(f: &TestStore, stage: StageId, change: StageChange) -> Result<Stage, StoreError> {
     let changed = f.store.change_stage(Actor::Organiser, stage, change, f.now);
     changed.await
 }
@@ -48,43 +48,43 @@ fn refused<T: std::fmt::Debug>(done: Result<T, StoreError>, words: &[&str]) {
 
 #[tokio::test]
 async fn stages_have_their_own_days_seeds_and_boards() {
-    let f = Fixture::new().await;
+    let f = TestStore::new().await;
     let agent = f.ready_team("Alpha").await;
     let first = f.stage(&small()).await;
-    let second = made(&f, second()).await.id;
+    let second = create(&f, second()).await.id;
     let secret = f.store.season().await.unwrap().secret;
     let date = date(2026, 3, 1);
     let mut seeds = Vec::new();
     for (stage, score) in [(first, 10.0), (second, 20.0)] {
         let started = start(&f, stage).await.unwrap();
         assert_eq!(started.len(), 1);
-        assert_eq!(started[0].of, StageDay { stage, date });
+        assert_eq!(started[0].stage_day, StageDay { stage, date });
         assert_eq!(started[0].submission, agent.id);
-        let again = start(&f, stage).await;
+        let repeated = start(&f, stage).await;
         assert!(
-            matches!(again, Err(StoreError::DayHasCut { .. })),
-            "{again:?}"
+            matches!(repeated, Err(StoreError::CutoffPassed { .. })),
+            "{repeated:?}"
         );
         let claimed = f.claim().await.unwrap();
-        let Work::Shard {
+        let Job::Shard {
             seeds: found,
             shard,
             ..
-        } = claimed.work
+        } = claimed.job
         else {
             panic!("expected a shard");
         };
         assert_eq!(found.episodes, secret.stage(stage).day(date));
         assert_eq!(found.mismatch, secret.model_mismatch());
         seeds.push(found.episodes);
-        f.play(&claimed.claim, &shard, 0).await;
-        f.play_to(score).await;
+        f.commit_shard(&claimed.claim, &shard, 0).await;
+        f.run_all(score).await;
         let board = f.store.board(stage, 1).await.unwrap();
         assert_eq!(board.len(), 1);
         assert_eq!(board[0].result.score, score);
         assert!(
             board[0].released_at.is_some(),
-            "the other stage's day is its own"
+            "the day of the other stage does not matter"
         );
     }
     assert_ne!(seeds[0], seeds[1]);
@@ -98,36 +98,36 @@ async fn stages_have_their_own_days_seeds_and_boards() {
 }
 
 #[tokio::test]
-async fn a_day_is_the_date_in_the_stages_zone() {
-    let mut f = Fixture::new().await;
+async fn day_is_the_date_in_the_stages_zone() {
+    let mut f = TestStore::new().await;
     f.ready_team("Alpha").await;
     let auckland = NewStage {
         zone: "Pacific/Auckland".parse().unwrap(),
         ..second()
     };
-    let stage = made(&f, auckland).await.id;
-    let day = |started: Vec<Evaluation>| started[0].of.date;
+    let stage = create(&f, auckland).await.id;
+    let day = |started: Vec<Evaluation>| started[0].stage_day.date;
     assert_eq!(day(start(&f, stage).await.unwrap()), date(2026, 3, 1));
-    f.play_to(1.0).await;
-    // Midnight there is 11:00 UTC.
+    f.run_all(1.0).await;
+    // Midnight in that zone is 11:00 UTC.
     f.now = at("2026-03-01T10:59:59Z");
     assert!(matches!(
         start(&f, stage).await,
-        Err(StoreError::DayHasCut { .. })
+        Err(StoreError::CutoffPassed { .. })
     ));
     f.now = at("2026-03-01T11:00:00Z");
     assert_eq!(day(start(&f, stage).await.unwrap()), date(2026, 3, 2));
 }
 
 #[tokio::test]
-async fn days_start_from_the_opening_to_the_closing_to_the_millisecond() {
-    let mut f = Fixture::new().await;
+async fn days_start_only_between_opening_and_closing() {
+    let mut f = TestStore::new().await;
     f.ready_team("Alpha").await;
     let later = NewStage {
         opens_at: at("2026-03-02T10:00:00Z"),
         ..second()
     };
-    let stage = made(&f, later).await;
+    let stage = create(&f, later).await;
     assert_eq!(stage.phase(f.now), StagePhase::Upcoming);
     f.now = stage.opens_at - SignedDuration::from_millis(1);
     let early = start(&f, stage.id).await;
@@ -155,7 +155,7 @@ async fn days_start_from_the_opening_to_the_closing_to_the_millisecond() {
     assert_eq!(
         start(&f, stage.id).await.unwrap().len(),
         1,
-        "the last moment"
+        "the last millisecond"
     );
     f.now = closes_at;
     assert_eq!(stage.phase(f.now), StagePhase::Closed);
@@ -168,17 +168,17 @@ async fn days_start_from_the_opening_to_the_closing_to_the_millisecond() {
         f.store.start_scheduled_day(stage.id, f.now).await.unwrap(),
         None
     );
-    // What had its cut in time is played to its end, and what we break of it is played again.
+    // Days that started before the closing continue, with automatic reruns.
     assert!(f.claim().await.is_some());
 }
 
 #[tokio::test]
-async fn other_rules_of_an_open_stage_are_another_revision_and_another_board() {
-    let mut f = Fixture::new().await;
+async fn new_rules_of_open_stage_create_revision_and_board() {
+    let mut f = TestStore::new().await;
     f.ready_team("Alpha").await;
-    let stage = made(&f, second()).await;
+    let stage = create(&f, second()).await;
     start(&f, stage.id).await.unwrap();
-    f.play_to(10.0).await;
+    f.run_all(10.0).await;
 
     let rules = StageRules {
         episodes_per_task: 2,
@@ -192,13 +192,13 @@ async fn other_rules_of_an_open_stage_are_another_revision_and_another_board() {
     let changed = change(&f, stage.id, others.clone()).await.unwrap();
     assert_eq!((changed.rules.number, changed.rules.since), (2, f.now));
     let same = change(&f, stage.id, others).await.unwrap();
-    assert_eq!(same, changed, "the same again is no change");
-    assert_eq!(f.store.board_revision(&same).await.unwrap(), 1, "as yet");
+    assert_eq!(same, changed, "identical rules are no change");
+    assert_eq!(f.store.board_revision(&same).await.unwrap(), 1, "there is no result of revision 2 yet");
 
     f.now = at("2026-03-02T10:00:00Z");
     let started = start(&f, stage.id).await.unwrap().remove(0);
     assert_eq!((started.revision, started.plan.episodes_per_task), (2, 2));
-    f.play_to(20.0).await;
+    f.run_all(20.0).await;
     assert_eq!(f.store.board_revision(&same).await.unwrap(), 2);
     for (revision, score) in [(1, 10.0), (2, 20.0)] {
         let board = f.store.board(stage.id, revision).await.unwrap();
@@ -206,11 +206,11 @@ async fn other_rules_of_an_open_stage_are_another_revision_and_another_board() {
         assert_eq!(board[0].result.score, score);
     }
     let revisions = f.store.stage_revisions(stage.id).await.unwrap();
-    let told: Vec<_> = revisions
+    let found: Vec<_> = revisions
         .iter()
         .map(|one| (one.number, &one.rules))
         .collect();
-    assert_eq!(told, [(1, &stage.rules.rules), (2, &rules)]);
+    assert_eq!(found, [(1, &stage.rules.rules), (2, &rules)]);
     let events = f.store.events_after(0, 1000).await.unwrap();
     let revised = events.iter().filter(|record| {
         record.event
@@ -223,10 +223,10 @@ async fn other_rules_of_an_open_stage_are_another_revision_and_another_board() {
 }
 
 #[tokio::test]
-async fn settings_are_no_rules() {
-    let f = Fixture::new().await;
+async fn settings_change_creates_no_revision() {
+    let f = TestStore::new().await;
     f.ready_team("Alpha").await;
-    let stage = made(&f, second()).await;
+    let stage = create(&f, second()).await;
     let settings = StageSettings {
         schedule: Some(Schedule::daily("06:00".parse().unwrap())),
         ablation_episodes: 3,
@@ -247,16 +247,16 @@ async fn settings_are_no_rules() {
 }
 
 #[tokio::test]
-async fn what_has_begun_is_not_changed() {
-    let mut f = Fixture::new().await;
+async fn started_stage_refuses_most_changes() {
+    let mut f = TestStore::new().await;
     f.ready_team("Alpha").await;
-    let open = made(&f, second()).await;
+    let open = create(&f, second()).await;
     let upcoming = NewStage {
         name: "Final".parse().unwrap(),
         opens_at: at("2026-03-02T10:00:00Z"),
         ..second()
     };
-    let upcoming = made(&f, upcoming).await;
+    let upcoming = create(&f, upcoming).await;
     let opening = |text| StageChange {
         opens_at: Some(at(text)),
         ..StageChange::default()
@@ -296,7 +296,7 @@ async fn what_has_begun_is_not_changed() {
     );
     change(&f, open.id, zone()).await.unwrap();
 
-    // Before it opens, other rules take the place of those by which nothing was played.
+    // Before the opening, new rules replace the old ones without a new revision.
     let moved = StageChange {
         rules: Some(StageRules {
             episodes_per_task: 9,
@@ -338,8 +338,8 @@ async fn what_has_begun_is_not_changed() {
 }
 
 #[tokio::test]
-async fn stages_that_cannot_be_are_refused_whole() {
-    let mut f = Fixture::new().await;
+async fn invalid_stages_are_refused() {
+    let mut f = TestStore::new().await;
     let bad_times = NewStage {
         closes_at: Some(at("2026-03-01T09:00:00Z")),
         ..second()
@@ -381,25 +381,25 @@ async fn stages_that_cannot_be_are_refused_whole() {
 }
 
 #[tokio::test]
-async fn the_first_stage_follows_the_configuration_until_a_hand_changes_it() {
-    let mut f = Fixture::new().await;
-    let told = async |f: &Fixture, plan: &RunPlan| {
-        let (rules, settings) = rules_of(plan);
-        let told = f.store.configure_stage(rules, settings, Zone::UTC, f.now);
-        told.await.unwrap();
+async fn first_stage_follows_configuration_until_changed() {
+    let mut f = TestStore::new().await;
+    let configure = async |f: &TestStore, plan: &RunPlan| {
+        let (rules, settings) = rules_and_settings(plan);
+        let configured = f.store.configure_stage(rules, settings, Zone::UTC, f.now);
+        configured.await.unwrap();
         f.store.stages().await.unwrap()
     };
-    let first = told(&f, &plan()).await;
+    let first = configure(&f, &plan()).await;
     assert_eq!(first.len(), 1);
     assert!(first[0].configured && first[0].names_seeds);
     assert_eq!(first[0].plan(), plan());
     f.later(60);
     assert_eq!(
-        told(&f, &plan()).await,
+        configure(&f, &plan()).await,
         first,
-        "the same again is no change"
+        "an identical configuration is no change"
     );
-    let second = told(&f, &small()).await;
+    let second = configure(&f, &small()).await;
     assert_eq!((second[0].id, second[0].rules.number), (first[0].id, 2));
     assert_eq!(second[0].plan(), small());
 
@@ -409,12 +409,12 @@ async fn the_first_stage_follows_the_configuration_until_a_hand_changes_it() {
     };
     let changed = change(&f, first[0].id, by_hand).await.unwrap();
     assert_eq!((changed.rules.number, changed.configured), (3, false));
-    assert_eq!(told(&f, &small()).await, [changed]);
+    assert_eq!(configure(&f, &small()).await, [changed]);
 }
 
 #[tokio::test]
-async fn a_closed_season_has_its_stage_and_changes_it_no_more() {
-    let mut f = Fixture::new().await;
+async fn stage_of_closed_season_is_unchangeable() {
+    let mut f = TestStore::new().await;
     f.store.close_season(Actor::Organiser, f.now).await.unwrap();
     f.later(1);
     let first = f.stage(&plan()).await;
@@ -429,8 +429,8 @@ async fn a_closed_season_has_its_stage_and_changes_it_no_more() {
 }
 
 #[tokio::test]
-async fn the_current_stage_is_the_open_one_or_the_nearest() {
-    let f = Fixture::new().await;
+async fn current_stage_is_the_open_or_nearest_one() {
+    let f = TestStore::new().await;
     let current = async |text: &str| {
         let current = f.store.current_stage(at(text)).await.unwrap();
         current.map(|stage| stage.name.to_string())
@@ -447,7 +447,7 @@ async fn the_current_stage_is_the_open_one_or_the_nearest() {
             closes_at: Some(at(closes_at)),
             ..second()
         };
-        made(&f, new).await;
+        create(&f, new).await;
     }
     for (now, expected) in [
         ("2026-03-01T10:00:00Z", "A"),

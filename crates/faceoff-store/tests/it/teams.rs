@@ -3,8 +3,8 @@ use faceoff_store::*;
 use faceoff_types::TeamId;
 
 #[tokio::test]
-async fn a_name_is_taken_whatever_its_case() {
-    let f = Fixture::new().await;
+async fn team_names_are_unique_ignoring_case() {
+    let f = TestStore::new().await;
     f.team("Air-HocKIT").await;
     let name = "AIR-hockit".parse().unwrap();
     let error = f
@@ -18,8 +18,8 @@ async fn a_name_is_taken_whatever_its_case() {
 }
 
 #[tokio::test]
-async fn a_team_is_found_by_its_token_until_that_is_replaced() {
-    let f = Fixture::new().await;
+async fn team_token_is_valid_until_replaced() {
+    let f = TestStore::new().await;
     let name = "Zoë".parse().unwrap();
     let team = f
         .store
@@ -27,22 +27,22 @@ async fn a_team_is_found_by_its_token_until_that_is_replaced() {
         .await
         .unwrap();
     assert_eq!(f.store.team(team.id).await.unwrap(), team);
-    let who = async |hash| {
-        let holder = f.store.holder([hash; 32], TokenKind::Key, f.now).await;
-        holder.unwrap().map(|holder| holder.who)
+    let principal = async |hash| {
+        let holder = f.store.verify_token([hash; 32], TokenKind::ApiToken, f.now).await;
+        holder.unwrap().map(|holder| holder.principal)
     };
-    assert_eq!(who(7).await, Ok(Who::Team(team.clone())));
+    assert_eq!(principal(7).await, Ok(Principal::Team(team.clone())));
     f.store
         .set_team_token(Actor::Organiser, team.id, [8; 32], f.now)
         .await
         .unwrap();
-    assert_eq!(who(7).await, Err(Refusal::Revoked(f.now)));
-    assert_eq!(who(8).await, Ok(Who::Team(team)));
+    assert_eq!(principal(7).await, Err(TokenRejection::Revoked(f.now)));
+    assert_eq!(principal(8).await, Ok(Principal::Team(team)));
 }
 
 #[tokio::test]
 async fn two_teams_cannot_share_a_token() {
-    let f = Fixture::new().await;
+    let f = TestStore::new().await;
     f.store
         .create_team(Actor::Organiser, &"A".parse().unwrap(), [7; 32], f.now)
         .await
@@ -68,7 +68,7 @@ async fn two_teams_cannot_share_a_token() {
 
 #[tokio::test]
 async fn unknown_ids_are_not_found() {
-    let f = Fixture::new().await;
+    let f = TestStore::new().await;
     let id = TeamId::new();
     assert!(matches!(
         f.store.team(id).await,

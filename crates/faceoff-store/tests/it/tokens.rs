@@ -1,4 +1,4 @@
-//! Tokens: what each is worth, and from when on it is worth nothing.
+//! Tokens: validity, expiry, rotation and revocation.
 
 use crate::fixture::*;
 use faceoff_store::*;
@@ -8,21 +8,21 @@ use jiff::{SignedDuration, Timestamp};
 fn new(hash: u8, owner: TokenOwner, expires_at: Option<Timestamp>) -> NewToken {
     NewToken {
         hash: [hash; 32],
-        kind: TokenKind::Key,
+        kind: TokenKind::ApiToken,
         owner,
         name: "laptop".into(),
         expires_at,
     }
 }
 
-async fn refusal(f: &Fixture, hash: u8) -> Option<Refusal> {
-    let holder = f.store.holder([hash; 32], TokenKind::Key, f.now).await;
+async fn rejection(f: &TestStore, hash: u8) -> Option<TokenRejection> {
+    let holder = f.store.verify_token([hash; 32], TokenKind::ApiToken, f.now).await;
     holder.unwrap().err()
 }
 
 #[tokio::test]
-async fn a_token_is_worth_something_until_it_expires_is_rotated_or_revoked() {
-    let mut f = Fixture::new().await;
+async fn token_is_valid_until_expired_rotated_or_revoked() {
+    let mut f = TestStore::new().await;
     let team = TokenOwner::Team(f.team("Alpha").await.id);
     let soon = f.now + SignedDuration::from_secs(60);
     let create = async |hash, expires_at| {
@@ -35,21 +35,21 @@ async fn a_token_is_worth_something_until_it_expires_is_rotated_or_revoked() {
     assert_eq!((brief.expires_at, long.expires_at), (Some(soon), None));
     let past = create(3, Some(f.now)).await.unwrap_err();
     assert!(past.to_string().contains("in the future"), "{past}");
-    let again = create(2, None).await.unwrap_err();
-    assert!(matches!(again, StoreError::Conflict(_)), "{again}");
-    assert_eq!(refusal(&f, 1).await, None);
-    assert_eq!(refusal(&f, 4).await, Some(Refusal::Unknown));
-    let as_cookie = f.store.holder([1; 32], TokenKind::Session, f.now).await;
-    assert_eq!(as_cookie.unwrap().unwrap_err(), Refusal::WrongKind);
+    let repeated = create(2, None).await.unwrap_err();
+    assert!(matches!(repeated, StoreError::Conflict(_)), "{repeated}");
+    assert_eq!(rejection(&f, 1).await, None);
+    assert_eq!(rejection(&f, 4).await, Some(TokenRejection::Unknown));
+    let as_cookie = f.store.verify_token([1; 32], TokenKind::Session, f.now).await;
+    assert_eq!(as_cookie.unwrap().unwrap_err(), TokenRejection::WrongKind);
 
     f.store
         .rotate_token(Actor::Organiser, long.id, [5; 32], f.now)
         .await
         .unwrap();
-    assert_eq!(refusal(&f, 2).await, Some(Refusal::Unknown));
-    assert_eq!(refusal(&f, 5).await, None);
+    assert_eq!(rejection(&f, 2).await, Some(TokenRejection::Unknown));
+    assert_eq!(rejection(&f, 5).await, None);
     f.later(60);
-    assert_eq!(refusal(&f, 1).await, Some(Refusal::Expired(soon)));
+    assert_eq!(rejection(&f, 1).await, Some(TokenRejection::Expired(soon)));
     let rotated = f
         .store
         .rotate_token(Actor::Organiser, brief.id, [6; 32], f.now)
@@ -59,7 +59,7 @@ async fn a_token_is_worth_something_until_it_expires_is_rotated_or_revoked() {
         let revoked = f.store.revoke_token(Actor::Organiser, long.id, f.now).await;
         assert_eq!(revoked.unwrap().revoked_at, Some(f.now));
     }
-    assert_eq!(refusal(&f, 5).await, Some(Refusal::Revoked(f.now)));
+    assert_eq!(rejection(&f, 5).await, Some(TokenRejection::Revoked(f.now)));
     let unknown = f
         .store
         .revoke_token(Actor::Organiser, TokenId::new(), f.now)
@@ -69,12 +69,12 @@ async fn a_token_is_worth_something_until_it_expires_is_rotated_or_revoked() {
     let revoked = events
         .iter()
         .filter(|record| matches!(record.event, Event::TokenRevoked { .. }));
-    assert_eq!(revoked.count(), 1, "what is revoked is not revoked again");
+    assert_eq!(revoked.count(), 1, "a revoked token is not revoked again");
 }
 
 #[tokio::test]
-async fn the_last_use_is_noted_and_one_owner_has_so_many() {
-    let mut f = Fixture::new().await;
+async fn token_use_is_recorded_and_tokens_are_limited() {
+    let mut f = TestStore::new().await;
     let team = f.team("Alpha").await;
     let owner = TokenOwner::Team(team.id);
     for hash in 1..u8::try_from(MAX_TOKENS).unwrap() {
@@ -88,14 +88,14 @@ async fn the_last_use_is_noted_and_one_owner_has_so_many() {
         .create_token(Actor::Organiser, new(200, owner, None), f.now)
         .await
         .unwrap_err();
-    assert!(many.to_string().contains("no more than that"), "{many}");
+    assert!(many.to_string().contains("which is the limit"), "{many}");
     let used = f.store.tokens().await.unwrap().remove(3);
     assert_eq!(used.last_used_at, None);
     f.later(90);
-    f.store.token_used(&used, f.now).await.unwrap();
+    f.store.record_token_use(&used, f.now).await.unwrap();
     let used = f.store.token(used.id).await.unwrap();
     assert_eq!(used.last_used_at, Some(f.now));
-    // One that is worth nothing makes room.
+    // A revoked token does not count towards the limit.
     f.store
         .revoke_token(Actor::Organiser, used.id, f.now)
         .await
@@ -107,8 +107,8 @@ async fn the_last_use_is_noted_and_one_owner_has_so_many() {
 }
 
 #[tokio::test]
-async fn the_hosts_token_follows_its_file_and_stays_revoked() {
-    let f = Fixture::new().await;
+async fn host_token_follows_its_file_and_stays_revoked() {
+    let f = TestStore::new().await;
     assert!(f.store.set_host_token([1; 32], f.now).await.unwrap());
     assert!(f.store.set_host_token([1; 32], f.now).await.unwrap());
     let other = f
@@ -117,10 +117,10 @@ async fn the_hosts_token_follows_its_file_and_stays_revoked() {
         .await
         .unwrap();
     assert!(f.store.set_host_token([2; 32], f.now).await.unwrap());
-    assert_eq!(refusal(&f, 1).await, Some(Refusal::Revoked(f.now)));
-    assert_eq!(refusal(&f, 2).await, None);
-    assert_eq!(refusal(&f, 9).await, None, "named by hand, it is no file's");
-    // Rotated, the file's would be worth something again at the next start, which reads the file.
+    assert_eq!(rejection(&f, 1).await, Some(TokenRejection::Revoked(f.now)));
+    assert_eq!(rejection(&f, 2).await, None);
+    assert_eq!(rejection(&f, 9).await, None, "other host tokens are not affected");
+    // If the file token could be rotated, the next start would restore the old secret from the file.
     let tokens = f.store.tokens().await.unwrap();
     let of_file = tokens
         .iter()
@@ -132,7 +132,7 @@ async fn the_hosts_token_follows_its_file_and_stays_revoked() {
     };
     let refused = rotate(of_file.unwrap().id, 3).await.unwrap_err();
     assert!(refused.to_string().contains("revoke it"), "{refused}");
-    assert_eq!(refusal(&f, 2).await, None, "nothing is done");
+    assert_eq!(rejection(&f, 2).await, None, "the token is unchanged");
     rotate(other.id, 8).await.unwrap();
     rotate(other.id, 9).await.unwrap();
     assert!(!f.store.set_host_token([1; 32], f.now).await.unwrap());

@@ -1,4 +1,4 @@
-//! Tournaments: who is in, what is drawn, how games stand, and what is kept apart from results.
+//! Tournaments: entrants, rounds, games and their attempts, friendly games, and schedule replays.
 
 use crate::fixture::*;
 use faceoff_store::*;
@@ -6,7 +6,7 @@ use faceoff_types::*;
 use proptest::prelude::*;
 use serde_json::json;
 
-const WHY: &str = "the table was tilted";
+const REASON: &str = "the table was tilted";
 
 #[track_caller]
 fn refused<T: std::fmt::Debug>(done: Result<T, StoreError>, words: &[&str]) {
@@ -22,8 +22,8 @@ fn round(number: u32) -> RoundNumber {
     number.try_into().unwrap()
 }
 
-/// Ready teams in a tournament of these rules.
-async fn opened(f: &Fixture, names: &[&str], rules: TournamentRules) -> (Tournament, Vec<TeamId>) {
+/// A tournament with these rules and teams, each of which has a valid submission.
+async fn opened(f: &TestStore, names: &[&str], rules: TournamentRules) -> (Tournament, Vec<TeamId>) {
     let mut teams = Vec::new();
     for name in names {
         teams.push(f.ready_team(name).await.team);
@@ -58,7 +58,7 @@ fn drawn(number: u32, matchdays: &[&[[TeamId; 2]]], byes: &[TeamId]) -> DrawnRou
 }
 
 async fn start(
-    f: &Fixture,
+    f: &TestStore,
     id: TournamentId,
     drawn: &DrawnRound,
 ) -> Result<TournamentRound, StoreError> {
@@ -67,7 +67,7 @@ async fn start(
         .await
 }
 
-async fn record(f: &Fixture, id: TournamentId) -> TournamentRecord {
+async fn record(f: &TestStore, id: TournamentId) -> TournamentRecord {
     f.store.tournament_record(id).await.unwrap()
 }
 
@@ -84,100 +84,100 @@ fn result(recorded: bool) -> GameCommit {
     }
 }
 
-/// The next unit, which must be a game.
-async fn claim_game(f: &Fixture) -> (Claim, GameId, u32) {
+/// Claims the next job, which must be a game.
+async fn claim_game(f: &TestStore) -> (JobClaim, GameId, u32) {
     match f.claim().await {
-        Some(Claimed {
+        Some(ClaimedJob {
             claim,
-            work: Work::Game { game, attempt, .. },
+            job: Job::Game { game, attempt, .. },
         }) => (claim, game, attempt),
         other => panic!("expected a game: {other:?}"),
     }
 }
 
-async fn play_next(f: &Fixture) -> GameId {
+async fn run_next_game(f: &TestStore) -> GameId {
     let (claim, game, _) = claim_game(f).await;
     let recorded = f.store.game(game).await.unwrap().purpose.keeps_recording();
     let committed = f.store.commit_game(&claim, &result(recorded), f.now).await;
-    assert_eq!(committed.unwrap(), Committed::Now);
+    assert_eq!(committed.unwrap(), CommitOutcome::Stored);
     game
 }
 
 #[tokio::test]
-async fn who_played_a_game_elsewhere_is_known_and_what_it_has_under_way_goes_with_its_ban() {
-    let f = Fixture::new().await;
+async fn ban_requeues_running_games_and_lists_results() {
+    let f = TestStore::new().await;
     let (cup, teams) = opened(&f, &["A", "B", "C"], TournamentRules::default()).await;
-    let meetings = [
+    let pairings = [
         [teams[0], teams[1]],
         [teams[1], teams[2]],
         [teams[2], teams[0]],
     ];
-    start(&f, cup.id, &drawn(1, &[&meetings], &[]))
+    start(&f, cup.id, &drawn(1, &[&pairings], &[]))
         .await
         .unwrap();
-    let begin = async |claim: &Claim, slot: &str| {
-        let begins = f.store.hand_over(claim, slot, LEASE_S, f.now);
+    let begin = async |claim: &JobClaim, slot: &str| {
+        let begins = f.store.transfer_lease(claim, slot, LEASE_S, f.now);
         assert!(begins.await.unwrap());
     };
-    let given_out = async || {
-        let claimed = f.store.claim("given out", LEASE_S, f.now).await.unwrap();
-        match claimed.expect("a game waits") {
-            Claimed {
+    let claim_in_advance = async || {
+        let claimed = f.store.claim("reserved", LEASE_S, f.now).await.unwrap();
+        match claimed.expect("a game is queued") {
+            ClaimedJob {
                 claim,
-                work: Work::Game { game, .. },
+                job: Job::Game { game, .. },
             } => (claim, game),
             other => panic!("{other:?}"),
         }
     };
-    let (claim, played) = given_out().await;
+    let (claim, played) = claim_in_advance().await;
     begin(&claim, "remote/rack-1/slot-0").await;
     let commit = result(true);
     let committed = f.store.commit_game(&claim, &commit, f.now);
-    assert_eq!(committed.await.unwrap(), Committed::Now);
+    assert_eq!(committed.await.unwrap(), CommitOutcome::Stored);
     let rack: WorkerName = "rack-1".parse().unwrap();
-    let games = f.store.played_by(&rack, 10).await.unwrap().games;
-    assert_eq!(games, [played], "an organiser finds it, to void it or not");
+    let games = f.store.results_of_worker(&rack, 10).await.unwrap().games;
+    assert_eq!(games, [played], "organisers can find the game and void it");
 
-    // One is just being looked at, one is somebody else's.
-    let (looked_at, mine) = given_out().await;
-    begin(&looked_at, "remote/rack-1/slot-0").await;
-    let (other, _) = given_out().await;
+    // One result is pending, one game belongs to another worker.
+    let (pending, requeued) = claim_in_advance().await;
+    begin(&pending, "remote/rack-1/slot-0").await;
+    let (other, _) = claim_in_advance().await;
     begin(&other, "remote/rack-2/slot-0").await;
-    let ban = f.store.ban_worker(Actor::Server, &rack, WHY, f.now);
+    let ban = f.store.ban_worker(Actor::Server, &rack, REASON, f.now);
     ban.await.unwrap();
-    let late = f.store.commit_game(&looked_at, &commit, f.now);
-    assert_eq!(late.await.unwrap(), Committed::LeaseLost);
-    assert_eq!(state(&f, mine).await, GameState::Queued);
-    let (again, game) = given_out().await;
-    assert_eq!(game, mine, "another plays it at once");
-    begin(&again, "remote/rack-2/slot-1").await;
+    let late = f.store.commit_game(&pending, &commit, f.now);
+    assert_eq!(late.await.unwrap(), CommitOutcome::LeaseLost);
+    assert_eq!(state(&f, requeued).await, GameState::Queued);
+    let (reclaimed, game) = claim_in_advance().await;
+    assert_eq!(game, requeued, "another worker gets it at once");
+    begin(&reclaimed, "remote/rack-2/slot-1").await;
     let committed = f.store.commit_game(&other, &commit, f.now);
-    assert_eq!(committed.await.unwrap(), Committed::Now);
+    assert_eq!(committed.await.unwrap(), CommitOutcome::Stored);
 }
 
-async fn state(f: &Fixture, game: GameId) -> GameState {
+async fn state(f: &TestStore, game: GameId) -> GameState {
     f.store.game(game).await.unwrap().state
 }
 
-fn leaving(team: TeamId, left_as: LeftAs, from_round: Option<RoundNumber>) -> Leaving {
-    Leaving {
+fn departure(team: TeamId, kind: DepartureKind, from_round: Option<RoundNumber>) -> DepartureRequest {
+    DepartureRequest {
         team,
-        left_as,
+        kind,
         from_round,
-        reason: WHY.to_owned(),
+        reason: REASON.to_owned(),
     }
 }
 
 #[tokio::test]
-async fn a_round_is_drawn_once_played_in_order_and_over_with_its_last_game() {
-    let mut f = Fixture::new().await;
+async fn round_starts_once_and_ends_with_its_last_game() {
+    let mut f = TestStore::new().await;
     let (cup, teams) = opened(&f, &["A", "B", "C"], TournamentRules::default()).await;
     let [a, b, c] = teams[..] else { panic!() };
     assert_eq!(cup.number, 1);
     let first = drawn(1, &[&[[a, b]], &[[b, c]], &[[c, a]]], &[c, a, b]);
     let (one, two) = tokio::join!(start(&f, cup.id, &first), start(&f, cup.id, &first));
     let lost = if one.is_ok() { two } else { one };
-    refused(lost, &["round 1 was started already"]);
+    refused(lost, &["round 1 has started already"]);
     refused(
         start(&f, cup.id, &drawn(3, &[&[[a, b]]], &[c])).await,
         &["not the next one"],
@@ -198,9 +198,9 @@ async fn a_round_is_drawn_once_played_in_order_and_over_with_its_last_game() {
     for game in &started.games {
         f.later(30);
         assert_eq!(
-            play_next(&f).await,
+            run_next_game(&f).await,
             game.id,
-            "in the order in which they were drawn"
+            "games are run in the order of the draw"
         );
         seeds.push(game.seed);
     }
@@ -216,7 +216,7 @@ async fn a_round_is_drawn_once_played_in_order_and_over_with_its_last_game() {
     let log = |side| f.store.game_log(over.games[0].id, side);
     assert_eq!(log(Side::First).await.unwrap().as_deref(), Some("home\n"));
     assert_eq!(log(Side::Second).await.unwrap().as_deref(), Some("away\n"));
-    // What was fixed at the start plays the round, whatever is uploaded then; the next has the new one.
+    // A round uses the submissions frozen at its start; the next round uses the newer one.
     let team = f.store.team(a).await.unwrap();
     f.upload(&team).await;
     let newer = f.validate().await;
@@ -234,7 +234,7 @@ async fn a_round_is_drawn_once_played_in_order_and_over_with_its_last_game() {
 
 #[tokio::test]
 async fn mirrored_halves_share_a_seed_and_swap_sides() {
-    let f = Fixture::new().await;
+    let f = TestStore::new().await;
     let rules = TournamentRules {
         mirrored: true,
         ..TournamentRules::default()
@@ -256,12 +256,12 @@ async fn mirrored_halves_share_a_seed_and_swap_sides() {
 }
 
 #[tokio::test]
-async fn a_team_without_a_valid_agent_keeps_a_round_from_starting() {
-    let f = Fixture::new().await;
+async fn round_needs_a_valid_submission_of_each_team() {
+    let f = TestStore::new().await;
     let (cup, teams) = opened(&f, &["A", "B"], TournamentRules::default()).await;
     let late = f.team("Late").await;
     f.store
-        .enter_tournament(Actor::Organiser, cup.id, &[late.id], f.now)
+        .add_entrants(Actor::Organiser, cup.id, &[late.id], f.now)
         .await
         .unwrap();
     let round = drawn(1, &[&[[teams[0], late.id]]], &[teams[1]]);
@@ -270,26 +270,26 @@ async fn a_team_without_a_valid_agent_keeps_a_round_from_starting() {
         &["Late", "Wait for them, or let them leave"],
     );
     assert!(record(&f, cup.id).await.rounds.is_empty());
-    let out = leaving(late.id, LeftAs::Withdrawn, None);
+    let out = departure(late.id, DepartureKind::Withdrawn, None);
     let left = f
         .store
         .leave_tournament(Actor::Organiser, cup.id, &out, f.now)
         .await;
-    assert_eq!(left.unwrap(), None, "nothing was played, so it is just out");
+    assert_eq!(left.unwrap(), None, "before the first round it is only removed");
     refused(start(&f, cup.id, &round).await, &["have changed meanwhile"]);
     let two = drawn(1, &[&[[teams[0], teams[1]]]], &[]);
     start(&f, cup.id, &two).await.unwrap();
     refused(
         f.store
-            .enter_tournament(Actor::Organiser, cup.id, &[late.id], f.now)
+            .add_entrants(Actor::Organiser, cup.id, &[late.id], f.now)
             .await,
         &["a round is under way"],
     );
 }
 
 #[tokio::test]
-async fn only_runtimes_that_the_tournament_takes_play() {
-    let f = Fixture::new().await;
+async fn round_refuses_runtimes_that_rules_exclude() {
+    let f = TestStore::new().await;
     let rules = TournamentRules {
         runtimes: Some(["python3".to_owned()].into_iter().collect()),
         ..TournamentRules::default()
@@ -302,14 +302,14 @@ async fn only_runtimes_that_the_tournament_takes_play() {
 }
 
 #[tokio::test]
-async fn a_game_that_we_break_is_an_attempt_and_no_result() {
-    let mut f = Fixture::new().await;
+async fn game_with_platform_faults_has_attempts_but_no_result() {
+    let mut f = TestStore::new().await;
     let (cup, teams) = opened(&f, &["A", "B"], TournamentRules::default()).await;
     start(&f, cup.id, &drawn(1, &[&[[teams[0], teams[1]]]], &[]))
         .await
         .unwrap();
     let game = record(&f, cup.id).await.games[0].id;
-    // A slot that dies, one that is asked to end, and faults of ours until it is given up.
+    // A slot that dies, one that shuts down, and platform faults until the game is given up.
     let (lost, _, _) = claim_game(&f).await;
     f.later(i64::from(LEASE_S) + 1);
     let (claim, _, attempt) = claim_game(&f).await;
@@ -319,7 +319,7 @@ async fn a_game_that_we_break_is_an_attempt_and_no_result() {
         .commit_game(&lost, &result(true), f.now)
         .await
         .unwrap();
-    assert_eq!(late, Committed::LeaseLost);
+    assert_eq!(late, CommitOutcome::LeaseLost);
     f.store.release(&claim, f.now).await.unwrap();
     assert_eq!(state(&f, game).await, GameState::Queued);
     for _ in 0..MAX_ATTEMPTS {
@@ -331,26 +331,26 @@ async fn a_game_that_we_break_is_an_attempt_and_no_result() {
         f.later(60);
     }
     assert!(
-        matches!(state(&f, game).await, GameState::Broken { reason, .. } if reason == "no sandbox")
+        matches!(state(&f, game).await, GameState::PlatformFailed { reason, .. } if reason == "no sandbox")
     );
     let attempts = f.store.game_attempts(game).await.unwrap();
     let ends: Vec<_> = attempts
         .iter()
-        .map(|attempt| attempt.end.as_ref().unwrap().how)
+        .map(|attempt| attempt.end.as_ref().unwrap().outcome)
         .collect();
-    let broken = [AttemptOutcome::Broken; MAX_ATTEMPTS as usize];
+    let failures = [AttemptOutcome::PlatformFailed; MAX_ATTEMPTS as usize];
     assert_eq!(
         ends,
         [
-            &[AttemptOutcome::Lost, AttemptOutcome::GivenBack][..],
-            &broken
+            &[AttemptOutcome::Lost, AttemptOutcome::Released][..],
+            &failures
         ]
         .concat()
     );
     assert_eq!(
         record(&f, cup.id).await.rounds[0].over_at,
         None,
-        "it is owed a result"
+        "a result is missing"
     );
     refused(
         f.store
@@ -359,33 +359,33 @@ async fn a_game_that_we_break_is_an_attempt_and_no_result() {
         &["has no result"],
     );
     let seed = f.store.game(game).await.unwrap().seed;
-    let again = f
+    let rerun = f
         .store
         .rerun_game(Actor::Organiser, game, f.now)
         .await
         .unwrap();
-    assert_eq!((again.seed, again.state), (seed, GameState::Queued));
-    play_next(&f).await;
+    assert_eq!((rerun.seed, rerun.state), (seed, GameState::Queued));
+    run_next_game(&f).await;
     assert!(record(&f, cup.id).await.rounds[0].over_at.is_some());
-    // Its result counts until it is voided, and then it is played again by the same rules.
+    // Its result counts until it is voided; then the game is rerun with the same rules.
     let voided = f
         .store
-        .void_game(Actor::Organiser, game, WHY, f.now)
+        .void_game(Actor::Organiser, game, REASON, f.now)
         .await
         .unwrap();
-    assert!(matches!(voided.state, GameState::Void { reason, .. } if reason == WHY));
+    assert!(matches!(voided.state, GameState::Void { reason, .. } if reason == REASON));
     let attempts = f.store.game_attempts(game).await.unwrap();
     let last = attempts.last().unwrap().end.as_ref().unwrap();
     assert_eq!(
-        (last.how, last.reason.as_deref()),
-        (AttemptOutcome::Played, Some(WHY))
+        (last.outcome, last.reason.as_deref()),
+        (AttemptOutcome::Played, Some(REASON))
     );
     refused(
         start(&f, cup.id, &drawn(2, &[&[[teams[1], teams[0]]]], &[])).await,
         &["have no result"],
     );
     refused(
-        f.store.void_game(Actor::Organiser, game, WHY, f.now).await,
+        f.store.void_game(Actor::Organiser, game, REASON, f.now).await,
         &["only a game"],
     );
     f.store
@@ -396,7 +396,7 @@ async fn a_game_that_we_break_is_an_attempt_and_no_result() {
         f.store.rerun_game(Actor::Organiser, game, f.now).await,
         &["only a game"],
     );
-    play_next(&f).await;
+    run_next_game(&f).await;
     let GameState::Played(played) = state(&f, game).await else {
         panic!()
     };
@@ -404,20 +404,20 @@ async fn a_game_that_we_break_is_an_attempt_and_no_result() {
 }
 
 #[tokio::test]
-async fn a_paused_tournament_begins_nothing_and_lets_the_rest_go_on() {
-    let f = Fixture::new().await;
+async fn paused_tournament_starts_no_game() {
+    let f = TestStore::new().await;
     let (cup, teams) = opened(&f, &["A", "B"], TournamentRules::default()).await;
     start(&f, cup.id, &drawn(1, &[&[[teams[0], teams[1]]]], &[]))
         .await
         .unwrap();
     let paused = f
         .store
-        .pause_tournament(Actor::Organiser, cup.id, WHY, f.now)
+        .pause_tournament(Actor::Organiser, cup.id, REASON, f.now)
         .await;
-    assert_eq!(paused.unwrap().paused.unwrap().reason, WHY);
+    assert_eq!(paused.unwrap().paused.unwrap().reason, REASON);
     refused(
         f.store
-            .pause_tournament(Actor::Organiser, cup.id, WHY, f.now)
+            .pause_tournament(Actor::Organiser, cup.id, REASON, f.now)
             .await,
         &["paused already"],
     );
@@ -438,12 +438,12 @@ async fn a_paused_tournament_begins_nothing_and_lets_the_rest_go_on() {
             .await,
         &["not paused"],
     );
-    assert_eq!(play_next(&f).await, game);
+    assert_eq!(run_next_game(&f).await, game);
 }
 
 #[tokio::test]
-async fn what_games_took_says_when_the_next_are_over() {
-    let mut f = Fixture::new().await;
+async fn game_forecast_uses_recent_durations() {
+    let mut f = TestStore::new().await;
     let (cup, teams) = opened(&f, &["A", "B", "C"], TournamentRules::default()).await;
     let [a, b, c] = teams[..] else { panic!() };
     start(
@@ -459,15 +459,15 @@ async fn what_games_took_says_when_the_next_are_over() {
         .iter()
         .map(|game| game.id)
         .collect();
-    let place = async |f: &Fixture, id| {
-        let outlook = f.store.outlook(1, f.now).await.unwrap();
-        let place = outlook.games.get(&id).copied();
-        place.map(|place| (place.place, place.of, place.expected_at))
+    let position = async |f: &TestStore, id| {
+        let forecast = f.store.queue_forecast(1, f.now).await.unwrap();
+        let found = forecast.games.get(&id).copied();
+        found.map(|found| (found.position, found.total, found.expected_at))
     };
     assert_eq!(
-        place(&f, ids[1]).await,
+        position(&f, ids[1]).await,
         Some((2, 3, None)),
-        "nothing like it was measured"
+        "there is no measured duration"
     );
     let (claim, _, _) = claim_game(&f).await;
     f.later(40);
@@ -476,23 +476,23 @@ async fn what_games_took_says_when_the_next_are_over() {
         .await
         .unwrap();
     let at = |seconds| Some(f.now + jiff::SignedDuration::from_secs(seconds));
-    assert_eq!(place(&f, ids[0]).await, None);
-    assert_eq!(place(&f, ids[1]).await, Some((1, 2, at(40))));
-    assert_eq!(place(&f, ids[2]).await, Some((2, 2, at(80))));
+    assert_eq!(position(&f, ids[0]).await, None);
+    assert_eq!(position(&f, ids[1]).await, Some((1, 2, at(40))));
+    assert_eq!(position(&f, ids[2]).await, Some((2, 2, at(80))));
     f.store
-        .pause_tournament(Actor::Organiser, cup.id, WHY, f.now)
+        .pause_tournament(Actor::Organiser, cup.id, REASON, f.now)
         .await
         .unwrap();
     assert_eq!(
-        place(&f, ids[1]).await,
+        position(&f, ids[1]).await,
         None,
-        "it begins when the tournament goes on"
+        "it starts when the tournament resumes"
     );
 }
 
 #[tokio::test]
-async fn who_leaves_takes_its_open_games_along() {
-    let f = Fixture::new().await;
+async fn departure_cancels_open_games() {
+    let f = TestStore::new().await;
     let (cup, teams) = opened(&f, &["A", "B", "C"], TournamentRules::default()).await;
     let [a, b, c] = teams[..] else { panic!() };
     start(
@@ -502,15 +502,15 @@ async fn who_leaves_takes_its_open_games_along() {
     )
     .await
     .unwrap();
-    play_next(&f).await;
+    run_next_game(&f).await;
     let (claim, running, _) = claim_game(&f).await;
-    let leave = |left_as, from| leaving(c, left_as, from);
+    let leave = |kind, from| departure(c, kind, from);
     refused(
         f.store
             .leave_tournament(
                 Actor::Organiser,
                 cup.id,
-                &leave(LeftAs::Disqualified, Some(round(2))),
+                &leave(DepartureKind::Disqualified, Some(round(2))),
                 f.now,
             )
             .await,
@@ -521,7 +521,7 @@ async fn who_leaves_takes_its_open_games_along() {
         .leave_tournament(
             Actor::Organiser,
             cup.id,
-            &leave(LeftAs::Disqualified, None),
+            &leave(DepartureKind::Disqualified, None),
             f.now,
         )
         .await
@@ -532,7 +532,7 @@ async fn who_leaves_takes_its_open_games_along() {
             .leave_tournament(
                 Actor::Organiser,
                 cup.id,
-                &leave(LeftAs::Withdrawn, None),
+                &leave(DepartureKind::Withdrawn, None),
                 f.now,
             )
             .await,
@@ -547,21 +547,21 @@ async fn who_leaves_takes_its_open_games_along() {
         .commit_game(&claim, &result(true), f.now)
         .await
         .unwrap();
-    assert_eq!(late, Committed::LeaseLost);
+    assert_eq!(late, CommitOutcome::LeaseLost);
     assert!(!f.store.heartbeat(&claim, 1, LEASE_S, f.now).await.unwrap());
     let attempts = f.store.game_attempts(running).await.unwrap();
     assert_eq!(
-        attempts[0].end.as_ref().unwrap().how,
-        AttemptOutcome::CalledOff
+        attempts[0].end.as_ref().unwrap().outcome,
+        AttemptOutcome::Cancelled
     );
     let after = record(&f, cup.id).await;
-    assert!(after.rounds[0].over_at.is_some(), "nothing of it is owed");
+    assert!(after.rounds[0].over_at.is_some(), "no result is missing");
     assert!(f.claim().await.is_none());
     assert_eq!(
         after
             .entrants
             .iter()
-            .filter(|one| one.left.is_some())
+            .filter(|one| one.departure.is_some())
             .count(),
         1
     );
@@ -575,23 +575,23 @@ async fn who_leaves_takes_its_open_games_along() {
 }
 
 #[tokio::test]
-async fn a_game_that_is_to_be_played_again_makes_no_earlier_round_unfinished() {
-    let f = Fixture::new().await;
+async fn rerun_game_does_not_reopen_its_round() {
+    let f = TestStore::new().await;
     let (cup, teams) = opened(&f, &["A", "B", "C"], TournamentRules::default()).await;
     let [a, b, c] = teams[..] else { panic!() };
     let first = drawn(1, &[&[[a, b]], &[[b, c]], &[[c, a]]], &[c, a, b]);
     start(&f, cup.id, &first).await.unwrap();
-    let played = play_next(&f).await;
+    let played = run_next_game(&f).await;
     for _ in 0..2 {
-        play_next(&f).await;
+        run_next_game(&f).await;
     }
     let second = drawn(2, &[&[[b, a]], &[[c, b]], &[[a, c]]], &[c, a, b]);
     start(&f, cup.id, &second).await.unwrap();
     f.store
-        .void_game(Actor::Organiser, played, WHY, f.now)
+        .void_game(Actor::Organiser, played, REASON, f.now)
         .await
         .unwrap();
-    let out = leaving(c, LeftAs::Withdrawn, None);
+    let out = departure(c, DepartureKind::Withdrawn, None);
     let left = f
         .store
         .leave_tournament(Actor::Organiser, cup.id, &out, f.now)
@@ -600,15 +600,15 @@ async fn a_game_that_is_to_be_played_again_makes_no_earlier_round_unfinished() {
     assert_eq!(
         left.unwrap().from_round,
         round(2),
-        "it keeps what it played of the first"
+        "it keeps its results of the first round"
     );
-    // Of the second round B and A are still owed their game, and of the first the void one.
+    // The game of B and A in the second round is open, and the voided one of the first round.
     f.store
         .rerun_game(Actor::Organiser, played, f.now)
         .await
         .unwrap();
     for _ in 0..2 {
-        play_next(&f).await;
+        run_next_game(&f).await;
     }
     assert!(record(&f, cup.id).await.rounds[1].over_at.is_some());
     f.store
@@ -618,39 +618,39 @@ async fn a_game_that_is_to_be_played_again_makes_no_earlier_round_unfinished() {
 }
 
 #[tokio::test]
-async fn nobody_escapes_a_disqualification_by_leaving_first_or_by_the_season() {
-    let f = Fixture::new().await;
+async fn disqualification_also_applies_after_withdrawal() {
+    let f = TestStore::new().await;
     let (cup, teams) = opened(&f, &["A", "B", "C"], TournamentRules::default()).await;
     let [a, b, c] = teams[..] else { panic!() };
     let first = drawn(1, &[&[[a, b]], &[[b, c]], &[[c, a]]], &[c, a, b]);
     start(&f, cup.id, &first).await.unwrap();
     for _ in 0..3 {
-        play_next(&f).await;
+        run_next_game(&f).await;
     }
-    let leave = async |leaving: Leaving| {
+    let leave = async |request: DepartureRequest| {
         f.store
-            .leave_tournament(Actor::Organiser, cup.id, &leaving, f.now)
+            .leave_tournament(Actor::Organiser, cup.id, &request, f.now)
             .await
     };
-    let out = leave(leaving(c, LeftAs::Withdrawn, None)).await.unwrap();
+    let out = leave(departure(c, DepartureKind::Withdrawn, None)).await.unwrap();
     assert_eq!(out.unwrap().from_round, round(2));
     refused(
-        leave(leaving(c, LeftAs::Disqualified, Some(round(3)))).await,
+        leave(departure(c, DepartureKind::Disqualified, Some(round(3)))).await,
         &["from_round: expected 1 to 2"],
     );
-    let out = leave(leaving(c, LeftAs::Disqualified, Some(round(1))))
+    let out = leave(departure(c, DepartureKind::Disqualified, Some(round(1))))
         .await
         .unwrap();
-    assert_eq!(out.unwrap().left_as, LeftAs::Disqualified);
+    assert_eq!(out.unwrap().kind, DepartureKind::Disqualified);
     refused(
-        leave(leaving(c, LeftAs::Disqualified, None)).await,
+        leave(departure(c, DepartureKind::Disqualified, None)).await,
         &["has left the tournament already"],
     );
-    // A game that a team had played before it left is played again if it is voided; one that counts no more is not.
+    // A voided game can be rerun if both teams were entrants in its round, otherwise not.
     let games = record(&f, cup.id).await.games;
     for game in &games[..2] {
         f.store
-            .void_game(Actor::Organiser, game.id, WHY, f.now)
+            .void_game(Actor::Organiser, game.id, REASON, f.now)
             .await
             .unwrap();
     }
@@ -664,15 +664,15 @@ async fn nobody_escapes_a_disqualification_by_leaving_first_or_by_the_season() {
         .rerun_game(Actor::Organiser, games[0].id, f.now)
         .await
         .unwrap();
-    // Out of the season is out of its tournaments.
+    // A team disqualified from the season leaves its tournaments.
     f.store
-        .disqualify_team(Actor::Organiser, b, WHY, f.now)
+        .disqualify_team(Actor::Organiser, b, REASON, f.now)
         .await
         .unwrap();
-    assert!(f.claim().await.is_none(), "what waited is called off");
+    assert!(f.claim().await.is_none(), "queued games are cancelled");
     let entrants = record(&f, cup.id).await.entrants;
     let of_b = entrants.iter().find(|one| one.team == b).unwrap();
-    assert_eq!(of_b.left.as_ref().unwrap().left_as, LeftAs::Disqualified);
+    assert_eq!(of_b.departure.as_ref().unwrap().kind, DepartureKind::Disqualified);
     refused(
         f.store.close_season(Actor::Organiser, f.now).await,
         &["Cup", "close it first"],
@@ -680,21 +680,21 @@ async fn nobody_escapes_a_disqualification_by_leaving_first_or_by_the_season() {
 }
 
 #[tokio::test]
-async fn games_that_do_not_count_have_a_quota_and_wait_for_rounds() {
-    let mut f = Fixture::new().await;
+async fn friendly_games_have_a_quota_and_wait_for_rounds() {
+    let mut f = TestStore::new().await;
     let (cup, teams) = opened(&f, &["A", "B", "Base"], TournamentRules::default()).await;
     let [a, b, base] = teams[..] else { panic!() };
-    let out = leaving(base, LeftAs::Withdrawn, None);
+    let out = departure(base, DepartureKind::Withdrawn, None);
     f.store
         .leave_tournament(Actor::Organiser, cup.id, &out, f.now)
         .await
         .unwrap();
-    let test = async |f: &Fixture, by| {
+    let test = async |f: &TestStore, by| {
         f.store
-            .order_test_game(Actor::Organiser, cup.id, a, by, f.now)
+            .request_test_game(Actor::Organiser, cup.id, a, by, f.now)
             .await
     };
-    refused(test(&f, None).await, &["named no baseline"]);
+    refused(test(&f, None).await, &["has no baseline"]);
     let baseline = f.store.active_submissions().await.unwrap();
     let baseline = baseline.iter().find(|one| one.team == base).unwrap().id;
     let change = TournamentChange {
@@ -709,9 +709,9 @@ async fn games_that_do_not_count_have_a_quota_and_wait_for_rounds() {
         .change_tournament(Actor::Organiser, cup.id, &change, f.now)
         .await
         .unwrap();
-    let friendly = async |f: &Fixture, by, with| {
+    let friendly = async |f: &TestStore, by, with| {
         f.store
-            .order_friendly_game(Actor::Team(by), cup.id, by, with, f.now)
+            .request_friendly_game(Actor::Team(by), cup.id, by, with, f.now)
             .await
     };
     let tested = test(&f, Some(a)).await.unwrap();
@@ -721,20 +721,20 @@ async fn games_that_do_not_count_have_a_quota_and_wait_for_rounds() {
         friendly(&f, a, base).await,
         &["Base is not in the tournament"],
     );
-    let called_off = friendly(&f, a, b).await.unwrap();
+    let cancelled = friendly(&f, a, b).await.unwrap();
     f.store
-        .cancel_game(Actor::Team(a), called_off.id, "not now", f.now)
+        .cancel_game(Actor::Team(a), cancelled.id, "not now", f.now)
         .await
         .unwrap();
     assert_eq!(
-        f.store.free_games_used(a, f.now).await.unwrap(),
+        f.store.requested_games_on_day(a, f.now).await.unwrap(),
         2,
-        "called off or not"
+        "cancelled games count"
     );
     friendly(&f, a, b).await.unwrap();
     assert!(matches!(
         friendly(&f, a, b).await,
-        Err(StoreError::FreeGamesSpent { limit: 3, used: 3 })
+        Err(StoreError::GameQuotaExceeded { limit: 3, used: 3 })
     ));
     test(&f, None).await.unwrap();
     f.store
@@ -743,12 +743,12 @@ async fn games_that_do_not_count_have_a_quota_and_wait_for_rounds() {
         .unwrap();
     refused(friendly(&f, b, a).await, &["A plays no friendly games"]);
     for _ in 0..3 {
-        play_next(&f).await;
+        run_next_game(&f).await;
     }
-    let free = f.store.games(cup.id, GamesOf::Free(Some(b))).await.unwrap();
-    assert_eq!(free.len(), 2, "one of them was called off");
+    let friendly_games = f.store.games(cup.id, GameFilter::TestAndFriendly(Some(b))).await.unwrap();
+    assert_eq!(friendly_games.len(), 2, "one of them was cancelled");
     f.later(24 * 3600);
-    assert_eq!(f.store.free_games_used(a, f.now).await.unwrap(), 0);
+    assert_eq!(f.store.requested_games_on_day(a, f.now).await.unwrap(), 0);
     start(&f, cup.id, &drawn(1, &[&[[a, b]]], &[]))
         .await
         .unwrap();
@@ -760,33 +760,33 @@ async fn games_that_do_not_count_have_a_quota_and_wait_for_rounds() {
         .store
         .cancel_game(Actor::Organiser, record.games[0].id, "no", f.now)
         .await;
-    refused(of_round, &["is not called off"]);
+    refused(of_round, &["cannot be cancelled"]);
 }
 
 #[tokio::test]
-async fn a_schedule_is_played_again_with_fresh_seeds_and_beside_what_counts() {
-    let f = Fixture::new().await;
+async fn schedule_replays_have_new_seeds_and_do_not_count() {
+    let f = TestStore::new().await;
     let once = TournamentRules {
         format: TournamentFormat::RoundRobin { rounds: round(1) },
         ..TournamentRules::default()
     };
     let (cup, teams) = opened(&f, &["A", "B"], once).await;
-    let again = async |times| {
+    let replay = async |times| {
         f.store
-            .order_replays(Actor::Organiser, cup.id, times, f.now)
+            .request_replays(Actor::Organiser, cup.id, times, f.now)
             .await
     };
-    refused(again(1).await, &["0 of 1 rounds were started"]);
+    refused(replay(1).await, &["0 of 1 rounds have started"]);
     start(&f, cup.id, &drawn(1, &[&[[teams[0], teams[1]]]], &[]))
         .await
         .unwrap();
-    refused(again(1).await, &["1 games have no result yet"]);
-    let game = play_next(&f).await;
-    refused(again(0).await, &["expected 1 to 1000"]);
-    assert_eq!(again(3).await.unwrap(), 3);
-    refused(again(998).await, &["expected 1 to 997"]);
+    refused(replay(1).await, &["1 games have no result yet"]);
+    let game = run_next_game(&f).await;
+    refused(replay(0).await, &["expected 1 to 1000"]);
+    assert_eq!(replay(3).await.unwrap(), 3);
+    refused(replay(998).await, &["expected 1 to 997"]);
     f.store
-        .void_game(Actor::Organiser, game, WHY, f.now)
+        .void_game(Actor::Organiser, game, REASON, f.now)
         .await
         .unwrap();
     f.store
@@ -805,7 +805,7 @@ async fn a_schedule_is_played_again_with_fresh_seeds_and_beside_what_counts() {
     let (claim, replayed, _) = claim_game(&f).await;
     refused(
         f.store.commit_game(&claim, &result(true), f.now).await,
-        &["played again is not"],
+        &["none of a game of a replayed schedule"],
     );
     f.store
         .commit_game(&claim, &result(false), f.now)
@@ -818,7 +818,7 @@ async fn a_schedule_is_played_again_with_fresh_seeds_and_beside_what_counts() {
             .unwrap(),
         2
     );
-    let replays = f.store.games(cup.id, GamesOf::Replays).await.unwrap();
+    let replays = f.store.games(cup.id, GameFilter::Replays).await.unwrap();
     assert_eq!(replays[0].id, replayed);
     let of_rounds = record(&f, cup.id).await.games;
     assert!(
@@ -830,8 +830,8 @@ async fn a_schedule_is_played_again_with_fresh_seeds_and_beside_what_counts() {
 }
 
 #[tokio::test]
-async fn tournament_of_an_earlier_ruleset_keeps_it() {
-    let f = Fixture::new().await;
+async fn tournament_keeps_its_earlier_ruleset() {
+    let f = TestStore::new().await;
     let rules = TournamentRules {
         ruleset: Ruleset::Second,
         ..TournamentRules::default()
@@ -840,10 +840,10 @@ async fn tournament_of_an_earlier_ruleset_keeps_it() {
     start(&f, cup.id, &drawn(1, &[&[[teams[0], teams[1]]]], &[]))
         .await
         .unwrap();
-    // The new program starts.
+    // A newer version starts.
     let claimed = f.reopen().await.claim("slot 0", LEASE_S, f.now).await;
-    let Some(Claimed {
-        work: Work::Game { rules, .. },
+    let Some(ClaimedJob {
+        job: Job::Game { rules, .. },
         ..
     }) = claimed.unwrap()
     else {
@@ -853,8 +853,8 @@ async fn tournament_of_an_earlier_ruleset_keeps_it() {
 }
 
 #[tokio::test]
-async fn a_closed_tournament_stays_as_it_is_and_lets_its_archives_go() {
-    let f = Fixture::new().await;
+async fn closed_tournament_is_final_and_frees_bundles() {
+    let f = TestStore::new().await;
     let (cup, teams) = opened(&f, &["A", "B"], TournamentRules::default()).await;
     let rules = TournamentChange {
         rules: Some(TournamentRules {
@@ -880,7 +880,7 @@ async fn a_closed_tournament_stays_as_it_is_and_lets_its_archives_go() {
         f.store
             .change_tournament(Actor::Organiser, cup.id, &other, f.now)
             .await,
-        &["a round was started"],
+        &["a round has started"],
     );
     refused(
         f.store
@@ -892,7 +892,7 @@ async fn a_closed_tournament_stays_as_it_is_and_lets_its_archives_go() {
         f.store.close_season(Actor::Organiser, f.now).await,
         &["1 games are queued"],
     );
-    let game = play_next(&f).await;
+    let game = run_next_game(&f).await;
     let of_a = f.store.game(game).await.unwrap().submissions[0];
     f.store
         .withdraw_submission(Actor::Team(teams[0]), of_a, f.now)
@@ -909,7 +909,7 @@ async fn a_closed_tournament_stays_as_it_is_and_lets_its_archives_go() {
     f.store.check_deletable(of_a, f.now).await.unwrap();
     refused(change().await, &["was closed on"]);
     refused(
-        f.store.void_game(Actor::Organiser, game, WHY, f.now).await,
+        f.store.void_game(Actor::Organiser, game, REASON, f.now).await,
         &["was closed on"],
     );
     let twice = NewTournament {
@@ -930,28 +930,28 @@ async fn a_closed_tournament_stays_as_it_is_and_lets_its_archives_go() {
 }
 
 #[derive(Debug, Clone)]
-enum Act {
+enum Action {
     Claim,
     Commit(usize),
-    Break(usize),
-    GiveBack(usize),
+    Fail(usize),
+    Release(usize),
     Die,
 }
 
-fn acts() -> impl Strategy<Value = Vec<Act>> {
-    let act = prop_oneof![
-        4 => Just(Act::Claim),
-        4 => (0..8_usize).prop_map(Act::Commit),
-        1 => (0..8_usize).prop_map(Act::Break),
-        1 => (0..8_usize).prop_map(Act::GiveBack),
-        1 => Just(Act::Die),
+fn actions() -> impl Strategy<Value = Vec<Action>> {
+    let action = prop_oneof![
+        4 => Just(Action::Claim),
+        4 => (0..8_usize).prop_map(Action::Commit),
+        1 => (0..8_usize).prop_map(Action::Fail),
+        1 => (0..8_usize).prop_map(Action::Release),
+        1 => Just(Action::Die),
     ];
-    prop::collection::vec(act, 0..40)
+    prop::collection::vec(action, 0..40)
 }
 
-/// Whatever slots do, in whatever order: each game has one result at most, and all have one in the end.
-async fn play_acts(acts: Vec<Act>) {
-    let mut f = Fixture::new().await;
+/// For any order of actions, each game has at most one result, and all have one in the end.
+async fn run_actions(actions: Vec<Action>) {
+    let mut f = TestStore::new().await;
     let (cup, teams) = opened(&f, &["A", "B", "C"], TournamentRules::default()).await;
     let [a, b, c] = teams[..] else { panic!() };
     start(
@@ -961,59 +961,59 @@ async fn play_acts(acts: Vec<Act>) {
     )
     .await
     .unwrap();
-    let mut claims: Vec<(Claim, GameId)> = Vec::new();
+    let mut claims: Vec<(JobClaim, GameId)> = Vec::new();
     let mut committed = std::collections::BTreeMap::<GameId, u32>::new();
-    for act in acts {
+    for action in actions {
         let pick = |number: usize| claims.get(number % claims.len().max(1)).cloned();
-        match act {
-            Act::Claim => {
-                if let Some(Claimed {
+        match action {
+            Action::Claim => {
+                if let Some(ClaimedJob {
                     claim,
-                    work: Work::Game { game, .. },
+                    job: Job::Game { game, .. },
                 }) = f.claim().await
                 {
                     claims.push((claim, game));
                 }
             }
-            Act::Commit(number) => {
+            Action::Commit(number) => {
                 if let Some((claim, game)) = pick(number)
                     && f.store
                         .commit_game(&claim, &result(true), f.now)
                         .await
                         .unwrap()
-                        == Committed::Now
+                        == CommitOutcome::Stored
                 {
                     *committed.entry(game).or_default() += 1;
                 }
             }
-            Act::Break(number) => {
+            Action::Fail(number) => {
                 if let Some((claim, _)) = pick(number) {
                     f.store
-                        .release_failed(&claim, "broken", f.now)
+                        .release_failed(&claim, "a platform fault", f.now)
                         .await
                         .unwrap();
                 }
             }
-            Act::GiveBack(number) => {
+            Action::Release(number) => {
                 if let Some((claim, _)) = pick(number) {
                     f.store.release(&claim, f.now).await.unwrap();
                 }
             }
-            Act::Die => f.later(i64::from(LEASE_S) + 1),
+            Action::Die => f.later(i64::from(LEASE_S) + 1),
         }
     }
     f.later(600);
     for game in record(&f, cup.id).await.games {
-        if let GameState::Broken { .. } = game.state {
+        if let GameState::PlatformFailed { .. } = game.state {
             f.store
                 .rerun_game(Actor::Organiser, game.id, f.now)
                 .await
                 .unwrap();
         }
     }
-    while let Some(Claimed {
+    while let Some(ClaimedJob {
         claim,
-        work: Work::Game { game, .. },
+        job: Job::Game { game, .. },
     }) = f.claim().await
     {
         f.store
@@ -1030,7 +1030,7 @@ async fn play_acts(acts: Vec<Act>) {
         let played = attempts.iter().filter(|one| {
             one.end
                 .as_ref()
-                .is_some_and(|end| end.how == AttemptOutcome::Played)
+                .is_some_and(|end| end.outcome == AttemptOutcome::Played)
         });
         assert_eq!(played.count(), 1);
         assert!(matches!(game.state, GameState::Played(_)));
@@ -1040,7 +1040,7 @@ async fn play_acts(acts: Vec<Act>) {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(24))]
     #[test]
-    fn every_game_has_one_result_whatever_slots_do(acts in acts()) {
-        tokio::runtime::Runtime::new().unwrap().block_on(play_acts(acts));
+    fn games_have_exactly_one_result(actions in actions()) {
+        tokio::runtime::Runtime::new().unwrap().block_on(run_actions(actions));
     }
 }

@@ -1,79 +1,79 @@
-//! Workers elsewhere of which nothing is taken.
+//! Banned remote workers.
 
 use crate::fixture::*;
 use faceoff_store::*;
 
-const WHY: &str = "its numbers are not the simulator's";
+const REASON: &str = "its numbers are not the simulator's";
 
 fn worker(name: &str) -> WorkerName {
     name.parse().unwrap()
 }
 
-/// Claims a shard, as the server does for a worker elsewhere.
-async fn claim_for(f: &Fixture, holder: &str) -> (Claim, Shard) {
+/// Claims a shard, as the server does for a remote worker.
+async fn claim_for(f: &TestStore, holder: &str) -> (JobClaim, Shard) {
     let claimed = f.store.claim(holder, LEASE_S, f.now).await.unwrap();
-    let claimed = claimed.expect("there is work");
-    let Work::Shard { shard, .. } = claimed.work else {
-        panic!("{:?}", claimed.work);
+    let claimed = claimed.expect("a job is queued");
+    let Job::Shard { shard, .. } = claimed.job else {
+        panic!("{:?}", claimed.job);
     };
     (claimed.claim, shard)
 }
 
 #[tokio::test]
-async fn what_a_banned_worker_played_of_runs_that_go_on_is_played_again() {
-    let f = Fixture::new().await;
+async fn ban_requeues_shards_of_open_runs() {
+    let f = TestStore::new().await;
     let submission = f.ready_team("Alpha").await;
     let evaluation = f.evaluate(submission.id, &plan()).await;
-    // One that is called alike is not meant, nor is the server's own slot.
+    // A worker with a similar name and the server's own slot are not affected.
     let (own, own_shard) = claim_for(&f, "slot-0").await;
-    assert_eq!(f.play(&own, &own_shard, 0).await, Committed::Now);
-    let (alike, alike_shard) = claim_for(&f, "remote/rack-10/slot-0").await;
-    assert_eq!(f.play(&alike, &alike_shard, 0).await, Committed::Now);
-    let (lied, lied_shard) = claim_for(&f, "remote/rack-1/slot-0").await;
-    assert_eq!(f.play(&lied, &lied_shard, 1).await, Committed::Now);
-    let (begun, begun_shard) = claim_for(&f, "remote/rack-1/slot-1").await;
+    assert_eq!(f.commit_shard(&own, &own_shard, 0).await, CommitOutcome::Stored);
+    let (similar, similar_shard) = claim_for(&f, "remote/rack-10/slot-0").await;
+    assert_eq!(f.commit_shard(&similar, &similar_shard, 0).await, CommitOutcome::Stored);
+    let (banned, banned_shard) = claim_for(&f, "remote/rack-1/slot-0").await;
+    assert_eq!(f.commit_shard(&banned, &banned_shard, 1).await, CommitOutcome::Stored);
+    let (running, running_shard) = claim_for(&f, "remote/rack-1/slot-1").await;
 
     let rack = worker("rack-1");
-    let ban = f.store.ban_worker(Actor::Server, &rack, WHY, f.now);
-    assert_eq!(ban.await.unwrap(), 1, "one shard is played again");
+    let ban = f.store.ban_worker(Actor::Server, &rack, REASON, f.now);
+    assert_eq!(ban.await.unwrap(), 1, "one shard is run again");
     let bans = f.store.worker_bans().await.unwrap();
-    assert_eq!((&*bans[0].worker, &*bans[0].reason), ("rack-1", WHY));
+    assert_eq!((&*bans[0].worker, &*bans[0].reason), ("rack-1", REASON));
     assert_eq!(
-        f.store.workers().ban_of("rack-1").as_deref(),
-        Some(WHY),
-        "without a look at the database"
+        f.store.workers().ban_reason("rack-1").as_deref(),
+        Some(REASON),
+        "the ban is cached"
     );
-    assert_eq!(f.store.workers().ban_of("rack-10"), None);
-    let again = f.store.ban_worker(Actor::Organiser, &rack, WHY, f.now);
-    assert!(matches!(again.await, Err(StoreError::Conflict(_))));
+    assert_eq!(f.store.workers().ban_reason("rack-10"), None);
+    let repeated = f.store.ban_worker(Actor::Organiser, &rack, REASON, f.now);
+    assert!(matches!(repeated.await, Err(StoreError::Conflict(_))));
 
-    // Its late outcomes change nothing, and both shards are another's.
-    assert_eq!(f.play(&lied, &lied_shard, 0).await, Committed::LeaseLost);
-    let mut left = vec![lied_shard.id, begun_shard.id];
+    // Its late outcomes change nothing, and both shards go to other workers.
+    assert_eq!(f.commit_shard(&banned, &banned_shard, 0).await, CommitOutcome::LeaseLost);
+    let mut left = vec![banned_shard.id, running_shard.id];
     while let Some(claimed) = f.store.claim("slot-0", LEASE_S, f.now).await.unwrap() {
-        match claimed.work {
-            Work::Shard { shard, .. } => {
+        match claimed.job {
+            Job::Shard { shard, .. } => {
                 left.retain(|id| *id != shard.id);
-                assert_eq!(f.play(&claimed.claim, &shard, 0).await, Committed::Now);
+                assert_eq!(f.commit_shard(&claimed.claim, &shard, 0).await, CommitOutcome::Stored);
             }
-            Work::Finalise { .. } => {
+            Job::Scoring { .. } => {
                 let done = f.finish(&claimed.claim, 0.5, "datasets/alpha").await;
-                assert_eq!(done, Committed::Now);
+                assert_eq!(done, CommitOutcome::Stored);
                 break;
             }
             other => panic!("{other:?}"),
         }
     }
     assert!(left.is_empty(), "{left:?}");
-    assert_eq!(f.play(&begun, &begun_shard, 0).await, Committed::LeaseLost);
+    assert_eq!(f.commit_shard(&running, &running_shard, 0).await, CommitOutcome::LeaseLost);
     assert!(matches!(
         f.state(evaluation.id).await,
         EvaluationState::Finished { .. }
     ));
-    // What is over and has a part of somebody's is told.
-    let played = async |name: &str| f.store.played_by(&worker(name), 100).await.unwrap();
-    assert_eq!(played("rack-1").await, PlayedBy::default());
-    assert_eq!(played("rack-10").await.evaluations, [evaluation.id]);
+    // Finished results with a part of a worker are listed.
+    let results = async |name: &str| f.store.results_of_worker(&worker(name), 100).await.unwrap();
+    assert_eq!(results("rack-1").await, WorkerResults::default());
+    assert_eq!(results("rack-10").await.evaluations, [evaluation.id]);
 
     // It stays banned for another process, until it is readmitted.
     let other = f.reopen().await;
@@ -84,23 +84,23 @@ async fn what_a_banned_worker_played_of_runs_that_go_on_is_played_again() {
             .await
     };
     readmit().await.unwrap();
-    assert_eq!(f.store.workers().ban_of("rack-1"), None);
+    assert_eq!(f.store.workers().ban_reason("rack-1"), None);
     assert!(matches!(readmit().await, Err(StoreError::Conflict(_))));
     assert!(other.worker_bans().await.unwrap().is_empty());
 }
 
 #[tokio::test]
-async fn what_workers_elsewhere_hold_outlives_a_server_that_was_away() {
-    let mut f = Fixture::new().await;
+async fn remote_leases_survive_a_server_restart() {
+    let mut f = TestStore::new().await;
     let submission = f.ready_team("Alpha").await;
     f.evaluate(submission.id, &plan()).await;
-    let (elsewhere, shard) = claim_for(&f, "remote/rack-1/slot-0").await;
+    let (remote, shard) = claim_for(&f, "remote/rack-1/slot-0").await;
     let (own, own_shard) = claim_for(&f, "slot-0").await;
-    let (unbegun, _) = claim_for(&f, "given out").await;
+    let (unstarted, _) = claim_for(&f, "reserved").await;
     f.later(i64::from(LEASE_S) + 5);
-    // What nobody has begun goes back, what others play is theirs for another while; the server's own is as it was.
+    // Leases of unstarted jobs end, remote leases are renewed, and the server's own leases are unchanged.
     assert_eq!(
-        f.store.give_back_all_of("given out", f.now).await.unwrap(),
+        f.store.release_leases_of("reserved", f.now).await.unwrap(),
         1
     );
     assert_eq!(
@@ -109,24 +109,24 @@ async fn what_workers_elsewhere_hold_outlives_a_server_that_was_away() {
     );
     let mut next = Vec::new();
     while let Some(claimed) = f.store.claim("slot-1", LEASE_S, f.now).await.unwrap() {
-        next.push(claimed.claim.unit);
+        next.push(claimed.claim.job);
     }
-    assert!(next.contains(&unbegun.unit) && next.contains(&own.unit));
-    assert!(!next.contains(&elsewhere.unit));
-    assert_eq!(f.play(&own, &own_shard, 0).await, Committed::LeaseLost);
-    assert_eq!(f.play(&elsewhere, &shard, 0).await, Committed::Now);
-    let is_of = async |name: &str| {
+    assert!(next.contains(&unstarted.job) && next.contains(&own.job));
+    assert!(!next.contains(&remote.job));
+    assert_eq!(f.commit_shard(&own, &own_shard, 0).await, CommitOutcome::LeaseLost);
+    assert_eq!(f.commit_shard(&remote, &shard, 0).await, CommitOutcome::Stored);
+    let is_leased_by = async |name: &str| {
         let worker = worker(name);
         f.store
-            .is_of(&worker, elsewhere.unit, elsewhere.nonce)
+            .is_leased_by(&worker, remote.job, remote.nonce)
             .await
             .unwrap()
     };
-    assert!(!is_of("rack-1").await, "it is done");
+    assert!(!is_leased_by("rack-1").await, "the job is done");
 }
 
 #[test]
-fn names_are_tokens_of_subjects() {
+fn worker_names_are_valid_subject_tokens() {
     for name in ["", "a.b", "a b", "*", ">", "a/b", &"x".repeat(65)] {
         let refused = name.parse::<WorkerName>().unwrap_err();
         assert!(refused.to_string().contains("1 to 64"), "{name:?}");

@@ -6,7 +6,7 @@ use std::fmt;
 /// Reads nested arrays of exactly `shape` into `out`, row-major, and refuses numbers beyond
 /// [`ACTION_LIMIT`].
 ///
-/// Recursion ends with the shape: an array where a number belongs is refused before it is entered.
+/// The shape bounds the recursion: an array in place of a number is refused before it is entered.
 pub(super) struct ActionSeed<'s> {
     pub shape: &'static [usize],
     pub out: &'s mut Vec<f64>,
@@ -55,8 +55,8 @@ impl<'de> Visitor<'de> for ActionSeed<'_> {
                 }
             }
         }
-        // serde_json itself refuses what follows the last element that was asked for, but with an
-        // error of its own; asking once more names it as the shape.
+        // serde_json refuses surplus elements with an error of its own; requesting one more element reports
+        // them as a wrong shape.
         match seq.next_element::<serde::de::IgnoredAny>()? {
             None => Ok(()),
             Some(_) => Err(A::Error::custom(marks::SHAPE)),

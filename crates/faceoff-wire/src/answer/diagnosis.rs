@@ -1,16 +1,16 @@
-//! Says what was wrong with a line that the one-pass parser refused. Not on the normal path.
+//! Explains what is wrong with a line that the one-pass parser refused. Not on the hot path.
 
 use super::marks;
 use crate::protocol::MAX_LINE_BYTES;
 use faceoff_types::{ACTION_LIMIT, AgentFaultKind, Interpolation};
 use serde_json::Value;
 
-/// Characters of a repeated key that are shown.
+/// Maximum number of characters of a repeated key in a message.
 const QUOTED_KEY_CHARS: usize = 60;
 
-/// Characters of the parser's words that are kept, but for the place that they end with.
+/// Maximum number of characters of a parser message, without the position at its end.
 const DETAIL_CHARS: usize = 200;
-/// Longest such place.
+/// Longest position at the end of a parser message.
 const PLACE_BYTES: usize = 40;
 
 /// The fault of a line longer than the protocol allows.
@@ -21,7 +21,7 @@ pub const fn too_long() -> AgentFaultKind {
     }
 }
 
-/// The fault behind a parser's error. `interpolation` is the agreed one where an action was due.
+/// The fault behind a parser error. `interpolation` is the agreed one if an action was due.
 pub(super) fn diagnose(
     text: &str,
     error: &serde_json::Error,
@@ -47,14 +47,14 @@ pub(super) fn diagnose(
             detail: "the line is empty".to_owned(),
         };
     }
-    // A line is line 1 of itself: the column alone helps.
+    // The text is a single line, so only the column helps.
     let detail = message.replace(" at line 1 column ", " at character ");
     AgentFaultKind::NotJson {
         detail: cut(&detail),
     }
 }
 
-/// The fault of an object with a repeated key.
+/// The fault for a repeated key.
 pub(super) fn twice(key: &str) -> AgentFaultKind {
     let key: String = key.chars().take(QUOTED_KEY_CHARS).collect();
     AgentFaultKind::NotJson {
@@ -62,7 +62,7 @@ pub(super) fn twice(key: &str) -> AgentFaultKind {
     }
 }
 
-/// The parser quotes what it did not expect, which may be all of a line, and ends with the place.
+/// Shortens a parser message, which may quote a whole line, but keeps the position at its end.
 fn cut(detail: &str) -> String {
     let Some((end, _)) = detail.char_indices().nth(DETAIL_CHARS) else {
         return detail.to_owned();
@@ -72,7 +72,7 @@ fn cut(detail: &str) -> String {
     format!("{}…{}", &detail[..end], place.unwrap_or_default())
 }
 
-/// `found` is the number's index in the action and its value.
+/// `found` holds the number's index in the action and its value.
 fn too_large(found: &str, code: Interpolation) -> AgentFaultKind {
     let mut words = found.split(' ');
     let mut index: usize = words.next().and_then(|word| word.parse().ok()).unwrap_or(0);
@@ -109,7 +109,7 @@ fn shape_text(shape: &[usize]) -> String {
     shape.iter().map(|len| format!("[{len}]")).collect()
 }
 
-/// `[2][6]` for a regular array; otherwise the first place that is out of line.
+/// `[2][6]` for a regular array; otherwise the first element that breaks the shape.
 fn describe_action(action: &Value) -> String {
     let mut shape = Vec::new();
     let mut inner = action;
@@ -167,11 +167,11 @@ fn is_word(rest: &[u8], word: &[u8]) -> bool {
         .is_some_and(|after| !after.first().is_some_and(u8::is_ascii_alphanumeric))
 }
 
-/// Does an object, outside of its strings, hold one of the words that lenient JSON writers (such as
-/// Python's) emit for what JSON cannot say?
+/// Does an object contain, outside of strings, one of the words that lenient JSON writers such as Python's emit for
+/// numbers that are not finite?
 fn has_non_finite_word(text: &str) -> bool {
     if !text.trim_start().starts_with('{') {
-        return false; // a stray print, not an answer
+        return false; // output of a stray print statement, not an answer
     }
     let mut in_string = false;
     let mut escaped = false;

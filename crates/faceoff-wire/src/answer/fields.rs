@@ -1,13 +1,13 @@
 use super::{action::ActionSeed, diagnosis, marks, repeated_keys, scalar::Scalar};
 use crate::protocol::MAX_LINE_BYTES;
-use faceoff_types::{AgentFaultKind, Interpolation, harmless};
+use faceoff_types::{AgentFaultKind, Interpolation, escape_unprintable};
 use serde::{
     Deserializer as _,
     de::{Error as _, IgnoredAny, MapAccess, Visitor},
 };
 use std::fmt;
 
-/// The fields of an answer that the protocol knows; `None` where the key is absent.
+/// The fields of an answer that the protocol defines; `None` if absent.
 #[derive(Debug, Default)]
 pub(super) struct Fields<'a> {
     pub kind: Option<Scalar<'a>>,
@@ -17,13 +17,13 @@ pub(super) struct Fields<'a> {
     pub step: Option<Scalar<'a>>,
     pub name: Option<Scalar<'a>>,
     pub version: Option<Scalar<'a>>,
-    /// The action was read into the caller's buffer.
+    /// Was an action read into the caller's buffer?
     pub has_action: bool,
-    /// Something was skipped: its keys have not been looked at.
+    /// Was a value skipped, so that its keys have not been checked for repetition?
     has_skipped: bool,
 }
 
-/// Where an expected action goes.
+/// The agreed interpolation and the buffer for an expected action.
 pub(super) type ActionSink<'s> = Option<(Interpolation, &'s mut Vec<f64>)>;
 
 impl<'a> Fields<'a> {
@@ -47,19 +47,19 @@ impl<'a> Fields<'a> {
         Ok(fields)
     }
 
-    /// Is this what the hot path hopes for?
+    /// Is this an `act` for `step`? The check of the hot path.
     pub fn is_act(&self, step: u32) -> bool {
         matches!(&self.kind, Some(Scalar::Text(kind)) if kind == "act")
             && self.step == Some(Scalar::Integer(i64::from(step)))
     }
 
-    /// The `type` must be this one.
+    /// Requires this `type`.
     pub fn require_type(&self, kind: &str, expected: &str) -> Result<(), AgentFaultKind> {
         let got = match &self.kind {
             Some(Scalar::Text(got)) if got == kind => return Ok(()),
             Some(Scalar::Text(got)) => {
                 let head: String = got.chars().take(60).collect();
-                harmless(&head).into_owned()
+                escape_unprintable(&head).into_owned()
             }
             Some(other) => format!("an object whose type is {other}"),
             None => "an object without type".to_owned(),
@@ -70,7 +70,7 @@ impl<'a> Fields<'a> {
         })
     }
 
-    /// The named field must be this integer.
+    /// Requires the field `name` to be this integer.
     pub fn require_integer(
         &self,
         name: &str,

@@ -1,15 +1,15 @@
-//! Keys given twice in what the parser skipped: programs disagree on which of the two counts, so that
-//! a line would not say the same to all who read it.
+//! Finds repeated keys in values that the parser skipped. Programs disagree on which of two values counts, so such a
+//! line would be ambiguous.
 
 use super::diagnosis;
 use faceoff_types::AgentFaultKind;
 use std::{borrow::Cow, collections::HashSet};
 
-/// Refuses the first key that an object of `text`, at any depth, has twice. `text` is one JSON value.
-/// A stack of its own takes the place of recursion.
+/// Refuses the first repeated key of an object in `text`, at any depth. `text` is one valid JSON value.
+/// It uses an explicit stack in place of recursion.
 pub(super) fn refuse(text: &str) -> Result<(), AgentFaultKind> {
     let bytes = text.as_bytes();
-    // The arrays and objects that are open, an object with its keys so far.
+    // The enclosing arrays (`None`) and objects (with their keys so far).
     let mut open: Vec<Option<HashSet<Cow<'_, str>>>> = Vec::new();
     let mut is_key = false;
     let mut at = 0;
@@ -47,7 +47,7 @@ pub(super) fn refuse(text: &str) -> Result<(), AgentFaultKind> {
     Ok(())
 }
 
-/// Where the string that opens at `start` is over.
+/// The index after the string that opens at `start`.
 fn end_of_string(bytes: &[u8], start: usize) -> usize {
     let mut at = start + 1;
     while let Some(byte) = bytes.get(at) {
@@ -60,7 +60,7 @@ fn end_of_string(bytes: &[u8], start: usize) -> usize {
     bytes.len()
 }
 
-/// A key without quotes and escapes: `"a"` and `"\u0061"` are one key.
+/// A key without quotes and escapes: `"a"` and `"\u0061"` are the same key.
 fn decoded(quoted: &str) -> Result<Cow<'_, str>, AgentFaultKind> {
     if quoted.contains('\\') {
         let decoded = serde_json::from_str(quoted).map_err(|error| AgentFaultKind::NotJson {

@@ -1,15 +1,14 @@
 use serde::de::{Deserialize, Deserializer, IgnoredAny, MapAccess, SeqAccess, Visitor};
 use std::{borrow::Cow, fmt};
 
-/// The value of a field that should hold no array or object; those are skipped and remembered as
-/// such.
+/// The value of a field that should be no array or object. Those are skipped, and only their kind is kept.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Scalar<'a> {
-    /// null
+    /// `null`
     Null,
-    /// true or false
+    /// `true` or `false`
     Bool(bool),
-    /// A number written without fraction and exponent that fits.
+    /// A number without fraction and exponent that fits into `i64`.
     Integer(i64),
     /// Any other number.
     Number(f64),

@@ -50,7 +50,7 @@ fn not_json(line: &str, needle: &str) {
 }
 
 #[test]
-fn an_action_is_read_row_major_with_its_bits() {
+fn action_is_read_row_major_with_its_bits() {
     let action = parse(&good()).unwrap();
     assert_eq!(action.len(), 14);
     assert_eq!(action[..7], [0.5; 7]);
@@ -62,7 +62,7 @@ fn an_action_is_read_row_major_with_its_bits() {
 }
 
 #[test]
-fn order_spaces_and_extra_fields_do_not_matter() {
+fn field_order_spaces_and_extra_fields_do_not_matter() {
     let line = format!(
         " {{ \"note\" : {{\"deep\":[[[1e999,\"NaN\"]]]}}, \"action\":[{},{}],\"x\":1,\"y\":2,\
          \"step\":4,\"type\":\"a\\u0063t\"}} \r",
@@ -73,7 +73,7 @@ fn order_spaces_and_extra_fields_do_not_matter() {
 }
 
 #[test]
-fn every_shape_of_the_protocol_is_read() {
+fn all_action_shapes_are_read() {
     let nest = |n: usize, inner: &str| format!("[{}]", vec![inner; n].join(","));
     for (code, text) in [
         (Some(1), row("1")),
@@ -92,7 +92,7 @@ fn every_shape_of_the_protocol_is_read() {
 }
 
 #[test]
-fn another_message_or_step_is_named() {
+fn wrong_message_or_step_is_named() {
     wrong_message(&good().replace("act", "ready"), "ready");
     wrong_message(&good().replace("\"act\"", "7"), "an object whose type is 7");
     wrong_message(
@@ -108,7 +108,7 @@ fn another_message_or_step_is_named() {
 }
 
 #[test]
-fn another_shape_is_named() {
+fn wrong_shape_is_named() {
     wrong_shape(&row("1"), "[7]");
     wrong_shape(&format!("[{}]", row("1")), "[1][7]");
     wrong_shape(&format!("[{0},{0},{0}]", row("1")), "[3][7]");
@@ -135,7 +135,7 @@ fn another_shape_is_named() {
 }
 
 #[test]
-fn what_is_not_finite_is_refused_however_it_is_written() {
+fn non_finite_numbers_are_refused_in_any_notation() {
     for word in [
         "NaN",
         "-Infinity",
@@ -156,7 +156,7 @@ fn what_is_not_finite_is_refused_however_it_is_written() {
 }
 
 #[test]
-fn a_number_that_no_action_needs_is_refused_with_its_place() {
+fn too_large_number_is_refused_with_its_place() {
     let too_large = |text: &str, expected_value: f64| {
         let mut second = ["0.5"; 7];
         second[3] = text;
@@ -206,7 +206,7 @@ fn a_number_that_no_action_needs_is_refused_with_its_place() {
 }
 
 #[test]
-fn rubbish_is_not_json() {
+fn invalid_json_is_refused_with_a_reason() {
     not_json("", "the line is empty");
     not_json("   ", "the line is empty");
     not_json("hello", "at character 1");
@@ -223,7 +223,7 @@ fn rubbish_is_not_json() {
     let at_an_end = format!("\"{} at {}\"", "é".repeat(300), "é".repeat(300));
     for line in [long.clone(), format!("\n{long}"), at_an_end] {
         let Err(AgentFaultKind::NotJson { detail }) = parse(&line) else {
-            panic!("it is no object");
+            panic!("expected NotJson");
         };
         assert!(detail.chars().count() < 260, "{detail}");
     }
@@ -239,7 +239,7 @@ fn rubbish_is_not_json() {
 }
 
 #[test]
-fn a_key_given_twice_is_refused() {
+fn repeated_key_is_refused() {
     for key in ["type", "step", "action"] {
         let line = good().replacen(
             '{',
@@ -258,7 +258,7 @@ fn a_key_given_twice_is_refused() {
 }
 
 #[test]
-fn a_key_given_twice_is_refused_at_any_depth_and_however_it_is_written() {
+fn repeated_key_is_refused_at_any_depth() {
     for (extra, key) in [
         (r#""x":1,"x":2"#, "x"),
         (r#""x":1,"y":{"a":[]},"x":{}"#, "x"),
@@ -283,13 +283,13 @@ fn a_key_given_twice_is_refused_at_any_depth_and_however_it_is_written() {
         &good().replacen('{', r#"{"x":{"\ud800":1},"#, 1),
         "a key cannot be read",
     );
-    // An action that is not due is skipped, and looked at.
+    // An action that is not due is skipped, but checked for repeated keys.
     let ready = r#"{"type":"ready","episode":1,"action":[{"a":1,"a":2}]}"#;
     assert!(matches!(
         parse_reset_ready(ready.as_bytes(), 1),
         Err(AgentFaultKind::NotJson { .. })
     ));
-    // The same word elsewhere is no repetition.
+    // The same text in another object, or as a value, is no repetition.
     for extra in [
         r#""x":{"a":1},"y":{"a":1}"#,
         r#""x":["a","a","a"]"#,
@@ -303,7 +303,7 @@ fn a_key_given_twice_is_refused_at_any_depth_and_however_it_is_written() {
 }
 
 #[test]
-fn a_line_over_64_kib_is_refused_and_one_of_64_kib_is_not() {
+fn line_limit_is_64_kib() {
     let pad = MAX_LINE_BYTES - good().len();
     assert!(parse(&format!("{}{}", good(), " ".repeat(pad))).is_ok());
     assert_eq!(
@@ -336,7 +336,7 @@ fn deep_nesting_does_not_exhaust_the_stack() {
 }
 
 #[test]
-fn ready_answers_hello() {
+fn ready_to_hello_is_parsed_and_checked() {
     let ready = |text: &str| parse_ready(text.as_bytes());
     let full = r#"{"type":"ready","protocol":1,"interpolation":3,"name":"x","version":"2"}"#;
     let parsed = ready(full).unwrap();
@@ -373,7 +373,7 @@ fn ready_answers_hello() {
 }
 
 #[test]
-fn ready_answers_reset_with_its_episode() {
+fn ready_to_reset_must_name_the_episode() {
     assert_eq!(
         parse_reset_ready(br#"{"type":"ready","episode":17}"#, 17),
         Ok(())

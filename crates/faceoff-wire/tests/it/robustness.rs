@@ -82,7 +82,7 @@ proptest! {
     }
 
     #[test]
-    fn any_bytes_are_survived(
+    fn arbitrary_bytes_do_not_panic(
         bytes in prop::collection::vec(any::<u8>(), 0..300), code in interpolation()
     ) {
         let mut action = Vec::new();
@@ -92,10 +92,9 @@ proptest! {
         prop_assert!(quote_line(&bytes).chars().count() <= 400);
     }
 
-    /// A good line with one piece cut out or overwritten either still parses to a whole, finite
-    /// action or is refused; nothing in between.
+    /// A valid line with one part removed or overwritten either parses to a complete, finite action or is refused.
     #[test]
-    fn damaged_lines_give_a_whole_action_or_a_fault(
+    fn damaged_lines_give_a_complete_action_or_a_fault(
         code in interpolation(),
         pool in prop::collection::vec(-10.0..10.0f64, 420),
         at in any::<prop::sample::Index>(),

@@ -1,11 +1,11 @@
-//! Bundles and recordings by a bucket of S3, or of what speaks as it does, in the place of the server's own HTTP: workers get links that
-//! expire, and no key.
+//! Transfer of bundles and recordings through an S3-compatible bucket in place of the server's HTTP. Workers get links that
+//! expire, but no credentials.
 
 use anyhow::Context as _;
 use faceoff_dataset::files_of;
 use faceoff_store::Artifacts;
 use faceoff_types::BundleRef;
-use faceoff_wire::{grant::Grant, remote::Objects};
+use faceoff_wire::{grant::Grant, remote::ObjectLinks};
 use futures::{StreamExt as _, TryStreamExt as _};
 use object_store::{
     ClientOptions, ObjectStore, ObjectStoreExt as _, RetryConfig, WriteMultipart,
@@ -26,25 +26,25 @@ use std::{
 use tokio::io::AsyncReadExt as _;
 use uuid::Uuid;
 
-/// For how long a link is good: longer than the longest game or shard takes.
-const LINKS_FOR: Duration = Duration::from_secs(24 * 3600);
-/// What fails is tried again by whoever gives out and takes in, who also says so.
-const ANSWERS_WITHIN: Duration = Duration::from_secs(10);
-/// After this it is looked whether a bundle is still there: a bucket may end what it holds.
-const SEEN_FOR: Duration = Duration::from_secs(600);
-/// Bytes in memory per piece of a copy.
-const PIECE_BYTES: usize = 8 << 20;
-/// The largest file of a recording, in bytes: far more than any shard has.
+/// Validity of a link: longer than the longest game or shard takes.
+const LINK_VALIDITY: Duration = Duration::from_secs(24 * 3600);
+/// Timeout of requests to the bucket. The callers retry and log failures.
+const REQUEST_TIMEOUT: Duration = Duration::from_secs(10);
+/// After this time the presence of a bundle is checked again, since buckets may delete objects.
+const RECHECK_AFTER: Duration = Duration::from_secs(600);
+/// Bytes in memory per part of an upload.
+const PART_BYTES: usize = 8 << 20;
+/// Largest file of a recording, in bytes; far beyond that of any shard.
 const LARGEST_BYTES: u64 = 4 << 30;
 
-/// Where a bucket is, and where files wait that come out of it.
+/// Configuration of a bucket.
 #[derive(Debug, Clone)]
 pub struct BucketConfig {
-    /// `s3://BUCKET` or `s3://BUCKET/PREFIX`; keys, region and endpoint are the environment's (`AWS_…`).
+    /// `s3://BUCKET` or `s3://BUCKET/PREFIX`; credentials, region and endpoint come from the environment (`AWS_…`).
     pub url: String,
-    /// By which it is reached.
+    /// HTTP client for the bucket.
     pub http: reqwest::Client,
-    /// For files that have come only in part; it exists.
+    /// An existing folder for partial downloads.
     pub folder: PathBuf,
 }
 
@@ -52,11 +52,11 @@ pub(super) struct Bucket {
     objects: AmazonS3,
     prefix: Key,
     folder: PathBuf,
-    /// BLAKE3 of bundles, and when they were last seen to be there.
+    /// BLAKE3 of bundles, with the time when their presence was last checked.
     bundles: Mutex<HashMap<String, Instant>>,
 }
 
-/// The client is the program's own: there is one way in it to trust others.
+/// Makes `object_store` use the program's own HTTP client, with its trusted certificates.
 struct Connector(reqwest::Client);
 
 impl fmt::Debug for Connector {
@@ -80,7 +80,7 @@ impl Bucket {
             .with_http_connector(Connector(config.http))
             .with_retry(RetryConfig {
                 max_retries: 2,
-                retry_timeout: ANSWERS_WITHIN,
+                retry_timeout: REQUEST_TIMEOUT,
                 ..RetryConfig::default()
             })
             .build()
@@ -93,29 +93,29 @@ impl Bucket {
         })
     }
 
-    /// Is it there? What is claimed for it otherwise comes back.
+    /// Checks that the bucket is reachable. Jobs that are claimed without it would only be released again.
     pub(super) async fn probe(&self) -> anyhow::Result<()> {
         match self.objects.head(&self.bundle("probe")).await {
             Ok(_) | Err(object_store::Error::NotFound { .. }) => Ok(()),
-            Err(error) => Err(error).context("asking for the bucket"),
+            Err(error) => Err(error).context("reaching the bucket"),
         }
     }
 
-    /// Links to what an order opens. Bundles that are not in the bucket are put there.
-    pub(super) async fn opens(
+    /// Creates links to the files of a grant. Uploads bundles that are not in the bucket.
+    pub(super) async fn create_links(
         &self,
         grant: &Grant,
         artifacts: &Artifacts,
-    ) -> anyhow::Result<Objects> {
+    ) -> anyhow::Result<ObjectLinks> {
         let mut bundles = BTreeMap::new();
         for bundle in &grant.bundles {
             let key = self.bundle(&bundle.blake3);
-            self.offer(bundle, &key, artifacts)
+            self.ensure_uploaded(bundle, &key, artifacts)
                 .await
                 .with_context(|| format!("putting a bundle into the bucket, at {key}"))?;
             let link = self
                 .objects
-                .signed_url(Method::GET, &key, LINKS_FOR)
+                .signed_url(Method::GET, &key, LINK_VALIDITY)
                 .await?;
             bundles.insert(bundle.blake3.clone(), link.to_string());
         }
@@ -124,65 +124,65 @@ impl Bucket {
             let key = self.file(grant.nonce, name);
             let link = self
                 .objects
-                .signed_url(Method::PUT, &key, LINKS_FOR)
+                .signed_url(Method::PUT, &key, LINK_VALIDITY)
                 .await?;
             files.insert((*name).to_owned(), link.to_string());
         }
-        Ok(Objects { bundles, files })
+        Ok(ObjectLinks { bundles, files })
     }
 
-    async fn offer(
+    async fn ensure_uploaded(
         &self,
         bundle: &BundleRef,
         key: &Key,
         artifacts: &Artifacts,
     ) -> anyhow::Result<()> {
-        let known = || self.bundles.lock().unwrap_or_else(PoisonError::into_inner);
-        if known()
+        let bundles = || self.bundles.lock().unwrap_or_else(PoisonError::into_inner);
+        if bundles()
             .get(&bundle.blake3)
-            .is_some_and(|seen| seen.elapsed() < SEEN_FOR)
+            .is_some_and(|checked| checked.elapsed() < RECHECK_AFTER)
         {
             return Ok(());
         }
         match self.objects.head(key).await {
             Ok(found) if found.size == bundle.bytes => {}
             Ok(_) | Err(object_store::Error::NotFound { .. }) => {
-                let mut file = tokio::fs::File::open(artifacts.path_of(&bundle.key)?).await?;
+                let mut file = tokio::fs::File::open(artifacts.local_path(&bundle.key)?).await?;
                 let upload = self.objects.put_multipart(key).await?;
-                let mut upload = WriteMultipart::new_with_chunk_size(upload, PIECE_BYTES);
-                let mut piece = vec![0; PIECE_BYTES];
+                let mut upload = WriteMultipart::new_with_chunk_size(upload, PART_BYTES);
+                let mut part = vec![0; PART_BYTES];
                 loop {
-                    let bytes = file.read(&mut piece).await?;
+                    let bytes = file.read(&mut part).await?;
                     if bytes == 0 {
                         break;
                     }
                     upload.wait_for_capacity(4).await?;
-                    upload.write(&piece[..bytes]);
+                    upload.write(&part[..bytes]);
                 }
                 upload.finish().await?;
             }
             Err(error) => return Err(error.into()),
         }
-        known().insert(bundle.blake3.clone(), Instant::now());
+        bundles().insert(bundle.blake3.clone(), Instant::now());
         Ok(())
     }
 
-    /// Takes over what was stored under an order.
-    pub(super) async fn take(&self, grant: &Grant, artifacts: &Artifacts) -> anyhow::Result<()> {
+    /// Copies the files that were stored under a grant into the artifacts.
+    pub(super) async fn fetch_files(&self, grant: &Grant, artifacts: &Artifacts) -> anyhow::Result<()> {
         for name in files_of(grant) {
-            let Some(to) = grant.key_of(name) else {
+            let Some(to) = grant.storage_key(name) else {
                 continue;
             };
             let from = self.file(grant.nonce, name);
             let found = match self.objects.get(&from).await {
                 Ok(found) => found,
-                // What must be there is missed by whoever reads it.
+                // If the file is required, its reader reports the error.
                 Err(object_store::Error::NotFound { .. }) => continue,
-                Err(error) => return Err(error).context("taking a recording out of the bucket"),
+                Err(error) => return Err(error).context("fetching a recording from the bucket"),
             };
             if found.meta.size > LARGEST_BYTES {
                 let bytes = found.meta.size;
-                tracing::error!(%from, bytes, "no recording has so large a file; it is left out");
+                tracing::error!(%from, bytes, "the file is too large for a recording; ignored");
                 continue;
             }
             let mut file = tempfile::NamedTempFile::new_in(&self.folder)?;
@@ -199,8 +199,8 @@ impl Bucket {
         Ok(())
     }
 
-    /// Removes what was stored under an order: it has been taken over, or nobody wants it.
-    pub(super) async fn forget(&self, grant: &Grant) {
+    /// Deletes the files that were stored under a grant, after they were copied or refused.
+    pub(super) async fn delete_files(&self, grant: &Grant) {
         let keys = files_of(grant)
             .iter()
             .map(|name| Ok(self.file(grant.nonce, name)));
@@ -210,7 +210,7 @@ impl Bucket {
             match one {
                 Ok(_) | Err(object_store::Error::NotFound { .. }) => {}
                 Err(error) => {
-                    tracing::warn!(%error, "a file stays in the bucket until its lifetime ends");
+                    tracing::warn!(%error, "a file in the bucket could not be deleted; it remains until its lifetime ends");
                 }
             }
         }
@@ -227,18 +227,18 @@ impl Bucket {
 }
 
 impl BucketConfig {
-    /// Makes the folder, empty of what a former life has left.
+    /// Creates the folder, without files of an earlier process.
     ///
     /// # Errors
-    /// If it cannot be made.
-    pub fn make_folder(&self) -> anyhow::Result<()> {
-        let made = || {
+    /// If it cannot be created.
+    pub fn create_folder(&self) -> anyhow::Result<()> {
+        let create = || {
             match fs::remove_dir_all(&self.folder) {
                 Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(error),
                 _ => {}
             }
             fs::create_dir_all(&self.folder)
         };
-        made().with_context(|| format!("making the folder {}", self.folder.display()))
+        create().with_context(|| format!("creating the folder {}", self.folder.display()))
     }
 }

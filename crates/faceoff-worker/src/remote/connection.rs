@@ -1,4 +1,4 @@
-//! A connection to NATS that comes back by itself, and says in the log when it goes and comes.
+//! A connection to NATS that reconnects automatically and logs changes of its state.
 
 use super::names::Names;
 use anyhow::Context as _;
@@ -9,9 +9,9 @@ use std::{
     time::Duration,
 };
 
-/// How long a question may go unanswered before it counts as lost.
-pub(super) const ANSWER: Duration = Duration::from_secs(5);
-/// The longest pause between two tries to connect.
+/// Timeout of requests over NATS.
+pub(super) const REQUEST_TIMEOUT: Duration = Duration::from_secs(5);
+/// The longest pause between two attempts to connect.
 const LONGEST_PAUSE: Duration = Duration::from_secs(5);
 
 /// How to reach NATS.
@@ -19,57 +19,58 @@ const LONGEST_PAUSE: Duration = Duration::from_secs(5);
 pub struct NatsConfig {
     /// `nats://HOST:PORT`, or `tls://HOST:PORT`.
     pub url: String,
-    /// What the server's streams and subjects begin with.
+    /// Name of the server, with which its streams and subjects begin.
     pub name: String,
-    /// A file with the seed of an nkey, by which NATS knows who connects.
+    /// A file with the seed of an nkey, which identifies the client to NATS.
     pub nkey_file: Option<PathBuf>,
-    /// A file with the certificates (PEM) of the authorities by which NATS is known, instead of those of this host.
+    /// A file with PEM certificates of the authorities trusted for NATS, in place of the host's.
     pub ca_file: Option<PathBuf>,
 }
 
 impl NatsConfig {
-    /// Connects as `who`, now or as soon as NATS is there. `stands` is told why there is no connection, and of none when there is one.
+    /// Connects as `client_name`, now or as soon as NATS is reachable. `on_status` is called with the reason when the
+    /// connection fails, and with `None` when it is established.
     pub(super) async fn connect(
         &self,
-        who: &str,
-        stands: impl Fn(Option<&str>) + Send + Sync + 'static,
+        client_name: &str,
+        on_status: impl Fn(Option<&str>) + Send + Sync + 'static,
     ) -> anyhow::Result<Client> {
-        let told = Arc::new(Told {
+        let log = Arc::new(ConnectionLog {
             url: self.url.clone(),
             cause: Mutex::default(),
-            stands: Box::new(stands),
+            on_status: Box::new(on_status),
         });
-        let asked = Arc::clone(&told);
+        let reconnect_log = Arc::clone(&log);
         let options = self
-            .options(who)
+            .options(client_name)
             .await?
             .retry_on_initial_connect()
             .max_reconnects(None)
             .reconnect_delay_callback(|tries| {
                 LONGEST_PAUSE.min(Duration::from_millis(100 << tries.min(6)))
             })
-            // Asked for the next server to try, it knows why the last try failed, which events leave out; the choice stays the client's.
+            // This callback knows why the last attempt failed, which events do not say; it leaves the choice of server to the client.
             .reconnect_to_server_callback(move |servers, _| {
                 let cause = servers.into_iter().find_map(|server| server.last_error);
                 if let Some(cause) = cause {
-                    asked.unreachable(&cause);
+                    reconnect_log.unreachable(&cause);
                 }
                 std::future::ready(None)
             })
             .event_callback(move |event| {
-                let told = Arc::clone(&told);
-                async move { told.tell(&event) }
+                let log = Arc::clone(&log);
+                async move { log.record(&event) }
             });
         let connected = options.connect(&self.url).await;
         connected.with_context(|| format!("connecting to NATS at {}", self.url))
     }
 
-    /// By which name and key, and whom it trusts.
-    pub(super) async fn options(&self, who: &str) -> anyhow::Result<ConnectOptions> {
+    /// Client name, credentials and trusted certificates.
+    pub(super) async fn options(&self, client_name: &str) -> anyhow::Result<ConnectOptions> {
         let mut options = ConnectOptions::new()
-            .name(who)
-            .custom_inbox_prefix(Names::of(&self.name)?.inbox(who))
-            .request_timeout(Some(ANSWER));
+            .name(client_name)
+            .custom_inbox_prefix(Names::new(&self.name)?.inbox(client_name))
+            .request_timeout(Some(REQUEST_TIMEOUT));
         if let Some(file) = &self.nkey_file {
             let seed = tokio::fs::read_to_string(file)
                 .await
@@ -83,35 +84,35 @@ impl NatsConfig {
     }
 }
 
-/// Is told why there is no connection, or of none.
-type Tells = dyn Fn(Option<&str>) + Send + Sync;
+/// Called with the reason for a missing connection, or `None`.
+type StatusCallback = dyn Fn(Option<&str>) + Send + Sync;
 
-/// What the log was told of a connection.
-struct Told {
+/// Logs the state of a connection, without repetitions.
+struct ConnectionLog {
     url: String,
-    /// Why it could not be had, as it was told last: the log is told of a change, not of every try.
+    /// The last logged cause of a failure; empty while connected. Only changes are logged.
     cause: Mutex<String>,
-    stands: Box<Tells>,
+    on_status: Box<StatusCallback>,
 }
 
-impl Told {
-    fn tell(&self, event: &Event) {
+impl ConnectionLog {
+    fn record(&self, event: &Event) {
         let url = &self.url;
         match event {
             Event::Connected => {
-                self.cause_is("");
-                (self.stands)(None);
+                self.set_cause("");
+                (self.on_status)(None);
                 tracing::info!(url, "connected to NATS");
             }
             Event::Disconnected => {
-                (self.stands)(Some(&format!("there is no connection to {url}")));
+                (self.on_status)(Some(&format!("there is no connection to {url}")));
                 tracing::warn!(
                     url,
                     "no connection to NATS; trying again until there is one"
                 );
             }
-            // In more detail before the next try, if more is known.
-            Event::ClientError(error) if self.is_well() => self.unreachable(&error.to_string()),
+            // If the cause is known, it is logged before the next attempt.
+            Event::ClientError(error) if self.is_healthy() => self.unreachable(&error.to_string()),
             Event::ClientError(error) => tracing::debug!(url, %error, "NATS cannot be reached"),
             Event::ServerError(error) => tracing::error!(url, %error, "NATS refuses"),
             other => tracing::info!(url, event = %other, "NATS"),
@@ -119,16 +120,16 @@ impl Told {
     }
 
     fn unreachable(&self, cause: &str) {
-        if !self.cause_is(cause) {
+        if !self.set_cause(cause) {
             return;
         }
         let url = &self.url;
-        (self.stands)(Some(&format!("{url}: {cause}")));
+        (self.on_status)(Some(&format!("{url}: {cause}")));
         if cause.contains("certificate") {
             tracing::error!(
                 url,
                 cause,
-                "NATS cannot be reached: its certificate is not believed; nats.ca_file names the authority that signed it"
+                "NATS cannot be reached: its certificate is not trusted; nats.ca_file must name the authority that signed it"
             );
         } else {
             tracing::warn!(
@@ -139,17 +140,17 @@ impl Told {
         }
     }
 
-    /// Was the log told of no cause since there was last a connection?
-    fn is_well(&self) -> bool {
-        let told = self.cause.lock().unwrap_or_else(PoisonError::into_inner);
-        told.is_empty()
+    /// Has no cause been logged since the last connection?
+    fn is_healthy(&self) -> bool {
+        let cause = self.cause.lock().unwrap_or_else(PoisonError::into_inner);
+        cause.is_empty()
     }
 
-    /// Is this another cause than before?
-    fn cause_is(&self, cause: &str) -> bool {
-        let mut told = self.cause.lock().unwrap_or_else(PoisonError::into_inner);
-        let is_new = *told != cause;
-        cause.clone_into(&mut told);
+    /// Records the cause; true if it differs from the previous one.
+    fn set_cause(&self, cause: &str) -> bool {
+        let mut logged = self.cause.lock().unwrap_or_else(PoisonError::into_inner);
+        let is_new = *logged != cause;
+        cause.clone_into(&mut logged);
         is_new
     }
 }

@@ -1,20 +1,20 @@
-//! The server's side: claims what free slots elsewhere ask for, and takes in what came of it.
+//! The server's side of remote work: publishes jobs for free remote slots and accepts their results.
 
 use super::{
-    answers::{Answers, claim},
+    requests::{RequestHandler, claim},
     bucket::{Bucket, BucketConfig},
-    checked::Checks,
+    result_checks::ResultChecks,
     connection::NatsConfig,
-    granted::grant_of,
-    handed_in::AllHandedIn,
-    names::{self, ALL, Names, SERVER, WAITING},
-    streams::{LOST_A_PART, Streams, is_ahead},
-    taken_back::{AllGivenOut, GivenOut},
+    grants::grant_for,
+    pending_results::PendingResults,
+    names::{self, ALL, Names, SERVER, UNCLAIMED},
+    streams::{MESSAGES_LOST, Streams, is_ahead},
+    published_jobs::{PublishedJobs, PublishedJob},
 };
 use crate::{
     boxed,
     local::LocalServer,
-    server::{Claimed, WorkServer},
+    server::{ClaimResult, JobServer},
     service::WorkerConfig,
 };
 use anyhow::Context as _;
@@ -22,12 +22,12 @@ use async_nats::{
     Client,
     jetstream::{self, stream::Stream},
 };
-use faceoff_store::{Lot, Store, StoreError, Workers};
+use faceoff_store::{JobFilter, Store, StoreError, Workers};
 use faceoff_types::Clock;
 use faceoff_wire::{
     grant::GrantKey,
-    remote::{Introduction, RemoteOrder},
-    work::{Lease, WorkOrder},
+    remote::{WorkerCapabilities, RemoteJob},
+    job::{Lease, JobSpec},
 };
 use futures::StreamExt as _;
 use std::{
@@ -37,46 +37,47 @@ use std::{
 };
 use tokio_util::sync::CancellationToken;
 
-/// How often is looked at what nobody tells: orders that nobody begins, work that is due by now.
-pub(super) const LOOK: Duration = Duration::from_secs(1);
-/// From one try of what fails to the next.
-const REST: Duration = Duration::from_secs(1);
-/// What has not failed within this goes well: questions to NATS that is away fail before.
-const WELL: Duration = Duration::from_secs(10);
-/// What workers hold when the server starts is theirs for so long at least, seconds: nobody could renew it before.
-const AT_LEAST_AT_START_S: u32 = 60;
-/// What the server cannot do while NATS is away, which is the cause of all else.
-const REACHES_NATS: &str = "reach NATS";
+/// How often to poll for changes without a signal: published jobs that no worker starts, and jobs that become due.
+pub(super) const POLL_INTERVAL: Duration = Duration::from_secs(1);
+/// Minimum interval between the starts of two attempts.
+const RETRY_INTERVAL: Duration = Duration::from_secs(1);
+/// A task that has run this long counts as healthy; requests to an unreachable NATS fail sooner.
+const HEALTHY_AFTER: Duration = Duration::from_secs(10);
+/// Minimum duration of the workers' leases at the start of the server, seconds: they could not be renewed while it was down.
+const MIN_LEASE_AT_START_S: u32 = 60;
+/// The problem of the server while NATS is unreachable; it is the cause of all others.
+const REACH_NATS: &str = "reach NATS";
 
-/// How a server gives work to other machines.
+/// Configuration of remote workers in a server.
 #[derive(Debug, Clone)]
 pub struct RemoteConfig {
     pub nats: NatsConfig,
-    /// Where workers reach this server's files: an address of http or https, without a slash at its end.
-    pub files: String,
-    /// What grants are sealed with.
+    /// Base URL of this server's files for workers (http or https), without a trailing slash.
+    pub files_url: String,
+    /// Key with which grants are sealed.
     pub key: GrantKey,
-    /// What workers must be like.
-    pub like: Introduction,
-    /// Episodes of each shard that are simulated again before it counts; 0: nothing is.
+    /// Program and runtimes that workers must have.
+    pub required: WorkerCapabilities,
+    /// Episodes of each shard that are simulated again as a check; 0: no checks.
     pub checked_episodes: u32,
-    /// Where bundles and recordings pass, if not by this server's HTTP.
+    /// Bucket for the transfer of bundles and recordings, if not over this server's HTTP.
     pub bucket: Option<BucketConfig>,
 }
 
 impl RemoteConfig {
-    pub(super) fn checks(&self) -> Checks {
-        Checks {
+    pub(super) fn checks(&self) -> ResultChecks {
+        ResultChecks {
             episodes: self.checked_episodes,
             key: self.key.clone(),
         }
     }
 }
 
-/// Gives out work until `shutdown` is cancelled. While NATS is away nothing is given out; what is under way elsewhere goes on.
+/// Publishes jobs and accepts results until `shutdown` is cancelled. While NATS is unreachable no jobs are published, and
+/// running jobs continue.
 ///
 /// # Errors
-/// If the configuration is none, or the database cannot be read at the start.
+/// If the configuration is invalid, or the database cannot be read at the start.
 #[boxed]
 pub async fn dispatch(
     store: Store,
@@ -85,120 +86,116 @@ pub async fn dispatch(
     remote: RemoteConfig,
     shutdown: CancellationToken,
 ) -> anyhow::Result<()> {
-    let names = Names::of(&remote.nats.name)?;
+    let names = Names::new(&remote.nats.name)?;
     let server = LocalServer {
-        lot: Lot::Plays,
+        job_filter: JobFilter::ShardsAndGames,
         ..config.local_server(store, clock)
     };
-    take_over(&server).await?;
+    resume_leases(&server).await?;
     let season = server.store.season().await?.commitment;
     let store = server.store.clone();
     let workers = store.workers();
-    workers.use_them();
-    let tell = workers.clone();
+    workers.enable();
+    let status = workers.clone();
     let client = remote
         .nats
-        .connect(SERVER, move |cause| tell.trouble(REACHES_NATS, cause));
+        .connect(SERVER, move |cause| status.set_problem(REACH_NATS, cause));
     let client = client.await?;
     let bucket = match &remote.bucket {
         Some(bucket) => {
-            bucket.make_folder()?;
+            bucket.create_folder()?;
             Some(Arc::new(Bucket::open(bucket.clone())?))
         }
         None => None,
     };
-    let hub = Arc::new(Hub {
+    let dispatcher = Arc::new(Dispatcher {
         bucket,
-        streams: Arc::new(Streams::of(
+        streams: Arc::new(Streams::new(
             jetstream::new(client.clone()),
             names.clone(),
             format!("Faceoff, season {season}"),
         )),
-        given_out: Arc::default(),
-        handed_in: Arc::default(),
+        published_jobs: Arc::default(),
+        pending_results: Arc::default(),
         client,
         names,
         server,
         remote,
     });
-    let answers = Answers {
-        client: hub.client.clone(),
-        names: hub.names.clone(),
-        store: hub.server.store.clone(),
-        clock: hub.server.clock.clone(),
-        lease_s: hub.server.lease_s,
-        like: hub.remote.like.clone(),
-        given_out: Arc::clone(&hub.given_out),
-        handed_in: Arc::clone(&hub.handed_in),
-        streams: Arc::clone(&hub.streams),
+    let requests = RequestHandler {
+        client: dispatcher.client.clone(),
+        names: dispatcher.names.clone(),
+        store: dispatcher.server.store.clone(),
+        clock: dispatcher.server.clock.clone(),
+        lease_s: dispatcher.server.lease_s,
+        required: dispatcher.remote.required.clone(),
+        published_jobs: Arc::clone(&dispatcher.published_jobs),
+        pending_results: Arc::clone(&dispatcher.pending_results),
+        streams: Arc::clone(&dispatcher.streams),
     };
-    let banned = hub.server.store.worker_bans().await?;
+    let banned = dispatcher.server.store.worker_bans().await?;
     workers.set_banned(banned.into_iter().map(|ban| (ban.worker, ban.reason)));
-    let again = Again {
+    let supervisor = Supervisor {
         workers,
         shutdown: &shutdown,
     };
     tokio::join!(
-        again.run("give out work", || hub.give_out(&shutdown)),
-        again.run("take in what came of work", || hub.take_in(&shutdown)),
-        again.run("keep what waits for it", || hub.keep_waiting(&shutdown)),
-        again.run("answer workers", || answers.answer(&shutdown)),
-        again.run("hear of games", || answers.show(&shutdown)),
+        supervisor.run("publish jobs", || dispatcher.publish_jobs(&shutdown)),
+        supervisor.run("accept results", || dispatcher.accept_results(&shutdown)),
+        supervisor.run("keep the leases of pending results", || dispatcher.keep_pending(&shutdown)),
+        supervisor.run("answer workers", || requests.run(&shutdown)),
+        supervisor.run("relay live games", || requests.relay_games(&shutdown)),
     );
-    hub.take_back(hub.given_out.take_all(), None).await;
+    dispatcher.requeue_jobs(dispatcher.published_jobs.take_all(), None).await;
     Ok(())
 }
 
-/// Nobody can begin what a former life of this server has given out; what workers have begun they could not renew while it was away, and may
-/// have handed in.
-async fn take_over(server: &LocalServer) -> anyhow::Result<()> {
+/// Resumes after a restart. Jobs that were published before can no longer be started and are released. Leases of running
+/// jobs are renewed, since workers could not renew them, and their results may be pending.
+async fn resume_leases(server: &LocalServer) -> anyhow::Result<()> {
     let (store, now) = (&server.store, server.clock.now());
-    let taken_over = async {
-        store.give_back_all_of(WAITING, now).await?;
-        let lease_s = server.lease_s.max(AT_LEAST_AT_START_S);
-        store.renew_leases_of(names::ELSEWHERE, lease_s, now).await
+    let resumed = async {
+        store.release_leases_of(UNCLAIMED, now).await?;
+        let lease_s = server.lease_s.max(MIN_LEASE_AT_START_S);
+        store.renew_leases_of(names::REMOTE, lease_s, now).await
     };
-    match taken_over.await {
+    match resumed.await {
         Ok(0) => Ok(()),
-        Ok(units) => {
-            tracing::info!(
-                units,
-                "workers elsewhere have work since before this server"
-            );
+        Ok(jobs) => {
+            tracing::info!(jobs, "remote workers have jobs from before the server's start");
             Ok(())
         }
-        // They end by themselves.
-        Err(error @ StoreError::FullDisk(_)) => {
-            tracing::warn!(%error, "the leases of this server's last life stay until they run out");
+        // They expire anyway.
+        Err(error @ StoreError::DiskFull(_)) => {
+            tracing::warn!(%error, "the leases of this server's previous process remain until they expire");
             Ok(())
         }
         Err(error) => Err(error.into()),
     }
 }
 
-/// Does what is to be done until the shutdown, again and again if it fails. The log is told of a change, not of every try; whoever
-/// looks after the server finds what is missing as long as it is.
-struct Again<'a> {
+/// Runs tasks until the shutdown and restarts them when they fail. Only changes are logged; current problems are shown to
+/// organisers.
+struct Supervisor<'a> {
     workers: &'a Workers,
     shutdown: &'a CancellationToken,
 }
 
-impl Again<'_> {
+impl Supervisor<'_> {
     async fn run<F: Future<Output = anyhow::Result<()>>>(
         &self,
-        what: &str,
+        task: &str,
         mut run: impl FnMut() -> F,
     ) {
-        let mut told = String::new();
+        let mut logged = String::new();
         while !self.shutdown.is_cancelled() {
             let began = Instant::now();
             let mut running = pin!(run());
-            // What goes well for so long is well.
-            let ended = match tokio::time::timeout(WELL, &mut running).await {
+            let ended = match tokio::time::timeout(HEALTHY_AFTER, &mut running).await {
                 Ok(ended) => ended,
                 Err(_) => {
-                    self.workers.trouble(what, None);
-                    told.clear();
+                    self.workers.set_problem(task, None);
+                    logged.clear();
                     running.await
                 }
             };
@@ -206,140 +203,140 @@ impl Again<'_> {
                 continue;
             };
             let cause = format!("{error:#}");
-            if cause != told {
-                tracing::error!(cause, "cannot {what}; trying again");
-                // Where NATS is away, that is told, and not all that follows from it.
-                let of_nats = self.workers.is_troubled(REACHES_NATS);
-                self.workers.trouble(what, (!of_nats).then_some(&*cause));
-                told = cause;
+            if cause != logged {
+                tracing::error!(cause, "cannot {task}; trying again");
+                // While NATS is unreachable, problems that follow from it are not shown.
+                let is_nats_down = self.workers.has_problem(REACH_NATS);
+                self.workers.set_problem(task, (!is_nats_down).then_some(&*cause));
+                logged = cause;
             }
             tokio::select! {
                 () = self.shutdown.cancelled() => {}
-                () = tokio::time::sleep_until((began + REST).into()) => {}
+                () = tokio::time::sleep_until((began + RETRY_INTERVAL).into()) => {}
             }
         }
     }
 }
 
-/// What gives out and takes in.
-pub(super) struct Hub {
+/// Publishes jobs and accepts results.
+pub(super) struct Dispatcher {
     client: Client,
     pub(super) streams: Arc<Streams>,
     names: Names,
     pub(super) server: LocalServer,
     pub(super) remote: RemoteConfig,
     pub(super) bucket: Option<Arc<Bucket>>,
-    given_out: Arc<AllGivenOut>,
-    pub(super) handed_in: Arc<AllHandedIn>,
+    published_jobs: Arc<PublishedJobs>,
+    pub(super) pending_results: Arc<PendingResults>,
 }
 
-impl Hub {
-    async fn give_out(&self, shutdown: &CancellationToken) -> anyhow::Result<()> {
-        let (mut stream, mut consumer) = self.streams.orders().await?;
-        let mut looked_at = Instant::now();
-        // Nothing is claimed in vain.
+impl Dispatcher {
+    async fn publish_jobs(&self, shutdown: &CancellationToken) -> anyhow::Result<()> {
+        let (mut stream, mut consumer) = self.streams.jobs().await?;
+        let mut checked_at = Instant::now();
+        // Without the bucket, claimed jobs would only be released again.
         if let Some(bucket) = &self.bucket {
             bucket.probe().await?;
         }
-        let mut free = self.client.subscribe(self.names.free(ALL)).await?;
-        let mut signal = self.server.store.work_signal();
+        let mut free = self.client.subscribe(self.names.free_slots(ALL)).await?;
+        let mut signal = self.server.store.job_signal();
         while !shutdown.is_cancelled() {
             signal.borrow_and_update();
-            let late = self.given_out.take_late(Instant::now());
-            self.take_back(late, Some(&stream)).await;
-            let info = consumer.info().await.context("asking who waits for work")?;
-            if looked_at.elapsed() >= LOOK {
-                let state = &stream.info().await.context("looking at the orders")?.state;
-                anyhow::ensure!(!is_ahead(info, state), LOST_A_PART);
-                looked_at = Instant::now();
+            let late = self.published_jobs.take_late(Instant::now());
+            self.requeue_jobs(late, Some(&stream)).await;
+            let info = consumer.info().await.context("reading the number of waiting slots")?;
+            if checked_at.elapsed() >= POLL_INTERVAL {
+                let state = &stream.info().await.context("reading the state of the stream of jobs")?.state;
+                anyhow::ensure!(!is_ahead(info, state), MESSAGES_LOST);
+                checked_at = Instant::now();
             }
             let waiting = u64::try_from(info.num_waiting).unwrap_or_default();
             for _ in 0..waiting.saturating_sub(info.num_pending) {
-                if !self.give_out_one().await? {
+                if !self.publish_next().await? {
                     break;
                 }
             }
             tokio::select! {
                 () = shutdown.cancelled() => {}
                 changed = signal.changed() => changed.context("listening to the queue")?,
-                told = free.next() => anyhow::ensure!(told.is_some(), "the connection to NATS has ended"),
-                () = tokio::time::sleep(LOOK) => {}
+                message = free.next() => anyhow::ensure!(message.is_some(), "the connection to NATS has ended"),
+                () = tokio::time::sleep(POLL_INTERVAL) => {}
             }
         }
         Ok(())
     }
 
-    /// Is there more to give out?
-    async fn give_out_one(&self) -> anyhow::Result<bool> {
+    /// Claims and publishes one job; false if there is none.
+    async fn publish_next(&self) -> anyhow::Result<bool> {
         let server = self.server.clone();
-        let claimed = tokio::task::spawn_blocking(move || server.claim(WAITING)).await??;
-        let Claimed::Order(order) = claimed else {
+        let claimed = tokio::task::spawn_blocking(move || server.claim(UNCLAIMED)).await??;
+        let ClaimResult::Job(job) = claimed else {
             return Ok(false);
         };
-        let (lease, what) = (order.lease.clone(), order.assignment.to_string());
-        self.given_out.add(lease.clone(), what, Instant::now());
-        match self.publish(*order).await {
+        let (lease, description) = (job.lease.clone(), job.payload.to_string());
+        self.published_jobs.add(lease.clone(), description, Instant::now());
+        match self.publish(*job).await {
             Ok(sequence) => {
-                self.given_out
-                    .is_published(lease.nonce, sequence, Instant::now());
+                self.published_jobs
+                    .set_published(lease.nonce, sequence, Instant::now());
                 Ok(true)
             }
-            // It may have gone out all the same: then nobody can begin it, or somebody has.
+            // It may have been published nevertheless: then it can no longer be started, or it already was.
             Err(error) => {
-                let _ = self.given_out.take(lease.nonce);
-                self.release(lease).await;
+                let _ = self.published_jobs.take(lease.nonce);
+                self.requeue(lease).await;
                 Err(error)
             }
         }
     }
 
-    /// Its place in the stream.
-    async fn publish(&self, order: WorkOrder) -> anyhow::Result<u64> {
-        let grant = grant_of(&order, &self.remote.like.program);
+    /// Publishes a job; its sequence number in the stream.
+    async fn publish(&self, job: JobSpec) -> anyhow::Result<u64> {
+        let grant = grant_for(&job, &self.remote.required.program);
         let objects = match &self.bucket {
             Some(bucket) => {
                 let artifacts = self.server.store.artifacts();
-                Some(bucket.opens(&grant, artifacts).await?)
+                Some(bucket.create_links(&grant, artifacts).await?)
             }
             None => None,
         };
-        let grant = grant.sealed(&self.remote.key)?;
-        let files = self.remote.files.clone();
-        let order = serde_json::to_vec(&RemoteOrder {
-            order,
+        let grant = grant.seal(&self.remote.key)?;
+        let files_url = self.remote.files_url.clone();
+        let message = serde_json::to_vec(&RemoteJob {
+            job,
             grant,
-            files,
-            program: self.remote.like.program.clone(),
+            files_url,
+            program: self.remote.required.program.clone(),
             objects,
         })?;
         let jetstream = &self.streams.jetstream;
-        let published = jetstream.publish(self.names.orders(), order.into());
-        let acknowledged = published.await.context("publishing an order")?;
-        let acknowledged = acknowledged.await.context("publishing an order")?;
+        let published = jetstream.publish(self.names.jobs(), message.into());
+        let acknowledged = published.await.context("publishing a job")?;
+        let acknowledged = acknowledged.await.context("publishing a job")?;
         Ok(acknowledged.sequence)
     }
 
-    /// Puts orders back into the queue that nobody has begun.
-    async fn take_back(&self, orders: Vec<GivenOut>, stream: Option<&Stream>) {
-        for order in orders {
-            self.release(order.lease).await;
-            // Whoever gets it yet is told that it is nobody's.
-            if let (Some(stream), Some(sequence)) = (stream, order.sequence)
+    /// Puts jobs that no worker has started back into the queue.
+    async fn requeue_jobs(&self, jobs: Vec<PublishedJob>, stream: Option<&Stream>) {
+        for job in jobs {
+            self.requeue(job.lease).await;
+            // A worker that still receives it cannot start it.
+            if let (Some(stream), Some(sequence)) = (stream, job.sequence)
                 && let Err(error) = stream.delete_message(sequence).await
             {
-                tracing::debug!(%error, "an order that was taken back stays in the stream");
+                tracing::debug!(%error, "a requeued job could not be removed from the stream");
             }
         }
     }
 
-    async fn release(&self, lease: Lease) {
-        let (store, unit, now) = (&self.server.store, lease.unit, self.server.clock.now());
-        let claim = claim(&lease, WAITING);
-        match store.take_back(&claim, now).await {
-            Ok(true) => tracing::debug!(%unit, "taken back: nobody has begun it"),
+    async fn requeue(&self, lease: Lease) {
+        let (store, id, now) = (&self.server.store, lease.job_id, self.server.clock.now());
+        let claim = claim(&lease, UNCLAIMED);
+        match store.release_unstarted(&claim, now).await {
+            Ok(true) => tracing::debug!(job = %id, "requeued: not started in time"),
             Ok(false) => {}
             Err(error) => {
-                tracing::warn!(%unit, %error, "an order could not be taken back; its lease will end");
+                tracing::warn!(job = %id, %error, "a job could not be requeued; its lease will expire");
             }
         }
     }

@@ -1,4 +1,4 @@
-//! What streams and subjects are called. Each begins with the server's own name, so that several share one NATS.
+//! Names of streams and subjects. Each begins with the server's name, so that several servers can share one NATS.
 
 use faceoff_store::WorkerName;
 
@@ -9,10 +9,10 @@ pub(super) struct Names {
 }
 
 impl Names {
-    /// Fails unless the name can be a part of all of them.
-    pub(super) fn of(server: &str) -> anyhow::Result<Self> {
+    /// Fails unless the server's name is valid in subjects and stream names.
+    pub(super) fn new(server: &str) -> anyhow::Result<Self> {
         anyhow::ensure!(
-            is_word(server),
+            is_subject_token(server),
             "nats.name: expected 1 to 64 of a-z, A-Z, 0-9, - and _, got {server:?}"
         );
         Ok(Self {
@@ -20,38 +20,38 @@ impl Names {
         })
     }
 
-    /// The stream of orders.
-    pub(super) fn orders_stream(&self) -> String {
+    /// The stream of jobs.
+    pub(super) fn jobs_stream(&self) -> String {
         format!("{}-orders", self.server)
     }
 
-    /// Where orders are published.
-    pub(super) fn orders(&self) -> String {
+    /// The subject of jobs.
+    pub(super) fn jobs(&self) -> String {
         format!("{}.orders", self.server)
     }
 
-    /// The stream of what came of them.
-    pub(super) fn outcomes_stream(&self) -> String {
+    /// The stream of results.
+    pub(super) fn results_stream(&self) -> String {
         format!("{}-outcomes", self.server)
     }
 
-    /// Where a worker publishes what came of an order; `*`: all of them.
-    pub(super) fn outcomes(&self, worker: &str) -> String {
+    /// The subject of a worker's results; `*`: of all workers.
+    pub(super) fn results(&self, worker: &str) -> String {
         format!("{}.outcomes.{worker}", self.server)
     }
 
-    /// Where a worker asks; `*`: all of them.
-    pub(super) fn asks(&self, worker: &str) -> String {
+    /// The subject of a worker's requests; `*`: of all workers.
+    pub(super) fn requests(&self, worker: &str) -> String {
         format!("{}.asks.{worker}", self.server)
     }
 
-    /// Where answers to who are sent: a prefix of subjects, without a dot at its end.
-    pub(super) fn inbox(&self, who: &str) -> String {
-        format!("_INBOX.{}.{who}", self.server)
+    /// The prefix of subjects on which a client gets responses, without a trailing dot.
+    pub(super) fn inbox(&self, client: &str) -> String {
+        format!("_INBOX.{}.{client}", self.server)
     }
 
-    /// Is it a subject on which this worker gets answers, and nobody else? Where workers have an account of their own, NATS has replaced it by one
-    /// that it alone may name.
+    /// Is it a subject on which only this worker gets responses? If workers have their own NATS account, NATS replaces the
+    /// subject by one that no client may name.
     pub(super) fn is_inbox_of(&self, worker: &WorkerName, subject: &str) -> bool {
         if subject.starts_with(BETWEEN_ACCOUNTS) {
             return true;
@@ -60,44 +60,44 @@ impl Names {
         rest.is_some_and(|rest| rest.starts_with('.') && !rest.contains(['*', '>']))
     }
 
-    /// Where a worker tells of games under way; `*`: all of them.
-    pub(super) fn shows(&self, worker: &str) -> String {
+    /// The subject of a worker's live updates of games; `*`: of all workers.
+    pub(super) fn live_games(&self, worker: &str) -> String {
         format!("{}.shows.{worker}", self.server)
     }
 
-    /// Where a worker tells that a slot has become free; `*`: all of them.
-    pub(super) fn free(&self, worker: &str) -> String {
+    /// The subject on which a worker reports a free slot; `*`: of all workers.
+    pub(super) fn free_slots(&self, worker: &str) -> String {
         format!("{}.free.{worker}", self.server)
     }
 }
 
-/// How subjects begin on which NATS passes answers on from one account to another; it refuses whoever says that they are to be answered there.
+/// Prefix of the subjects by which NATS forwards responses between accounts. It refuses clients that name one.
 const BETWEEN_ACCOUNTS: &str = "_R_.";
-/// What the server is called where workers have names.
+/// Client name of the server.
 pub(super) const SERVER: &str = "server";
-/// What workers have in common when they take orders.
-pub(super) const ORDERS_CONSUMER: &str = "workers";
-/// The server, when it takes what came of them.
-pub(super) const OUTCOMES_CONSUMER: &str = "server";
-/// Every worker, where subjects name one.
+/// The consumer of jobs, shared by all workers.
+pub(super) const JOBS_CONSUMER: &str = "workers";
+/// The consumer of results, used by the server.
+pub(super) const RESULTS_CONSUMER: &str = "server";
+/// All workers, in subjects.
 pub(super) const ALL: &str = "*";
-/// The holder of leases of orders that nobody has begun. No slot is called this.
-pub(super) const WAITING: &str = "given out";
+/// Lease holder of published jobs that no worker has started. No slot has this name.
+pub(super) const UNCLAIMED: &str = "given out";
 
-/// What the holders of leases of all slots elsewhere are below.
-pub(super) const ELSEWHERE: &str = "remote";
+/// Prefix of the lease holders of all remote slots.
+pub(super) const REMOTE: &str = "remote";
 
-/// What the queue calls a slot of a worker elsewhere.
+/// Lease holder name of a remote slot.
 pub(super) fn slot(worker: &WorkerName, slot: &str) -> String {
     format!("{}/{slot}", worker.holder())
 }
 
-/// Can it be a token of a subject, and a part of a stream's name?
-pub(super) fn is_word(text: &str) -> bool {
+/// Is the text valid as a token of a subject and as a part of a stream's name?
+pub(super) fn is_subject_token(text: &str) -> bool {
     text.parse::<WorkerName>().is_ok()
 }
 
-/// The worker that a subject of its own names.
+/// The worker whose subject this is.
 pub(super) fn worker_of(subject: &str) -> Option<WorkerName> {
     let (_, worker) = subject.rsplit_once('.')?;
     worker.parse().ok()
@@ -109,14 +109,14 @@ mod tests {
 
     #[test]
     fn subjects_name_server_and_worker() {
-        let names = Names::of("faceoff").unwrap();
-        assert_eq!(names.asks("gpu-1"), "faceoff.asks.gpu-1");
-        assert_eq!(worker_of(&names.asks("gpu-1")), "gpu-1".parse().ok());
-        assert_eq!(worker_of(&names.asks(ALL)), None);
+        let names = Names::new("faceoff").unwrap();
+        assert_eq!(names.requests("gpu-1"), "faceoff.asks.gpu-1");
+        assert_eq!(worker_of(&names.requests("gpu-1")), "gpu-1".parse().ok());
+        assert_eq!(worker_of(&names.requests(ALL)), None);
         let rack: WorkerName = "rack-1".parse().unwrap();
         assert!(names.is_inbox_of(&rack, "_INBOX.faceoff.rack-1.abc.1"));
         assert!(names.is_inbox_of(&rack, "_R_.abc.xyz"));
-        for other in [
+        for foreign in [
             "_INBOX.faceoff.rack-10.abc",
             "_INBOX.faceoff.rack-1",
             "_INBOX.faceoff.server.abc",
@@ -124,10 +124,10 @@ mod tests {
             "faceoff.orders",
             "",
         ] {
-            assert!(!names.is_inbox_of(&rack, other), "{other}");
+            assert!(!names.is_inbox_of(&rack, foreign), "{foreign}");
         }
-        for bad in ["", "a.b", "a b", "*", ">", &"x".repeat(65)] {
-            assert!(Names::of(bad).is_err(), "{bad:?}");
+        for invalid in ["", "a.b", "a b", "*", ">", &"x".repeat(65)] {
+            assert!(Names::new(invalid).is_err(), "{invalid:?}");
         }
     }
 }

@@ -1,5 +1,4 @@
-//! Files on their way to a worker or from it: a try goes on for as long as something of it moves, and what is lost on the way is tried
-//! again.
+//! Transfer of files to and from a worker. An attempt continues as long as data moves, and failures on the way are retried.
 
 use reqwest::{Client, Response, StatusCode, header};
 use std::{
@@ -9,85 +8,85 @@ use std::{
 };
 use tokio::time::{Instant, sleep, sleep_until};
 
-/// Who carries files, and how patiently.
+/// Transfers files with timeouts and retries.
 #[derive(Debug, Clone)]
-pub(super) struct Carrier {
-    /// Without a limit of its own on how long a file may take: reqwest's for reading runs while a body is sent, however well it is.
+pub(super) struct FileTransfer {
+    /// HTTP client without a timeout of its own: reqwest's read timeout also runs while a body is sent, even if data moves.
     pub(super) http: Client,
-    pub(super) patience: Patience,
+    pub(super) timeouts: TransferTimeouts,
 }
 
-/// For how long what is waited for.
+/// Timeouts and retry limits of transfers.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Patience {
-    /// A try is given up once nothing of it has moved for so long.
-    pub(super) still: Duration,
-    /// Whoever has the files is asked again for so long after something last moved: the server may be starting anew.
-    pub(super) away: Duration,
-    /// What breaks in the middle so many times would do so for ever: somebody in between takes nothing of this size.
-    pub(super) most_broken: u32,
-    /// From one try to the next.
-    pub(super) rest: Duration,
-    /// Likewise, if whoever answers asks for more.
-    pub(super) longest_rest: Duration,
+pub(super) struct TransferTimeouts {
+    /// An attempt is given up after this time without progress.
+    pub(super) stall: Duration,
+    /// Retries end this long after the last progress. The server may be restarting meanwhile.
+    pub(super) unavailable: Duration,
+    /// Maximum number of attempts interrupted after some progress. More are a sign that a proxy refuses files of this size.
+    pub(super) max_interrupted: u32,
+    /// Delay before a retry.
+    pub(super) retry_delay: Duration,
+    /// Maximum delay before a retry, if the server requests a longer one.
+    pub(super) max_retry_delay: Duration,
 }
 
-impl Default for Patience {
+impl Default for TransferTimeouts {
     fn default() -> Self {
         Self {
-            still: Duration::from_secs(60),
-            away: Duration::from_secs(60),
-            most_broken: 10,
-            rest: Duration::from_secs(2),
-            longest_rest: Duration::from_secs(30),
+            stall: Duration::from_secs(60),
+            unavailable: Duration::from_secs(60),
+            max_interrupted: 10,
+            retry_delay: Duration::from_secs(2),
+            max_retry_delay: Duration::from_secs(30),
         }
     }
 }
 
-/// How often is looked whether a file is still wanted.
-const LOOK: Duration = Duration::from_millis(500);
-/// So much of a body may be on its way in buffers of this host when all of it has been handed over: 4 MiB of the kernel's, and HTTP's.
+/// How often to check whether the job has ended.
+const END_CHECK_INTERVAL: Duration = Duration::from_millis(500);
+/// Upper bound of the data in this host's buffers after a whole body was written: 4 MiB of the kernel, and those of HTTP.
 const BUFFERED_BYTES: u64 = 5 << 20;
-/// The slowest link by which they are emptied: 128 kbit/s.
+/// The slowest supported link, which empties the buffers: 128 kbit/s.
 const SLOWEST_BYTES_PER_S: u64 = 16_000;
 
-/// What of a try has moved.
+/// Progress of an attempt.
 #[derive(Debug, Clone)]
-pub(super) struct Moved(Arc<Mutex<Since>>);
+pub(super) struct TransferProgress(Arc<Mutex<ProgressState>>);
 
 #[derive(Debug)]
-struct Since {
+struct ProgressState {
     at: Instant,
     bytes: u64,
-    /// What is sent, in all; of what is fetched nobody knows.
-    all_bytes: Option<u64>,
+    /// Size of a file that is sent; unknown for downloads.
+    total_bytes: Option<u64>,
 }
 
-impl Moved {
-    fn nothing() -> Self {
-        Self(Arc::new(Mutex::new(Since {
+impl TransferProgress {
+    fn new() -> Self {
+        Self(Arc::new(Mutex::new(ProgressState {
             at: Instant::now(),
             bytes: 0,
-            all_bytes: None,
+            total_bytes: None,
         })))
     }
 
-    /// So much is to be sent.
-    pub(super) fn of(&self, all_bytes: u64) {
-        self.since().all_bytes = Some(all_bytes);
+    /// Sets the size of the file that is sent.
+    pub(super) fn set_total(&self, total_bytes: u64) {
+        self.state().total_bytes = Some(total_bytes);
     }
 
-    /// So much more has moved.
+    /// Adds bytes that were transferred.
     pub(super) fn add(&self, bytes: usize) {
-        let mut since = self.since();
-        since.at = Instant::now();
-        since.bytes += bytes as u64;
+        let mut state = self.state();
+        state.at = Instant::now();
+        state.bytes += bytes as u64;
     }
 
-    /// Waits until nothing has moved for so long.
-    async fn stands_still(&self, still: Duration) {
+    /// Waits until there was no progress for this time.
+    async fn stalled(&self, stall: Duration) {
         loop {
-            let end = self.since().patience_ends(still);
+            let end = self.state().stall_deadline(stall);
             if end <= Instant::now() {
                 return;
             }
@@ -95,147 +94,147 @@ impl Moved {
         }
     }
 
-    fn since(&self) -> MutexGuard<'_, Since> {
+    fn state(&self) -> MutexGuard<'_, ProgressState> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
-impl Since {
-    fn patience_ends(&self, still: Duration) -> Instant {
-        let in_buffers = match self.all_bytes {
-            Some(all) if self.bytes >= all => all.min(BUFFERED_BYTES),
+impl ProgressState {
+    fn stall_deadline(&self, stall: Duration) -> Instant {
+        let in_buffers = match self.total_bytes {
+            Some(total) if self.bytes >= total => total.min(BUFFERED_BYTES),
             _ => 0,
         };
-        self.at + still + Duration::from_secs(in_buffers / SLOWEST_BYTES_PER_S)
+        self.at + stall + Duration::from_secs(in_buffers / SLOWEST_BYTES_PER_S)
     }
 }
 
-/// Why a try came to nothing without anybody's refusal.
+/// A failure of an attempt that may succeed when retried.
 #[derive(Debug, thiserror::Error)]
-enum Unfinished {
-    /// The server, or the proxy before it, has no time now.
+enum TransientError {
+    /// The server, or a proxy before it, is overloaded.
     #[error("the server answered {status}")]
     Busy {
         status: StatusCode,
         retry_after: Option<Duration>,
     },
-    #[error("nothing has moved for {} s", .0.as_secs())]
-    StoodStill(Duration),
+    #[error("no progress for {} s", .0.as_secs())]
+    Stalled(Duration),
 }
 
-/// The file is not wanted any more.
+/// The job has ended, so its files are not needed.
 #[derive(Debug, thiserror::Error)]
-#[error("the order has ended")]
-struct Ended;
+#[error("the job has ended")]
+struct JobEnded;
 
-impl Carrier {
-    /// Tries until it is done, it is refused, or nobody can be expected to be there; a try ends as soon as the order has `ended`.
-    pub(super) async fn carry(
+impl FileTransfer {
+    /// Repeats `attempt` until it succeeds, is refused, or the retry limits are reached. Stops as soon as the job has `ended`.
+    pub(super) async fn run(
         &self,
-        mut once: impl AsyncFnMut(&Client, &Moved) -> anyhow::Result<()>,
+        mut attempt: impl AsyncFnMut(&Client, &TransferProgress) -> anyhow::Result<()>,
         ended: impl Fn() -> bool,
     ) -> anyhow::Result<()> {
-        let patience = &self.patience;
-        let mut tries = Tries::default();
+        let timeouts = &self.timeouts;
+        let mut attempts = Attempts::default();
         let mut is_over = pin!(async {
             while !ended() {
-                sleep(LOOK).await;
+                sleep(END_CHECK_INTERVAL).await;
             }
         });
         loop {
-            let moved = Moved::nothing();
-            let tried = tokio::select! {
+            let progress = TransferProgress::new();
+            let result = tokio::select! {
                 biased;
-                done = once(&self.http, &moved) => done,
-                () = &mut is_over => return Err(Ended.into()),
-                () = moved.stands_still(patience.still) => Err(Unfinished::StoodStill(patience.still).into()),
+                done = attempt(&self.http, &progress) => done,
+                () = &mut is_over => return Err(JobEnded.into()),
+                () = progress.stalled(timeouts.stall) => Err(TransientError::Stalled(timeouts.stall).into()),
             };
-            let Err(error) = tried else {
+            let Err(error) = result else {
                 return Ok(());
             };
-            let Some(rest) = tries.rest_after(&error, &moved, patience) else {
+            let Some(delay) = attempts.retry_delay(&error, &progress, timeouts) else {
                 return Err(error);
             };
             tokio::select! {
                 () = &mut is_over => return Err(error),
-                () = sleep(rest) => {}
+                () = sleep(delay) => {}
             }
         }
     }
 }
 
-/// The tries so far.
+/// The failed attempts so far.
 #[derive(Debug, Default)]
-struct Tries {
+struct Attempts {
     failed: u32,
-    /// Of those, the ones of which something had moved.
-    broken: u32,
-    /// When something last moved.
-    away_since: Option<Instant>,
+    /// Attempts that failed after some progress.
+    interrupted: u32,
+    /// Start of the current period without progress.
+    unavailable_since: Option<Instant>,
 }
 
-impl Tries {
-    /// How long to rest before the next try, if there is to be one: there is one at least unless it was refused.
-    fn rest_after(
+impl Attempts {
+    /// The delay before the next attempt; `None` if there is none. There is at least one retry, except after a refusal.
+    fn retry_delay(
         &mut self,
         error: &anyhow::Error,
-        moved: &Moved,
-        patience: &Patience,
+        progress: &TransferProgress,
+        timeouts: &TransferTimeouts,
     ) -> Option<Duration> {
-        let unfinished = error.downcast_ref::<Unfinished>();
-        if unfinished.is_none() && !is_lost(error) {
+        let transient = error.downcast_ref::<TransientError>();
+        if transient.is_none() && !is_connection_error(error) {
             return None;
         }
         self.failed += 1;
         let (at, bytes) = {
-            let since = moved.since();
-            (since.at, since.bytes)
+            let state = progress.state();
+            (state.at, state.bytes)
         };
-        match unfinished {
-            // Whatever was sent to it went for nothing.
-            Some(Unfinished::Busy { .. }) => {
-                self.away_since.get_or_insert(at);
+        match transient {
+            // Data sent to an overloaded server does not count as progress.
+            Some(TransientError::Busy { .. }) => {
+                self.unavailable_since.get_or_insert(at);
             }
             _ if bytes > 0 => {
-                self.broken += 1;
-                self.away_since = Some(at);
+                self.interrupted += 1;
+                self.unavailable_since = Some(at);
             }
             _ => {
-                self.away_since.get_or_insert(at);
+                self.unavailable_since.get_or_insert(at);
             }
         }
-        let is_away = self
-            .away_since
-            .is_some_and(|at| at.elapsed() >= patience.away);
-        if (is_away && self.failed > 1) || self.broken >= patience.most_broken {
+        let is_expired = self
+            .unavailable_since
+            .is_some_and(|at| at.elapsed() >= timeouts.unavailable);
+        if (is_expired && self.failed > 1) || self.interrupted >= timeouts.max_interrupted {
             return None;
         }
-        Some(match unfinished {
-            Some(Unfinished::Busy {
-                retry_after: Some(rest),
+        Some(match transient {
+            Some(TransientError::Busy {
+                retry_after: Some(delay),
                 ..
-            }) => (*rest).min(patience.longest_rest).max(patience.rest),
-            _ => patience.rest,
+            }) => (*delay).min(timeouts.max_retry_delay).max(timeouts.retry_delay),
+            _ => timeouts.retry_delay,
         })
     }
 }
 
-/// Was it lost on the way?
-fn is_lost(error: &anyhow::Error) -> bool {
+/// Did the connection fail, before or during the transfer?
+fn is_connection_error(error: &anyhow::Error) -> bool {
     error.chain().any(|cause| {
         cause.downcast_ref::<reqwest::Error>().is_some_and(|error| {
-            let before = error.is_connect() || error.is_timeout() || error.is_request();
-            // In the middle of what it answers.
-            before || error.is_body() || error.is_decode()
+            let is_before = error.is_connect() || error.is_timeout() || error.is_request();
+            // The others occur while the response is read.
+            is_before || error.is_body() || error.is_decode()
         })
     })
 }
 
-/// An answer that is no refusal.
-pub(super) async fn good(answer: Response) -> anyhow::Result<Response> {
-    let status = answer.status();
+/// Turns an error status of the response into an error.
+pub(super) async fn check_status(response: Response) -> anyhow::Result<Response> {
+    let status = response.status();
     if status.is_success() {
-        return Ok(answer);
+        return Ok(response);
     }
     if status == StatusCode::INSUFFICIENT_STORAGE {
         return Err(std::io::Error::from(std::io::ErrorKind::StorageFull).into());
@@ -243,16 +242,16 @@ pub(super) async fn good(answer: Response) -> anyhow::Result<Response> {
     if status.is_server_error()
         || [StatusCode::REQUEST_TIMEOUT, StatusCode::TOO_MANY_REQUESTS].contains(&status)
     {
-        let retry_after = answer.headers().get(header::RETRY_AFTER);
+        let retry_after = response.headers().get(header::RETRY_AFTER);
         let retry_after = retry_after.and_then(|value| value.to_str().ok()?.trim().parse().ok());
-        return Err(Unfinished::Busy {
+        return Err(TransientError::Busy {
             status,
             retry_after: retry_after.map(Duration::from_secs),
         }
         .into());
     }
-    let told = answer.text().await.unwrap_or_default();
-    anyhow::bail!("the server answered {status}: {told}")
+    let message = response.text().await.unwrap_or_default();
+    anyhow::bail!("the server answered {status}: {message}")
 }
 
 #[cfg(test)]

@@ -1,11 +1,11 @@
-//! A process whose slots work for a server on another machine.
+//! The process of a remote worker.
 
 use super::{
-    connection::{ANSWER, NatsConfig},
-    far_server::FarServer,
-    link::Link,
+    connection::{REQUEST_TIMEOUT, NatsConfig},
+    server_client::ServerClient,
+    worker_link::WorkerLink,
     names::{self, Names},
-    transfer::{Carrier, Patience},
+    transfer::{FileTransfer, TransferTimeouts},
 };
 use crate::{
     boxed,
@@ -15,7 +15,7 @@ use crate::{
 };
 use anyhow::Context as _;
 use faceoff_store::WorkerName;
-use faceoff_wire::remote::Introduction;
+use faceoff_wire::remote::WorkerCapabilities;
 use std::{
     sync::{Arc, Mutex},
     time::{Duration, Instant},
@@ -26,26 +26,27 @@ use tokio_util::sync::CancellationToken;
 #[derive(Debug, Clone)]
 pub struct RemoteWorker {
     pub nats: NatsConfig,
-    /// What it is called; no two of a server's are called alike.
+    /// Name of the worker, unique among the server's workers.
     pub name: String,
-    pub own: Introduction,
-    /// Fetches and stores files. How long nothing may move is watched here: it has no such limit of its own.
+    pub capabilities: WorkerCapabilities,
+    /// HTTP client for files. It has no timeout of its own, since transfers are monitored for progress.
     pub http: reqwest::Client,
-    /// It ends once no slot has had anything to do for so long; none: it goes on.
+    /// Idle time after which the worker ends; `None`: never.
     pub ends_after: Option<Duration>,
     pub slots: SlotsConfig,
 }
 
-/// How often a worker looks for how long it had nothing to do.
-const LOOK: Duration = Duration::from_secs(1);
+/// How often the idle time is checked.
+const IDLE_CHECK_INTERVAL: Duration = Duration::from_secs(1);
 
-/// Works until `shutdown` is cancelled, or it had nothing to do for as long as it is to wait; then every unit is given back at once. While NATS or the server is away it waits.
+/// Runs jobs until `shutdown` is cancelled or the idle time is over; then all jobs are released at once. While NATS or the
+/// server is unreachable it waits.
 ///
 /// # Errors
-/// If a name is none, the scratch folder cannot be had, or a slot dies.
+/// If a name is invalid, the scratch folder cannot be locked, or a slot dies.
 #[boxed]
-pub async fn work(config: RemoteWorker, shutdown: CancellationToken) -> anyhow::Result<()> {
-    let names = Names::of(&config.nats.name)?;
+pub async fn run_remote_worker(config: RemoteWorker, shutdown: CancellationToken) -> anyhow::Result<()> {
+    let names = Names::new(&config.nats.name)?;
     let name = config.name.parse::<WorkerName>().ok();
     let name = name.filter(|name| name.as_str() != names::SERVER);
     let name = name.with_context(|| {
@@ -57,35 +58,35 @@ pub async fn work(config: RemoteWorker, shutdown: CancellationToken) -> anyhow::
     let client = config.nats.connect(&config.name, |_| ()).await?;
     let folder = config.slots.scratch_dir.clone();
     let scratch = tokio::task::spawn_blocking(move || Scratch::take(&folder)).await??;
-    let link = Arc::new(Link {
+    let link = Arc::new(WorkerLink {
         runtime: Handle::current(),
         client,
         names,
         worker: name,
-        own: config.own,
-        carrier: Carrier {
+        capabilities: config.capabilities,
+        file_transfer: FileTransfer {
             http: config.http,
-            patience: Patience::default(),
+            timeouts: TransferTimeouts::default(),
         },
         shutdown: shutdown.clone(),
         refused: Mutex::default(),
-        unread: Mutex::default(),
+        unreadable: Mutex::default(),
         busy_at: Mutex::new(Instant::now()),
-        may_work_at: Mutex::default(),
+        registered_at: Mutex::default(),
     });
     if let Some(ends_after) = config.ends_after {
         let (link, shutdown) = (Arc::clone(&link), shutdown.clone());
         tokio::spawn(async move {
             while link.idle_for() < ends_after {
-                tokio::time::sleep(LOOK.min(ends_after)).await;
+                tokio::time::sleep(IDLE_CHECK_INTERVAL.min(ends_after)).await;
             }
-            tracing::info!(?ends_after, "ending: there was nothing to do");
+            tracing::info!(?ends_after, "ending: idle");
             shutdown.cancel();
         });
     }
     let servers = (0..config.slots.cpus.slots.len()).map(|index| SlotServer {
         slot: format!("slot-{index}"),
-        server: Arc::new(FarServer::new(Arc::clone(&link))),
+        server: Arc::new(ServerClient::new(Arc::clone(&link))),
     });
     let servers = servers.collect();
     let ended = run_slots(
@@ -97,7 +98,7 @@ pub async fn work(config: RemoteWorker, shutdown: CancellationToken) -> anyhow::
         shutdown,
     );
     ended.await.context("the worker's slots")?;
-    // What was said last is to arrive, if NATS is there.
-    let _ = tokio::time::timeout(ANSWER, link.client.flush()).await;
+    // Sends the last messages, if NATS is reachable.
+    let _ = tokio::time::timeout(REQUEST_TIMEOUT, link.client.flush()).await;
     Ok(())
 }

@@ -5,16 +5,16 @@ use crate::{
     cpus::CpuLayout,
     evaluator::Evaluator,
     local::LocalServer,
-    server::WorkServer,
+    server::JobServer,
     service::{Intervals, SlotsConfig, WorkerConfig, run_with},
-    slot::Rests,
+    slot::Backoff,
     slot_threads::SlotThreads,
 };
 use faceoff_metrics::Metrics;
-use faceoff_replay::{EpisodeLine, Key, PackWriter, Sheet};
+use faceoff_replay::{EpisodeLine, Key, PackWriter, ClipIndex};
 use faceoff_runner::{
-    AgentEnvironment, Assembled, CLIPS_FILE, EvaluationMeta, GameAudience, GameReport, GameSpec,
-    Observer, PlatformFault, ShardReport, ShardSpec, SmokeReport, SmokeSpec, TimeLimits,
+    AgentEnvironment, Assembled, CLIPS_FILE, EvaluationMeta, LiveFeedSink, GameReport, GameSpec,
+    Observer, PlatformFault, ShardReport, ShardSpec, ValidationReport, ValidationSpec, TimeLimits,
     bundle::{Bundle, BundleError, BundleLimits},
 };
 use faceoff_sandbox::{Isolation, Limits};
@@ -38,15 +38,15 @@ pub(super) type Play =
     dyn Fn(&ShardSpec, &mut dyn Observer) -> Result<(), PlatformFault> + Send + Sync;
 
 pub(super) type PlayGame =
-    dyn Fn(&GameSpec, &mut dyn GameAudience) -> Result<(), PlatformFault> + Send + Sync;
+    dyn Fn(&GameSpec, &mut dyn LiveFeedSink) -> Result<(), PlatformFault> + Send + Sync;
 
-/// Plays by a test's closure; records which episodes were played and what was assembled.
+/// An evaluator that plays by a test's closures, and records the played shards and assembled parts.
 pub(super) struct Scripted {
     play: Box<Play>,
     game: Box<PlayGame>,
     pub(super) played: Mutex<Vec<(Task, u32)>>,
     pub(super) assembled: Mutex<Vec<String>>,
-    /// Told when an archive is unpacked that has no end.
+    /// Notified when an endless archive is being unpacked.
     pub(super) endless: tokio::sync::Notify,
 }
 
@@ -57,25 +57,25 @@ impl Scripted {
         + Sync
         + 'static,
     ) -> Arc<Self> {
-        Arc::new(Self::with(play, |_, _| Ok(())))
+        Arc::new(Self::from_closures(play, |_, _| Ok(())))
     }
 
-    /// Plays games so, and all else well.
-    pub(super) fn of_games(
-        game: impl Fn(&GameSpec, &mut dyn GameAudience) -> Result<(), PlatformFault>
+    /// Plays games by the closure, and everything else without faults.
+    pub(super) fn with_game(
+        game: impl Fn(&GameSpec, &mut dyn LiveFeedSink) -> Result<(), PlatformFault>
         + Send
         + Sync
         + 'static,
     ) -> Arc<Self> {
-        Arc::new(Self::with(|_, _| Ok(()), game))
+        Arc::new(Self::from_closures(|_, _| Ok(()), game))
     }
 
-    fn with(
+    fn from_closures(
         play: impl Fn(&ShardSpec, &mut dyn Observer) -> Result<(), PlatformFault>
         + Send
         + Sync
         + 'static,
-        game: impl Fn(&GameSpec, &mut dyn GameAudience) -> Result<(), PlatformFault>
+        game: impl Fn(&GameSpec, &mut dyn LiveFeedSink) -> Result<(), PlatformFault>
         + Send
         + Sync
         + 'static,
@@ -103,21 +103,21 @@ pub(super) fn outcome(task: Task, episode: u32) -> EpisodeOutcome {
     }
 }
 
-/// Clips that are none, with real lines: with perturbations the second episode of a task is not solved.
+/// Dummy clips with a real index. Under perturbations the second episode of a task is not solved.
 fn clips(spec: &ShardSpec) -> Vec<u8> {
     let mut pack = PackWriter::new(Vec::new()).unwrap();
-    let mut sheet = Sheet::default();
+    let mut index = ClipIndex::default();
     for episode in spec.episodes.clone() {
-        let told = format!("{} {episode}", spec.profile);
-        pack.add(Key::motion(spec.task, episode), told.as_bytes())
+        let text = format!("{} {episode}", spec.profile);
+        pack.add(Key::motion(spec.task, episode), text.as_bytes())
             .unwrap();
-        sheet.episodes.push(EpisodeLine {
+        index.episodes.push(EpisodeLine {
             task: spec.task,
             episode,
             steps: 10,
             success: spec.profile == Profile::Ideal || episode != 1,
             end: EpisodeEnd::Horizon,
-            why: told,
+            why: text,
             start: [0.0; 4],
             last: [0.0; 4],
             broken: Vec::new(),
@@ -125,7 +125,7 @@ fn clips(spec: &ShardSpec) -> Vec<u8> {
             late: 0,
         });
     }
-    pack.add_sheet(&sheet).unwrap();
+    pack.add_index(&index).unwrap();
     pack.finish().unwrap()
 }
 
@@ -162,21 +162,21 @@ impl Evaluator for Scripted {
         })
     }
 
-    fn smoke(
+    fn validate(
         &self,
-        _: &SmokeSpec,
+        _: &ValidationSpec,
         _: &Bundle,
         _: &AgentEnvironment,
         _: &dyn Fn() -> bool,
-    ) -> Result<SmokeReport, PlatformFault> {
-        Ok(SmokeReport {
-            defect: None,
+    ) -> Result<ValidationReport, PlatformFault> {
+        Ok(ValidationReport {
+            failure: None,
             timing: Vec::new(),
-            log: "smoke\n".into(),
+            log: "validated\n".into(),
         })
     }
 
-    fn play(
+    fn play_shard(
         &self,
         spec: &ShardSpec,
         _bundle: &Bundle,
@@ -214,7 +214,7 @@ impl Evaluator for Scripted {
         _bundles: [&Bundle; 2],
         _envs: [&AgentEnvironment; 2],
         out: &Path,
-        audience: &mut dyn GameAudience,
+        audience: &mut dyn LiveFeedSink,
     ) -> Result<GameReport, PlatformFault> {
         (self.game)(spec, audience)?;
         Ok(game_report(spec, out))
@@ -260,23 +260,22 @@ pub(super) fn result(meta: &EvaluationMeta) -> EvaluationResult {
     }
 }
 
-/// Off the runtime's threads, as a slot is.
+/// Runs a blocking call outside of the runtime's threads, as in a slot.
 pub(super) async fn blocking<T: Send + 'static>(call: impl FnOnce() -> T + Send + 'static) -> T {
     tokio::task::spawn_blocking(call).await.unwrap()
 }
 
-/// A store with one team's valid submission, and a clock that only tests turn forward: no lease ends and
-/// no day passes because a machine was slow.
+/// A store, and a clock that only the tests advance, so that no lease expires because the machine is slow.
 pub(super) struct Server {
     pub(super) store: Store,
     pub(super) folder: tempfile::TempDir,
-    /// About the real time, by which files are dated.
-    begun: Timestamp,
+    /// Start of the clock: about the real time, which file timestamps have.
+    started_at: Timestamp,
     pub(super) ahead_s: Arc<AtomicI64>,
     pub(super) intervals: Intervals,
 }
 
-/// Renewed after a third of it by the real time: never while a test looks.
+/// So long that no renewal, after a third of it in real time, falls into a test.
 pub(super) const LEASE_S: u32 = 1800;
 
 impl Server {
@@ -286,12 +285,12 @@ impl Server {
         Self {
             store,
             folder,
-            begun: Timestamp::now(),
+            started_at: Timestamp::now(),
             ahead_s: Arc::default(),
             intervals: Intervals {
                 idle_poll: Duration::from_millis(20),
-                tidy: Duration::from_millis(20),
-                rests: Rests {
+                cleanup: Duration::from_millis(20),
+                backoff: Backoff {
                     first: Duration::ZERO,
                     longest: Duration::ZERO,
                 },
@@ -301,22 +300,22 @@ impl Server {
     }
 
     pub(super) fn clock(&self) -> Clock {
-        let (begun, ahead_s) = (self.begun, Arc::clone(&self.ahead_s));
-        Clock::new(move || begun + SignedDuration::from_secs(ahead_s.load(Ordering::SeqCst)))
+        let (started_at, ahead_s) = (self.started_at, Arc::clone(&self.ahead_s));
+        Clock::new(move || started_at + SignedDuration::from_secs(ahead_s.load(Ordering::SeqCst)))
     }
 
     pub(super) fn now(&self) -> Timestamp {
         self.clock().now()
     }
 
-    /// Another life of the server on the same folder.
+    /// Restarts the server on the same folder.
     pub(super) async fn reopen(self) -> Self {
         let store = Store::open(self.folder.path()).await.unwrap();
         Self { store, ..self }
     }
 
-    /// Turns the clock forward.
-    pub(super) fn pass(&self, seconds: i64) {
+    /// Advances the clock.
+    pub(super) fn advance(&self, seconds: i64) {
         self.ahead_s.fetch_add(seconds, Ordering::SeqCst);
     }
 
@@ -326,7 +325,7 @@ impl Server {
         self.store.artifacts().put_file(key, &file).await.unwrap();
     }
 
-    /// Is there such an artifact?
+    /// Does the artifact exist?
     pub(super) async fn has(&self, key: &str) -> bool {
         self.store.artifacts().read(key).await.is_ok()
     }
@@ -358,25 +357,25 @@ impl Server {
             .unwrap()
     }
 
-    /// A team with a submission that has passed its smoke run.
+    /// A team with a valid submission.
     pub(super) async fn valid(&self, team: &str) -> Submission {
         let submission = self.upload(team, b"archive").await;
         let claimed = self.store.claim("test", LEASE_S, self.now()).await.unwrap();
-        let claim = claimed.expect("a smoke run is queued").claim;
-        let outcome = SmokeOutcome::Valid {
+        let claim = claimed.expect("a validation run is queued").claim;
+        let outcome = ValidationOutcome::Valid {
             runtime: "native".into(),
             agent_name: "scripted".into(),
             timing: Vec::new(),
             log: String::new(),
         };
         self.store
-            .commit_smoke(&claim, outcome, self.now())
+            .commit_validation(&claim, outcome, self.now())
             .await
             .unwrap();
         submission
     }
 
-    /// An evaluation of six shards, all of them queued.
+    /// An evaluation of six queued shards.
     pub(super) async fn evaluation(&self) -> EvaluationId {
         let submission = self.valid("Alpha").await;
         let plan = RunPlan {
@@ -388,7 +387,7 @@ impl Server {
             variation: Default::default(),
             limits: Default::default(),
         };
-        let stage = stage_by(&self.store, &plan, None, self.now()).await;
+        let stage = configure_stage(&self.store, &plan, None, self.now()).await;
         let started = self
             .store
             .start_day(Actor::Organiser, stage, self.now())
@@ -398,29 +397,29 @@ impl Server {
         started[0].id
     }
 
-    /// What its slots would work for.
+    /// The job server of its slots.
     pub(super) fn local(&self) -> LocalServer {
         self.config(1)
             .local_server(self.store.clone(), self.clock())
     }
 
-    pub(super) fn work(&self, slots: usize, evaluator: &Arc<Scripted>) -> Running {
-        self.work_through(slots, evaluator, |server| Arc::new(server))
+    pub(super) fn start_slots(&self, slots: usize, evaluator: &Arc<Scripted>) -> Running {
+        self.start_intercepted_slots(slots, evaluator, |server| Arc::new(server))
     }
 
-    /// With something between the slots and their server.
-    pub(super) fn work_through(
+    /// Starts slots with an intercepted job server.
+    pub(super) fn start_intercepted_slots(
         &self,
         slots: usize,
         evaluator: &Arc<Scripted>,
-        between: impl FnOnce(LocalServer) -> Arc<dyn WorkServer>,
+        intercept: impl FnOnce(LocalServer) -> Arc<dyn JobServer>,
     ) -> Running {
         let config = self.config(slots);
         let server = config.local_server(self.store.clone(), self.clock());
         let shutdown = CancellationToken::new();
         let task = tokio::spawn(run_with(
             server.clone(),
-            between(server),
+            intercept(server),
             Arc::clone(evaluator) as Arc<dyn Evaluator>,
             config,
             self.intervals,
@@ -433,7 +432,7 @@ impl Server {
         WorkerConfig {
             slots: SlotsConfig {
                 cpus: CpuLayout::with_agents_on(&[0], &[0], slots),
-                threads: SlotThreads::of_the_caller(),
+                threads: SlotThreads::from_caller(),
                 scratch_dir: self.folder.path().join("scratch"),
                 agent: AgentEnvironment {
                     limits: limits(),
@@ -453,7 +452,7 @@ impl Server {
                 },
                 metrics: Metrics::new("0.0.0"),
             },
-            lot: Lot::All,
+            job_filter: JobFilter::All,
             lease_s: LEASE_S,
             bundle_limits: BundleLimits {
                 packed_bytes: 1,
@@ -464,15 +463,15 @@ impl Server {
         }
     }
 
-    /// Waits for an evaluation's end by the store's events.
-    pub(super) async fn over(&self, id: EvaluationId) -> EvaluationState {
+    /// Waits for the end of an evaluation.
+    pub(super) async fn wait_for_end(&self, id: EvaluationId) -> EvaluationState {
         let mut events = self.store.events();
         loop {
             let state = self.store.evaluation(id).await.unwrap().state;
             if state.is_over() {
                 return state;
             }
-            // a lagging receiver has missed something: look again
+            // After a lag, the state is read again.
             let _ = events.recv().await;
         }
     }
@@ -502,8 +501,8 @@ impl Running {
     }
 }
 
-/// The season's first stage, which plays by this plan from now on.
-pub(super) async fn stage_by(
+/// Configures the season's first stage with this plan.
+pub(super) async fn configure_stage(
     store: &Store,
     plan: &RunPlan,
     schedule: Option<Schedule>,

@@ -1,7 +1,7 @@
-//! Full disks, at moments that a disk cannot be made to choose.
+//! Full disks at moments that a real disk cannot be made to choose.
 
 use super::{
-    between::{Between, Moment},
+    intercepted_server::{InterceptedServer, Interception},
     fixture::*,
 };
 use faceoff_runner::PlatformFault;
@@ -12,25 +12,25 @@ use std::sync::{
 };
 
 fn full() -> anyhow::Error {
-    StoreError::FullDisk("the queue".into()).into()
+    StoreError::DiskFull("the queue".into()).into()
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-async fn a_full_disk_interrupts_a_shard_as_often_as_it_likes_and_costs_no_try() {
+async fn full_disk_does_not_count_as_an_attempt() {
     let server = Server::new().await;
     let id = server.evaluation().await;
     let (calls, ahead_s) = (AtomicU32::new(0), Arc::clone(&server.ahead_s));
     let evaluator = Scripted::new(move |spec, _| {
-        assert_eq!(spec.platform_retries, 0, "no try was lost");
-        // the rest after each passes
+        assert_eq!(spec.platform_retries, 0, "no attempt was counted");
+        // Skips the pause after each failure.
         ahead_s.fetch_add(10, Ordering::SeqCst);
         if calls.fetch_add(1, Ordering::SeqCst) < 3 * MAX_ATTEMPTS {
             return Err(PlatformFault::FullDisk("steps.parquet".into()));
         }
         Ok(())
     });
-    let running = server.work(1, &evaluator);
-    let state = server.over(id).await;
+    let running = server.start_slots(1, &evaluator);
+    let state = server.wait_for_end(id).await;
     assert!(
         matches!(state, EvaluationState::Finished { .. }),
         "{state:?}"
@@ -38,24 +38,24 @@ async fn a_full_disk_interrupts_a_shard_as_often_as_it_likes_and_costs_no_try() 
     assert_eq!(evaluator.played.lock().unwrap().len(), 6);
     running.stop().await;
     let events = server.store.events_after(0, 1000).await.unwrap();
-    let blames = |record: &EventRecord| matches!(record.event, Event::UnitGivenBack { .. });
-    assert!(!events.iter().any(blames), "{events:#?}");
+    let is_counted = |record: &EventRecord| matches!(record.event, Event::UnitGivenBack { .. });
+    assert!(!events.iter().any(is_counted), "{events:#?}");
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-async fn what_was_played_is_committed_when_there_is_room_and_not_played_again() {
+async fn commit_waits_for_disk_space_without_replaying() {
     let server = Server::new().await;
     let id = server.evaluation().await;
     let evaluator = Scripted::new(|_, _| Ok(()));
     let failures = AtomicU32::new(0);
-    let running = server.work_through(1, &evaluator, |local| {
-        Between::slots_and(local, move |moment| match moment {
-            // every report, whether it was stored or not
-            Moment::Committed(_) if failures.fetch_add(1, Ordering::SeqCst) % 4 < 3 => Err(full()),
+    let running = server.start_intercepted_slots(1, &evaluator, |local| {
+        InterceptedServer::new(local, move |moment| match moment {
+            // Fails most calls, although the report was stored.
+            Interception::Committed(_) if failures.fetch_add(1, Ordering::SeqCst) % 4 < 3 => Err(full()),
             _ => Ok(()),
         })
     });
-    let state = server.over(id).await;
+    let state = server.wait_for_end(id).await;
     assert!(
         matches!(state, EvaluationState::Finished { .. }),
         "{state:?}"
@@ -65,26 +65,26 @@ async fn what_was_played_is_committed_when_there_is_room_and_not_played_again() 
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-async fn a_unit_is_given_back_when_there_is_room_to_say_so() {
+async fn release_waits_for_disk_space() {
     let server = Server::new().await;
     let id = server.evaluation().await;
     let (calls, ahead_s) = (AtomicU32::new(0), Arc::clone(&server.ahead_s));
     let evaluator = Scripted::new(move |spec, _| {
         ahead_s.fetch_add(10, Ordering::SeqCst);
-        assert_eq!(spec.platform_retries, 0, "its lease did not end");
+        assert_eq!(spec.platform_retries, 0, "the lease did not expire");
         match calls.fetch_add(1, Ordering::SeqCst) {
             0 => Err(PlatformFault::FullDisk("steps.parquet".into())),
             _ => Ok(()),
         }
     });
     let refusals = AtomicU32::new(0);
-    let running = server.work_through(1, &evaluator, |local| {
-        Between::slots_and(local, move |moment| match moment {
-            Moment::GivingBack if refusals.fetch_add(1, Ordering::SeqCst) < 5 => Err(full()),
+    let running = server.start_intercepted_slots(1, &evaluator, |local| {
+        InterceptedServer::new(local, move |moment| match moment {
+            Interception::Releasing if refusals.fetch_add(1, Ordering::SeqCst) < 5 => Err(full()),
             _ => Ok(()),
         })
     });
-    let state = server.over(id).await;
+    let state = server.wait_for_end(id).await;
     assert!(
         matches!(state, EvaluationState::Finished { .. }),
         "{state:?}"

@@ -1,14 +1,14 @@
-//! Games: orders, attempts, recordings and what is shown, with an evaluator that plays what a test tells it to.
+//! Games: jobs, attempts, recordings and live updates, with a scripted evaluator.
 
 use super::{
-    between::{Between, Moment},
+    intercepted_server::{InterceptedServer, Interception},
     fixture::*,
 };
-use crate::server::{Claimed, WorkServer as _};
+use crate::server::{ClaimResult, JobServer as _};
 use faceoff_runner::PlatformFault;
 use faceoff_store::*;
 use faceoff_types::*;
-use faceoff_wire::work::{Assignment, WorkReport};
+use faceoff_wire::job::{JobPayload, JobReport};
 use std::{
     collections::BTreeSet,
     sync::{
@@ -23,7 +23,7 @@ const POSITION: LivePosition = LivePosition {
     mallets: [[-0.8, 0.0], [0.8, 0.1]],
 };
 
-/// A tournament of two teams whose first round is one game, which waits.
+/// A tournament of two teams whose first round is one queued game.
 async fn one_game(server: &Server, rules: TournamentRules) -> Game {
     let mut teams = Vec::new();
     for team in ["Alpha", "Beta"] {
@@ -53,25 +53,25 @@ async fn one_game(server: &Server, rules: TournamentRules) -> Game {
         .start_round(Actor::Organiser, id, &drawn, server.now())
         .await
         .unwrap();
-    let mut games = server.store.games(id, GamesOf::Rounds).await.unwrap();
+    let mut games = server.store.games(id, GameFilter::Rounds).await.unwrap();
     games.remove(0)
 }
 
-/// Waits until a game stands so.
-async fn stands(server: &Server, id: GameId, so: impl Fn(&GameState) -> bool) -> GameState {
+/// Waits until the game's state satisfies a condition.
+async fn wait_for_state(server: &Server, id: GameId, condition: impl Fn(&GameState) -> bool) -> GameState {
     let mut events = server.store.events();
     loop {
         let state = server.store.game(id).await.unwrap().state;
-        if so(&state) {
+        if condition(&state) {
             return state;
         }
-        // a lagging receiver has missed something: look again
+        // After a lag, the state is read again.
         let _ = events.recv().await;
     }
 }
 
 async fn played(server: &Server, id: GameId) -> GameResultRow {
-    let state = stands(server, id, |state| !state.is_open()).await;
+    let state = wait_for_state(server, id, |state| !state.is_open()).await;
     let GameState::Played(result) = state else {
         panic!("{state:?}")
     };
@@ -81,11 +81,11 @@ async fn played(server: &Server, id: GameId) -> GameResultRow {
 async fn ends(server: &Server, id: GameId) -> Vec<AttemptOutcome> {
     let attempts = server.store.game_attempts(id).await.unwrap();
     let ends = attempts.into_iter().map(|attempt| attempt.end);
-    ends.map(|end| end.expect("it is over").how).collect()
+    ends.map(|end| end.expect("it is over").outcome).collect()
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-async fn the_order_of_a_game_tells_all_and_no_secret() {
+async fn game_job_is_complete_and_contains_no_secret() {
     let server = Server::new().await;
     let mut rules = TournamentRules {
         steps: 500,
@@ -97,23 +97,23 @@ async fn the_order_of_a_game_tells_all_and_no_secret() {
     let game = one_game(&server, rules.clone()).await;
     let local = server.local();
     let claimed = blocking(move || local.claim("test").unwrap()).await;
-    let Claimed::Order(order) = claimed else {
+    let ClaimResult::Job(job) = claimed else {
         panic!("the game is queued")
     };
     let secret = server.store.season().await.unwrap().secret;
-    let text = serde_json::to_string(&order).unwrap();
+    let text = serde_json::to_string(&job).unwrap();
     assert!(!text.contains(&secret.to_string()), "{text}");
-    let Assignment::Game {
-        game: ordered,
+    let JobPayload::Game {
+        game: job_game,
         attempt,
         agents,
         spec,
         recording,
-    } = order.assignment
+    } = job.payload
     else {
-        panic!("{}", order.assignment)
+        panic!("{}", job.payload)
     };
-    assert_eq!((ordered, attempt), (game.id, 1));
+    assert_eq!((job_game, attempt), (game.id, 1));
     for (agent, submission) in agents.iter().zip(game.submissions) {
         let bundle = server.store.submission(submission).await.unwrap().bundle;
         assert_eq!(agent.bundle, bundle);
@@ -124,40 +124,40 @@ async fn the_order_of_a_game_tells_all_and_no_secret() {
     assert_eq!((spec.steps, spec.platform_retries), (500, 0));
     assert_eq!(spec.limits, rules.game_limits);
     assert_eq!(spec.perturbations, rules.perturbations);
-    let key = format!("games/{}/{}", game.id, order.lease.nonce);
+    let key = format!("games/{}/{}", game.id, job.lease.nonce);
     assert_eq!(recording, Some(key));
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-async fn a_game_that_we_break_is_an_attempt_and_no_result_until_it_is_played_again() {
+async fn platform_fault_ends_game_without_result_until_rerun() {
     let server = Server::new().await;
     let game = one_game(&server, TournamentRules::default()).await.id;
     let seeds = Arc::new(Mutex::new(BTreeSet::new()));
     let broken = {
         let seeds = Arc::clone(&seeds);
-        Scripted::of_games(move |spec, _| {
+        Scripted::with_game(move |spec, _| {
             seeds.lock().unwrap().insert(spec.seed.to_string());
-            Err(PlatformFault::Recording("a defect of ours".into()))
+            Err(PlatformFault::Recording("a bug of the platform".into()))
         })
     };
     let mut events = server.store.events();
-    let running = server.work(1, &broken);
+    let running = server.start_slots(1, &broken);
     for attempt in 1..=MAX_ATTEMPTS {
-        while ended(&server, game).await < attempt {
+        while ended_attempts(&server, game).await < attempt {
             let _ = events.recv().await;
         }
-        // It rests after each failure, by the server's clock.
-        server.pass(600);
+        // It backoff after each failure, by the server's clock.
+        server.advance(600);
     }
-    let state = stands(&server, game, |state| !state.is_open()).await;
-    let GameState::Broken { reason, .. } = state else {
+    let state = wait_for_state(&server, game, |state| !state.is_open()).await;
+    let GameState::PlatformFailed { reason, .. } = state else {
         panic!("{state:?}")
     };
     assert!(
         reason.contains("the recording could not be made"),
         "{reason}"
     );
-    assert_eq!(ends(&server, game).await, [AttemptOutcome::Broken; 5]);
+    assert_eq!(ends(&server, game).await, [AttemptOutcome::PlatformFailed; 5]);
     running.stop().await;
 
     let rerun = server
@@ -166,39 +166,39 @@ async fn a_game_that_we_break_is_an_attempt_and_no_result_until_it_is_played_aga
     rerun.await.unwrap();
     let healthy = {
         let seeds = Arc::clone(&seeds);
-        Scripted::of_games(move |spec, _| {
+        Scripted::with_game(move |spec, _| {
             seeds.lock().unwrap().insert(spec.seed.to_string());
             Ok(())
         })
     };
-    let running = server.work(1, &healthy);
+    let running = server.start_slots(1, &healthy);
     let result = played(&server, game).await;
     assert_eq!(result.attempt, 6);
     assert_eq!(result.score["sides"][0]["score"], 1);
-    for (side, told) in Side::BOTH.into_iter().zip(["first log\n", "second log\n"]) {
+    for (side, expected) in Side::BOTH.into_iter().zip(["first log\n", "second log\n"]) {
         let log = server.store.game_log(game, side).await.unwrap();
-        assert_eq!(log.as_deref(), Some(told));
+        assert_eq!(log.as_deref(), Some(expected));
     }
-    assert_eq!(seeds.lock().unwrap().len(), 1, "one seed, however often");
+    assert_eq!(seeds.lock().unwrap().len(), 1, "all attempts have the same seed");
     running.stop().await;
 }
 
-/// How many attempts are over.
-async fn ended(server: &Server, game: GameId) -> u32 {
+/// The number of attempts that are over.
+async fn ended_attempts(server: &Server, game: GameId) -> u32 {
     let attempts = server.store.game_attempts(game).await.unwrap();
     let over = attempts.iter().filter(|attempt| attempt.end.is_some());
     u32::try_from(over.count()).unwrap()
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-async fn of_a_games_recordings_the_one_that_counts_is_kept() {
+async fn only_the_counting_recording_of_a_game_is_kept() {
     let server = Server::new().await;
     let game = one_game(&server, TournamentRules::default()).await.id;
-    // of an attempt that was killed between upload and commit
+    // The recording of an attempt that was killed between upload and commit.
     let killed = format!("games/{game}/killed/game.zip");
     server.put(&killed, b"PK").await;
-    let evaluator = Scripted::of_games(|_, _| Ok(()));
-    let running = server.work(1, &evaluator);
+    let evaluator = Scripted::with_game(|_, _| Ok(()));
+    let running = server.start_slots(1, &evaluator);
     let files = |result: &GameResultRow| {
         let recording = result.recording.as_ref().expect("a round's game has one");
         ["game.zip", "side-1.zip", "side-2.zip"].map(|name| format!("{}/{name}", recording.key))
@@ -212,14 +212,14 @@ async fn of_a_games_recordings_the_one_that_counts_is_kept() {
         .void_game(Actor::Organiser, game, "the table leaned", server.now());
     void.await.unwrap();
     for file in &first {
-        assert!(server.has(file).await, "until another result stands");
+        assert!(server.has(file).await, "kept until there is another result");
     }
     let rerun = server
         .store
         .rerun_game(Actor::Organiser, game, server.now());
     rerun.await.unwrap();
     let second = files(&played(&server, game).await);
-    // The slot removes what nobody needs before it looks for more work.
+    // The slot removes obsolete recordings before it claims another job.
     running.stop().await;
     for file in &second {
         assert!(server.has(file).await, "{file}");
@@ -230,41 +230,41 @@ async fn of_a_games_recordings_the_one_that_counts_is_kept() {
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-async fn the_recording_of_a_lost_lease_is_removed_and_its_result_does_not_count() {
+async fn lost_lease_discards_result_and_recording() {
     let server = Server::new().await;
     let game = one_game(&server, TournamentRules::default()).await.id;
     let local = server.local();
     let claimed = blocking(move || local.claim("lost").unwrap()).await;
-    let Claimed::Order(order) = claimed else {
+    let ClaimResult::Job(job) = claimed else {
         panic!("the game is queued")
     };
-    // Its lease ends, and another slot plays the game.
-    server.pass(2 * i64::from(LEASE_S));
-    let evaluator = Scripted::of_games(|_, _| Ok(()));
-    let running = server.work(1, &evaluator);
+    // The lease expires, and another slot plays the game.
+    server.advance(2 * i64::from(LEASE_S));
+    let evaluator = Scripted::with_game(|_, _| Ok(()));
+    let running = server.start_slots(1, &evaluator);
     let result = played(&server, game).await;
     running.stop().await;
-    let Assignment::Game {
+    let JobPayload::Game {
         recording: Some(key),
         ..
-    } = &order.assignment
+    } = &job.payload
     else {
-        panic!("{}", order.assignment)
+        panic!("{}", job.payload)
     };
     let file = format!("{key}/game.zip");
     server.put(&file, b"PK").await;
-    let report = WorkReport::Game {
+    let report = JobReport::Game {
         score: serde_json::json!({"winner": 1}),
-        recording: Some(faceoff_wire::work::StoredGame {
+        recording: Some(faceoff_wire::job::GameFiles {
             key: key.clone(),
             game_blake3: "ab".repeat(32),
             side_blake3: ["cd".repeat(32), "ef".repeat(32)],
         }),
         logs: Default::default(),
     };
-    let (local, lease) = (server.local(), order.lease.clone());
-    let holding = blocking(move || local.commit(&lease, report).unwrap()).await;
-    assert_eq!(holding, crate::server::Holding::Lost);
+    let (local, lease) = (server.local(), job.lease.clone());
+    let status = blocking(move || local.commit(&lease, report).unwrap()).await;
+    assert_eq!(status, crate::server::LeaseStatus::Lost);
     assert!(!server.has(&file).await);
     assert_eq!(played(&server, game).await, result);
     assert_eq!(
@@ -274,18 +274,18 @@ async fn the_recording_of_a_lost_lease_is_removed_and_its_result_does_not_count(
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-async fn an_answer_that_is_lost_after_a_commit_leaves_result_and_recording() {
+async fn lost_commit_response_keeps_result_and_recording() {
     let server = Server::new().await;
     let game = one_game(&server, TournamentRules::default()).await.id;
     let commits = Arc::new(AtomicU32::new(0));
-    let running = server.work_through(1, &Scripted::of_games(|_, _| Ok(())), |local| {
+    let running = server.start_intercepted_slots(1, &Scripted::with_game(|_, _| Ok(())), |local| {
         let commits = Arc::clone(&commits);
-        Between::slots_and(local, move |moment| match moment {
-            Moment::Committed(_) => {
+        InterceptedServer::new(local, move |moment| match moment {
+            Interception::Committed(_) => {
                 commits.fetch_add(1, Ordering::SeqCst);
                 anyhow::bail!("the connection broke")
             }
-            Moment::GivingBack => Ok(()),
+            Interception::Releasing => Ok(()),
         })
     });
     let result = played(&server, game).await;
@@ -299,60 +299,60 @@ async fn an_answer_that_is_lost_after_a_commit_leaves_result_and_recording() {
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-async fn a_game_is_shown_while_it_is_played_and_anew_when_it_is_played_again() {
+async fn live_updates_cover_each_attempt() {
     let server = Server::new().await;
     let rules = TournamentRules {
         steps: 500,
         ..TournamentRules::default()
     };
     let game = one_game(&server, rules).await.id;
-    let happening = LiveHappening {
+    let event = LiveEvent {
         step: 7,
-        what: GameHappening::Stuck,
+        event: GameEvent::Stuck,
     };
-    let (told, go_on) = (happening.clone(), Arc::new(tokio::sync::Semaphore::new(0)));
-    let (begun, mut begins) = tokio::sync::mpsc::unbounded_channel();
+    let (published, go_on) = (event.clone(), Arc::new(tokio::sync::Semaphore::new(0)));
+    let (started, mut starts) = tokio::sync::mpsc::unbounded_channel();
     let gate = Arc::clone(&go_on);
-    let evaluator = Scripted::of_games(move |_, audience| {
-        audience.hear(vec![told.clone()], POSITION);
-        begun.send(()).unwrap();
+    let evaluator = Scripted::with_game(move |_, audience| {
+        audience.receive(vec![published.clone()], POSITION);
+        started.send(()).unwrap();
         while gate.try_acquire().map(|permit| permit.forget()).is_err() {
             if audience.cancelled() {
                 return Err(PlatformFault::Cancelled);
             }
             std::thread::yield_now();
         }
-        panic!("a defect of ours");
+        panic!("a bug of the platform");
     });
-    let running = server.work(1, &evaluator);
-    begins.recv().await.unwrap();
-    let mut watch = server.store.live_games().watch(game).unwrap();
-    let news = watch.news(None);
-    assert_eq!(news.happenings, [happening]);
-    assert_eq!((news.stands.attempt, news.stands.steps), (1, 500));
-    assert_eq!(news.stands.position, Some(POSITION));
-    assert!(!news.stands.is_over);
+    let running = server.start_slots(1, &evaluator);
+    starts.recv().await.unwrap();
+    let mut watch = server.store.live_games().subscribe(game).unwrap();
+    let news = watch.read_since(None);
+    assert_eq!(news.events, [event]);
+    assert_eq!((news.state.attempt, news.state.steps), (1, 500));
+    assert_eq!(news.state.position, Some(POSITION));
+    assert!(!news.state.is_over);
 
-    // A panic ends the attempt, and what is shown of it.
+    // A panic ends the attempt and its live updates.
     go_on.add_permits(1);
-    let mut broken = watch.news(Some(news.mark));
-    while !broken.stands.is_over {
+    let mut aborted = watch.read_since(Some(news.end));
+    while !aborted.state.is_over {
         assert!(watch.changed().await);
-        broken = watch.news(Some(news.mark));
+        aborted = watch.read_since(Some(news.end));
     }
-    assert_eq!(broken.happenings[0].what, GameHappening::BrokenOff);
-    while ended(&server, game).await < 1 {
+    assert_eq!(aborted.events[0].event, GameEvent::Aborted);
+    while ended_attempts(&server, game).await < 1 {
         tokio::task::yield_now().await;
     }
-    server.pass(600);
-    begins.recv().await.unwrap();
-    let anew = watch.news(Some(broken.mark));
-    assert_eq!((anew.stands.attempt, anew.stands.is_over), (2, false));
-    // A shutdown gives it back: the attempt does not count against the game.
+    server.advance(600);
+    starts.recv().await.unwrap();
+    let second = watch.read_since(Some(aborted.end));
+    assert_eq!((second.state.attempt, second.state.is_over), (2, false));
+    // A shutdown releases the game without counting the attempt.
     running.stop().await;
     assert_eq!(
         ends(&server, game).await,
-        [AttemptOutcome::Broken, AttemptOutcome::GivenBack]
+        [AttemptOutcome::PlatformFailed, AttemptOutcome::Released]
     );
-    assert!(watch.news(None).stands.is_over);
+    assert!(watch.read_since(None).state.is_over);
 }

@@ -1,7 +1,7 @@
-//! Shutdowns, lost leases, cancelled evaluations and successors.
+//! Shutdowns, lost leases, cancelled evaluations and restarts.
 
 use super::{
-    between::{Between, Moment},
+    intercepted_server::{InterceptedServer, Interception},
     fixture::*,
 };
 use faceoff_runner::PlatformFault;
@@ -16,27 +16,27 @@ use std::{
 };
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-async fn a_shutdown_gives_the_unit_back_and_the_next_worker_finishes() {
+async fn shutdown_releases_jobs_for_the_next_worker() {
     let server = Server::new().await;
     let id = server.evaluation().await;
-    let (begun, mut begins) = tokio::sync::mpsc::unbounded_channel();
+    let (started, mut starts) = tokio::sync::mpsc::unbounded_channel();
     let hanging = Scripted::new(move |_, observer| {
-        begun.send(()).unwrap();
+        started.send(()).unwrap();
         while !observer.cancelled() {
             std::thread::yield_now();
         }
         Err(PlatformFault::Cancelled)
     });
-    let running = server.work(2, &hanging);
-    begins.recv().await.unwrap();
-    begins.recv().await.unwrap();
+    let running = server.start_slots(2, &hanging);
+    starts.recv().await.unwrap();
+    starts.recv().await.unwrap();
     running.stop().await;
     assert!(hanging.played.lock().unwrap().is_empty());
 
     let healthy = Scripted::new(|_, _| Ok(()));
-    let running = server.work(1, &healthy);
+    let running = server.start_slots(1, &healthy);
     assert!(matches!(
-        server.over(id).await,
+        server.wait_for_end(id).await,
         EvaluationState::Finished { .. }
     ));
     assert_eq!(healthy.played.lock().unwrap().len(), 6);
@@ -44,24 +44,24 @@ async fn a_shutdown_gives_the_unit_back_and_the_next_worker_finishes() {
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-async fn a_shutdown_does_not_stop_a_slot_before_its_unit_was_given_back() {
+async fn shutdown_releases_job_before_the_slot_ends() {
     let server = Server::new().await;
     server.evaluation().await;
-    let (begun, mut begins) = tokio::sync::mpsc::unbounded_channel();
+    let (started, mut starts) = tokio::sync::mpsc::unbounded_channel();
     let (stopped, stops) = std::sync::mpsc::channel();
     let hanging = Scripted::new(move |_, observer| {
-        begun.send(()).unwrap();
+        started.send(()).unwrap();
         while !observer.cancelled() {
             std::thread::yield_now();
         }
         Err(PlatformFault::Cancelled)
     });
     let (early, stops) = (Arc::new(AtomicBool::new(false)), Mutex::new(stops));
-    let running = server.work_through(1, &hanging, |local| {
+    let running = server.start_intercepted_slots(1, &hanging, |local| {
         let early = Arc::clone(&early);
-        Between::slots_and(local, move |moment| {
-            if let Moment::GivingBack = moment {
-                // Time for a worker that does not wait to end; one that waits is not in a hurry.
+        InterceptedServer::new(local, move |moment| {
+            if let Interception::Releasing = moment {
+                // Enough time for a worker that wrongly does not wait for the release.
                 let ended = stops
                     .lock()
                     .unwrap()
@@ -71,55 +71,55 @@ async fn a_shutdown_does_not_stop_a_slot_before_its_unit_was_given_back() {
             Ok(())
         })
     });
-    begins.recv().await.unwrap();
+    starts.recv().await.unwrap();
     running.stop().await;
     let _ = stopped.send(());
     assert!(!early.load(Ordering::SeqCst));
-    let work = server.store.claim("next", LEASE_S, server.now()).await;
-    let Some(Work::Shard { shard, .. }) = work.unwrap().map(|claimed| claimed.work) else {
-        panic!("the slot has left its shard to its lease")
+    let claimed = server.store.claim("next", LEASE_S, server.now()).await;
+    let Some(Job::Shard { shard, .. }) = claimed.unwrap().map(|claimed| claimed.job) else {
+        panic!("the slot did not release its shard")
     };
     assert_eq!((shard.task, shard.first_episode), (Task::Hit, 0));
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-async fn a_shutdown_ends_an_archive_that_is_being_unpacked() {
+async fn shutdown_interrupts_unpacking() {
     let server = Server::new().await;
     let submission = server.upload("Alpha", b"endless").await;
     let evaluator = Scripted::new(|_, _| Ok(()));
-    let running = server.work(1, &evaluator);
+    let running = server.start_slots(1, &evaluator);
     evaluator.endless.notified().await;
     running.stop().await;
-    // Given back at once, and nobody's fault.
-    let work = server.store.claim("next", LEASE_S, server.now()).await;
-    let Some(Work::Smoke {
+    // Released at once, without a fault.
+    let claimed = server.store.claim("next", LEASE_S, server.now()).await;
+    let Some(Job::Validation {
         submission: next, ..
-    }) = work.unwrap().map(|claimed| claimed.work)
+    }) = claimed.unwrap().map(|claimed| claimed.job)
     else {
-        panic!("the slot has left its unit to its lease")
+        panic!("the slot did not release its job")
     };
     assert_eq!(next.id, submission.id);
     assert_eq!(next.state, SubmissionState::Validating);
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-async fn a_cancelled_evaluation_stops_its_slots() {
+async fn cancelled_evaluation_stops_its_slots() {
     let server = Server::new().await;
     let id = server.evaluation().await;
-    let (begun, mut begins) = tokio::sync::mpsc::unbounded_channel();
+    let (started, mut starts) = tokio::sync::mpsc::unbounded_channel();
     let (stopped, mut stops) = tokio::sync::mpsc::unbounded_channel();
     let hanging = Scripted::new(move |spec, observer| {
-        // progress makes the next look at the lease a matter of a second
-        observer.episode_done(&outcome(spec.task, spec.episodes.start));
-        begun.send(()).unwrap();
+        // Progress triggers a renewal within a second.
+        observer.on_episode_end(&outcome(spec.task, spec.episodes.start));
+        started.send(()).unwrap();
         while !observer.cancelled() {
             std::thread::yield_now();
         }
         stopped.send(()).unwrap();
         Err(PlatformFault::Cancelled)
     });
-    let running = server.work(1, &hanging);
-    begins.recv().await.unwrap();
+    let running = server.start_slots(1, &hanging);
+    starts.recv().await.unwrap();
     server
         .store
         .cancel_evaluation(Actor::Organiser, id, "rain", server.now())
@@ -128,13 +128,13 @@ async fn a_cancelled_evaluation_stops_its_slots() {
     stops.recv().await.unwrap();
     running.stop().await;
     assert!(matches!(
-        server.over(id).await,
+        server.wait_for_end(id).await,
         EvaluationState::Cancelled { .. }
     ));
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-async fn what_was_played_under_a_lost_lease_is_thrown_away() {
+async fn result_of_a_lost_lease_is_discarded() {
     let server = Server::new().await;
     let id = server.evaluation().await;
     let (handle, clock) = (tokio::runtime::Handle::current(), server.clock());
@@ -143,14 +143,14 @@ async fn what_was_played_under_a_lost_lease_is_thrown_away() {
     let thief = Arc::clone(&stolen);
     let evaluator = Scripted::new(move |spec, _| {
         if thief.lock().unwrap().is_none() {
-            // the slot stalls until its lease is over, and another worker takes and plays the shard
+            // The slot stalls until its lease has expired, and another worker claims the shard.
             ahead_s.fetch_add(i64::from(LEASE_S) + 1, Ordering::SeqCst);
             let work = handle
                 .block_on(store.claim("thief", LEASE_S, clock.now()))
                 .unwrap();
-            let Some(Claimed {
+            let Some(ClaimedJob {
                 claim,
-                work: Work::Shard { shard, .. },
+                job: Job::Shard { shard, .. },
             }) = work
             else {
                 panic!("{work:?}")
@@ -163,7 +163,7 @@ async fn what_was_played_under_a_lost_lease_is_thrown_away() {
         }
         Ok(())
     });
-    let running = server.work(1, &evaluator);
+    let running = server.start_slots(1, &evaluator);
     let mut events = server.store.events();
     while evaluator.played.lock().unwrap().len() < 6 {
         let _ = events.recv().await;
@@ -184,11 +184,11 @@ async fn what_was_played_under_a_lost_lease_is_thrown_away() {
         .path()
         .join("artifacts/recordings")
         .join(run.to_string());
-    let of_the_shard = std::fs::read_dir(recordings.join(claim.unit.to_string())).unwrap();
+    let shard_recordings = std::fs::read_dir(recordings.join(claim.job.to_string())).unwrap();
     assert_eq!(
-        of_the_shard.count(),
+        shard_recordings.count(),
         1,
-        "the stalled slot has removed its own"
+        "the stalled slot has removed its own recording"
     );
     let shard = server.store.shards(run).await.unwrap().remove(0);
     let outcomes = (0..2).map(|episode| outcome(shard.task, episode)).collect();
@@ -203,26 +203,26 @@ async fn what_was_played_under_a_lost_lease_is_thrown_away() {
         .commit_shard(&claim, commit, server.now())
         .await
         .unwrap();
-    assert_eq!(committed, Committed::Now);
+    assert_eq!(committed, CommitOutcome::Stored);
     assert!(matches!(
-        server.over(id).await,
+        server.wait_for_end(id).await,
         EvaluationState::Finished { .. }
     ));
     assert_eq!(evaluator.assembled.lock().unwrap()[0], "by the thief");
     running.stop().await;
     server
         .store
-        .remove_old_recordings(server.now() + RECORDINGS_KEPT)
+        .remove_old_recordings(server.now() + RECORDINGS_KEPT_FOR)
         .await
         .unwrap();
     assert!(!recordings.exists() || std::fs::read_dir(&recordings).unwrap().next().is_none());
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-async fn a_new_life_takes_over_what_the_last_one_held() {
+async fn restarted_worker_releases_its_former_leases() {
     let server = Server::new().await;
     let id = server.evaluation().await;
-    // a life that ended without a word: its scratch folder tells who it was
+    // A process that ended without releasing its job; the scratch folder has its name.
     let scratch = crate::scratch::Scratch::take(&server.folder.path().join("scratch")).unwrap();
     let worker = format!("{}/slot-0", scratch.worker());
     server
@@ -232,19 +232,19 @@ async fn a_new_life_takes_over_what_the_last_one_held() {
         .unwrap()
         .unwrap();
     drop(scratch);
-    let running = server.work(1, &Scripted::new(|_, _| Ok(())));
+    let running = server.start_slots(1, &Scripted::new(|_, _| Ok(())));
     assert!(matches!(
-        server.over(id).await,
+        server.wait_for_end(id).await,
         EvaluationState::Finished { .. }
     ));
     running.stop().await;
 }
 
 #[tokio::test]
-async fn two_processes_cannot_share_a_scratch_folder() {
+async fn scratch_folder_cannot_be_shared() {
     let server = Server::new().await;
     let _other = crate::scratch::Scratch::take(&server.folder.path().join("scratch")).unwrap();
-    let running = server.work(1, &Scripted::new(|_, _| Ok(())));
+    let running = server.start_slots(1, &Scripted::new(|_, _| Ok(())));
     let error = running.task.await.unwrap().unwrap_err();
     assert!(error.to_string().contains("another process"), "{error}");
 }

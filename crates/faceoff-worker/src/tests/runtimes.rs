@@ -1,23 +1,23 @@
-//! What no stage takes is refused before it runs.
+//! Agents whose runtime no stage accepts are refused before they run.
 
 use super::fixture::*;
 use faceoff_store::*;
 use faceoff_types::*;
 
-async fn verdict(server: &Server, id: SubmissionId) -> Submission {
+async fn wait_for_verdict(server: &Server, id: SubmissionId) -> Submission {
     let mut events = server.store.events();
     loop {
         let submission = server.store.submission(id).await.unwrap();
-        if submission.state.is_settled() {
+        if submission.state.is_checked() {
             return submission;
         }
-        // a lagging receiver has missed something: look again
+        // After a lag, the state is read again.
         let _ = events.recv().await;
     }
 }
 
 #[tokio::test]
-async fn an_agent_whose_runtime_no_open_stage_takes_is_refused_before_it_runs() {
+async fn unaccepted_runtime_is_refused_before_the_agent_runs() {
     let server = Server::new().await;
     let plan = RunPlan {
         profile: Profile::Ideal,
@@ -28,8 +28,8 @@ async fn an_agent_whose_runtime_no_open_stage_takes_is_refused_before_it_runs() 
         variation: Default::default(),
         limits: Default::default(),
     };
-    let stage = stage_by(&server.store, &plan, None, server.now()).await;
-    let takes = async |runtimes: Option<&str>| {
+    let stage = configure_stage(&server.store, &plan, None, server.now()).await;
+    let set_runtimes = async |runtimes: Option<&str>| {
         let rules = StageRules {
             runtimes: runtimes.map(|name| [name.to_owned()].into_iter().collect()),
             ..server.store.stage(stage).await.unwrap().rules.rules
@@ -43,11 +43,11 @@ async fn an_agent_whose_runtime_no_open_stage_takes_is_refused_before_it_runs() 
             .change_stage(Actor::Organiser, stage, change, server.now());
         changed.await.unwrap();
     };
-    takes(Some("python3")).await;
+    set_runtimes(Some("python3")).await;
     let evaluator = Scripted::new(|_, _| Ok(()));
-    let running = server.work(1, &evaluator);
+    let running = server.start_slots(1, &evaluator);
     let refused = server.upload("Alpha", b"archive").await;
-    let refused = verdict(&server, refused.id).await;
+    let refused = wait_for_verdict(&server, refused.id).await;
     let SubmissionState::Invalid { reason } = &refused.state else {
         panic!("expected a refusal, got {refused:?}");
     };
@@ -62,9 +62,9 @@ async fn an_agent_whose_runtime_no_open_stage_takes_is_refused_before_it_runs() 
     assert_eq!(log.as_deref(), Some(""), "it did not run");
 
     for (team, runtimes) in [("Beta", Some("native")), ("Gamma", None)] {
-        takes(runtimes).await;
+        set_runtimes(runtimes).await;
         let valid = server.upload(team, b"archive").await;
-        let valid = verdict(&server, valid.id).await;
+        let valid = wait_for_verdict(&server, valid.id).await;
         assert_eq!(valid.state, SubmissionState::Valid);
         assert_eq!(valid.runtime.as_deref(), Some("native"));
     }

@@ -1,12 +1,12 @@
-//! What a game that nobody played leaves.
+//! The files and the report of a scripted game.
 
 use faceoff_runner::{GameArchives, GameCalibration, GameReport, GameSpec};
-use faceoff_scoring::tournament::{PlayedAs, score_game};
+use faceoff_scoring::tournament::{GameSettings, score_game};
 use faceoff_types::{GameEnd, GameOutcome, GameWindow, SideOutcome, SlotTiming};
 use faceoff_wire::dataset::FileDigest;
 use std::path::Path;
 
-/// Leaves the three files of a game, and tells of one that the first side won by a goal.
+/// Writes the three files of a game, and reports a win of the first side by one goal.
 pub(super) fn game_report(spec: &GameSpec, out: &Path) -> GameReport {
     let files = ["game.zip", "side-1.zip", "side-2.zip"].map(|name| {
         std::fs::write(out.join(name), name).unwrap();
@@ -33,7 +33,7 @@ pub(super) fn game_report(spec: &GameSpec, out: &Path) -> GameReport {
         end: GameEnd::Played,
         sides: [side(1), side(0)],
     };
-    let played_as = PlayedAs {
+    let played_as = GameSettings {
         ruleset: spec.ruleset,
         profile: spec.profile,
         perturbations: spec.perturbations.clone(),

@@ -1,7 +1,7 @@
-//! Units from claim to commit, and faults of ours.
+//! Jobs from claim to commit, and platform faults.
 
 use super::fixture::*;
-use crate::{slot::Rests, tidying};
+use crate::{slot::Backoff, cleanup};
 use faceoff_replay::{Key, Pack};
 use faceoff_runner::PlatformFault;
 use faceoff_store::*;
@@ -17,19 +17,19 @@ use std::{
 use tokio_util::sync::CancellationToken;
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-async fn slots_play_every_shard_once_and_publish_the_dataset() {
+async fn slots_play_each_shard_once_and_store_the_dataset() {
     let server = Server::new().await;
     let id = server.evaluation().await;
     let evaluator = Scripted::new(|spec, observer| {
         for episode in spec.episodes.clone() {
-            observer.episode_done(&outcome(spec.task, episode));
+            observer.on_episode_end(&outcome(spec.task, episode));
         }
         Ok(())
     });
-    let running = server.work(3, &evaluator);
+    let running = server.start_slots(3, &evaluator);
     let EvaluationState::Finished {
         result, dataset, ..
-    } = server.over(id).await
+    } = server.wait_for_end(id).await
     else {
         panic!("it finishes")
     };
@@ -58,28 +58,28 @@ async fn slots_play_every_shard_once_and_publish_the_dataset() {
         .unwrap();
     assert_eq!(std::fs::read_to_string(&file).unwrap(), in_order.join("\n"));
     let season = server.store.season().await.unwrap();
-    let of = server.store.evaluation(id).await.unwrap().of;
-    assert_eq!(result.seed, season.secret.stage(of.stage).day(of.date));
+    let day = server.store.evaluation(id).await.unwrap().stage_day;
+    assert_eq!(result.seed, season.secret.stage(day.stage).day(day.date));
     running.stop().await;
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-async fn an_upload_is_checked_by_an_idle_worker() {
+async fn idle_slot_validates_submissions() {
     let server = Server::new().await;
-    let running = server.work(1, &Scripted::new(|_, _| Ok(())));
+    let running = server.start_slots(1, &Scripted::new(|_, _| Ok(())));
     let mut events = server.store.events();
     let good = server.upload("Alpha", b"archive").await.id;
     let bad = server.upload("Beta", b"no archive").await.id;
     let state = async |id, events: &mut tokio::sync::broadcast::Receiver<Change>| loop {
         let state = server.store.submission(id).await.unwrap().state;
-        if state.is_settled() {
+        if state.is_checked() {
             break state;
         }
         let _ = events.recv().await;
     };
     assert_eq!(state(good, &mut events).await, SubmissionState::Valid);
     let log = server.store.submission_log(good).await.unwrap();
-    assert_eq!(log.as_deref(), Some("smoke\n"));
+    assert_eq!(log.as_deref(), Some("validated\n"));
     let reason = "agent.toml is missing".to_owned();
     let invalid = SubmissionState::Invalid { reason };
     assert_eq!(state(bad, &mut events).await, invalid);
@@ -87,30 +87,30 @@ async fn an_upload_is_checked_by_an_idle_worker() {
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-async fn a_panic_and_a_fault_of_ours_cost_nothing_but_time() {
+async fn panics_and_platform_faults_are_retried() {
     let server = Server::new().await;
     let id = server.evaluation().await;
     let (calls, ahead_s) = (AtomicU32::new(0), Arc::clone(&server.ahead_s));
     let evaluator = Scripted::new(move |_, _| {
         match calls.fetch_add(1, Ordering::SeqCst) {
-            0 => panic!("a defect of ours"),
+            0 => panic!("a bug of the platform"),
             1 => {
                 let source = std::io::Error::other("disk full");
                 Err(PlatformFault::Io {
-                    what: "writing".into(),
+                    action: "writing".into(),
                     source,
                 })
             }
-            // the pause after a failure passes
+            // Skips the pause after a failure.
             _ => {
                 ahead_s.fetch_add(10, Ordering::SeqCst);
                 Ok(())
             }
         }
     });
-    let running = server.work(1, &evaluator);
+    let running = server.start_slots(1, &evaluator);
     assert!(matches!(
-        server.over(id).await,
+        server.wait_for_end(id).await,
         EvaluationState::Finished { .. }
     ));
     assert_eq!(evaluator.played.lock().unwrap().len(), 6);
@@ -118,19 +118,19 @@ async fn a_panic_and_a_fault_of_ours_cost_nothing_but_time() {
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-async fn a_slot_that_failed_rests_while_another_plays_and_ends_when_it_is_asked_to() {
+async fn failed_slot_pauses_and_stops_at_shutdown() {
     let hour = Duration::from_secs(3600);
     let mut server = Server::new().await;
     server.intervals.shutdown_grace = hour;
-    server.intervals.rests = Rests {
+    server.intervals.backoff = Backoff {
         first: hour,
         longest: hour,
     };
     let id = server.evaluation().await;
-    let (began, ahead_s) = (Arc::<Mutex<Vec<_>>>::default(), Arc::clone(&server.ahead_s));
-    let slots = Arc::clone(&began);
+    let (started, ahead_s) = (Arc::<Mutex<Vec<_>>>::default(), Arc::clone(&server.ahead_s));
+    let slots = Arc::clone(&started);
     let evaluator = Scripted::new(move |_, _| {
-        // The rest of the unit passes; that of the slot does not.
+        // Skips the pause of the job, but not that of the slot.
         ahead_s.fetch_add(10, Ordering::SeqCst);
         let mut slots = slots.lock().unwrap();
         slots.push(thread::current().name().map(str::to_owned));
@@ -139,21 +139,21 @@ async fn a_slot_that_failed_rests_while_another_plays_and_ends_when_it_is_asked_
             _ => Ok(()),
         }
     });
-    let running = server.work(2, &evaluator);
+    let running = server.start_slots(2, &evaluator);
     assert!(matches!(
-        server.over(id).await,
+        server.wait_for_end(id).await,
         EvaluationState::Finished { .. }
     ));
-    // For longer than the test may take, unless the rest ends with the slot.
+    // Without the shutdown, the pause would outlast the test.
     running.stop().await;
-    let slots = began.lock().unwrap();
+    let slots = started.lock().unwrap();
     let (failed, played) = slots.split_first().unwrap();
     assert_eq!(played.len(), 6);
     assert!(!played.contains(failed), "{slots:?}");
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-async fn a_lasting_fault_of_ours_ends_the_evaluation_which_is_queued_again() {
+async fn lasting_platform_fault_fails_and_requeues_evaluation() {
     let server = Server::new().await;
     let id = server.evaluation().await;
     let ahead_s = Arc::clone(&server.ahead_s);
@@ -161,8 +161,8 @@ async fn a_lasting_fault_of_ours_ends_the_evaluation_which_is_queued_again() {
         ahead_s.fetch_add(61, Ordering::SeqCst);
         Err(PlatformFault::Recording("no space left".into()))
     });
-    let running = server.work(1, &evaluator);
-    let state = server.over(id).await;
+    let running = server.start_slots(1, &evaluator);
+    let state = server.wait_for_end(id).await;
     let EvaluationState::PlatformFailed { reason, .. } = &state else {
         panic!("{state:?}")
     };
@@ -172,17 +172,17 @@ async fn a_lasting_fault_of_ours_ends_the_evaluation_which_is_queued_again() {
     );
     assert!(
         !reason.contains("no space left"),
-        "the cause is for the log: {reason}"
+        "the cause is for the log only: {reason}"
     );
     running.stop().await;
     let broken = server.store.evaluation(id).await.unwrap();
-    let of_team = server.store.evaluations_of(broken.team).await.unwrap();
-    let again = of_team.iter().find(|one| one.rerun_of == Some(id));
-    assert_eq!(again.unwrap().submission, broken.submission);
+    let evaluations = server.store.evaluations_of(broken.team).await.unwrap();
+    let rerun = evaluations.iter().find(|one| one.rerun_of == Some(id));
+    assert_eq!(rerun.unwrap().submission, broken.submission);
 }
 
 #[tokio::test]
-async fn the_schedule_starts_a_missed_day_once() {
+async fn missed_day_is_started_once() {
     let server = Server::new().await;
     let submission = server.upload("Alpha", b"archive").await;
     let work = server
@@ -191,7 +191,7 @@ async fn the_schedule_starts_a_missed_day_once() {
         .await
         .unwrap()
         .unwrap();
-    let outcome = SmokeOutcome::Valid {
+    let outcome = ValidationOutcome::Valid {
         runtime: "native".into(),
         agent_name: "a".into(),
         timing: Vec::new(),
@@ -199,7 +199,7 @@ async fn the_schedule_starts_a_missed_day_once() {
     };
     server
         .store
-        .commit_smoke(&work.claim, outcome, server.now())
+        .commit_validation(&work.claim, outcome, server.now())
         .await
         .unwrap();
     let plan = RunPlan {
@@ -212,9 +212,9 @@ async fn the_schedule_starts_a_missed_day_once() {
         limits: Default::default(),
     };
     let midnight = Schedule::daily(jiff::civil::Time::midnight());
-    // A stage that opened after midnight would wait for the next one.
+    // A stage that opened after midnight would start at the next midnight.
     let opened = server.now() - jiff::SignedDuration::from_hours(24);
-    let stage = stage_by(&server.store, &plan, Some(midnight), opened).await;
+    let stage = configure_stage(&server.store, &plan, Some(midnight), opened).await;
     let settings = StageSettings {
         ablation_episodes: 2,
         ..server.store.stage(stage).await.unwrap().settings
@@ -272,12 +272,12 @@ async fn the_schedule_starts_a_missed_day_once() {
 }
 
 #[tokio::test]
-async fn the_schedule_ends_an_overdue_day_before_the_next_one_starts() {
+async fn overdue_day_ends_before_the_next_one_starts() {
     let server = Server::new().await;
     let first = server.evaluation().await;
     let first = server.store.evaluation(first).await.unwrap();
-    let stage = server.store.stage(first.of.stage).await.unwrap();
-    // The next day, and the deadline, in 24 hours.
+    let stage = server.store.stage(first.stage_day.stage).await.unwrap();
+    // The next day starts in 24 hours, which is also the deadline.
     let at = server.now().to_zoned(jiff::tz::TimeZone::UTC).time();
     let settings = StageSettings {
         schedule: Some(Schedule::daily(at)),
@@ -291,7 +291,7 @@ async fn the_schedule_ends_an_overdue_day_before_the_next_one_starts() {
         .store
         .change_stage(Actor::Organiser, stage.id, scheduled, server.now());
     scheduled.await.unwrap();
-    server.pass(24 * 3600);
+    server.advance(24 * 3600);
     let mut events = server.store.events();
     let shutdown = CancellationToken::new();
     let schedule = crate::run_schedule(server.store.clone(), server.clock(), shutdown.clone());
@@ -322,7 +322,7 @@ async fn the_schedule_ends_an_overdue_day_before_the_next_one_starts() {
 }
 
 #[tokio::test]
-async fn an_ablation_is_played_on_episodes_of_its_own_in_every_profile() {
+async fn ablation_plays_own_episodes_in_all_profiles() {
     let server = Server::new().await;
     let evaluation = server.evaluation().await;
     let submission = server
@@ -332,9 +332,9 @@ async fn an_ablation_is_played_on_episodes_of_its_own_in_every_profile() {
         .unwrap()
         .submission;
     let specs = std::sync::Arc::new(std::sync::Mutex::new(Vec::new()));
-    let seen = std::sync::Arc::clone(&specs);
+    let recorded = std::sync::Arc::clone(&specs);
     let evaluator = Scripted::new(move |spec, _| {
-        seen.lock().unwrap().push(spec.clone());
+        recorded.lock().unwrap().push(spec.clone());
         Ok(())
     });
     let plan = RunPlan {
@@ -344,18 +344,18 @@ async fn an_ablation_is_played_on_episodes_of_its_own_in_every_profile() {
     };
     server
         .store
-        .create_ablation(Actor::Organiser, submission, &plan, server.now())
+        .request_ablation(Actor::Organiser, submission, &plan, server.now())
         .await
         .unwrap();
     let mut events = server.store.events();
-    let running = server.work(1, &evaluator);
+    let running = server.start_slots(1, &evaluator);
     let ablation = loop {
         let newest = server.store.newest_ablation(submission).await.unwrap();
         match newest {
             Some(ablation) if matches!(ablation.state, AblationState::Finished { .. }) => {
                 break ablation;
             }
-            // a lagging receiver has missed something: look again
+            // After a lag, the state is read again.
             _ => drop(events.recv().await),
         }
     };
@@ -376,30 +376,30 @@ async fn an_ablation_is_played_on_episodes_of_its_own_in_every_profile() {
             assert_eq!(run.mismatch_seed, secret.model_mismatch());
         }
     }
-    // What ends otherwise than in the ideal simulator is kept, beside how it ended there.
+    // Clips are stored of episodes that end differently than in the ideal simulator, with their ideal counterparts.
     let artifacts = server.store.artifacts();
     for profile in Profile::ABLATION {
-        let key = Artifacts::ablation_clips(ablation.id, profile);
-        assert_eq!(artifacts.bytes_of(&key).await.unwrap(), None, "not yet");
+        let key = Artifacts::ablation_clips_key(ablation.id, profile);
+        assert_eq!(artifacts.size_bytes(&key).await.unwrap(), None, "not yet");
     }
     for _ in 0..2 {
-        tidying::tidy(&server.store, server.now()).await;
-        assert_eq!(artifacts.ablations_in_parts().await.unwrap(), []);
+        cleanup::clean_up(&server.store, server.now()).await;
+        assert_eq!(artifacts.ablations_with_parts().await.unwrap(), []);
         for profile in Profile::ABLATION {
-            let key = Artifacts::ablation_clips(ablation.id, profile);
-            let pack = Pack::open(&artifacts.path_of(&key).unwrap()).unwrap();
-            let lines = pack.sheet().unwrap().episodes;
+            let key = Artifacts::ablation_clips_key(ablation.id, profile);
+            let pack = Pack::open(&artifacts.local_path(&key).unwrap()).unwrap();
+            let lines = pack.clip_index().unwrap().episodes;
             let lines = lines.iter().map(|line| (line.task, line.episode));
             let expected = Task::ALL.map(|task| (task, 1));
             assert_eq!(lines.collect::<Vec<_>>(), expected, "{profile}");
             for task in Task::ALL {
-                let told = format!("{profile} 1").into_bytes();
-                assert_eq!(pack.clip(Key::motion(task, 1)).unwrap(), Some(told));
+                let clip = format!("{profile} 1").into_bytes();
+                assert_eq!(pack.clip(Key::motion(task, 1)).unwrap(), Some(clip));
                 assert_eq!(pack.clip(Key::motion(task, 0)).unwrap(), None);
             }
         }
-        // A part that comes late changes nothing.
-        let late = Artifacts::ablation_part(ablation.id, Profile::Ideal, Task::Hit, 0);
+        // A late part has no effect.
+        let late = Artifacts::ablation_part_key(ablation.id, Profile::Ideal, Task::Hit, 0);
         server.put(&late, b"late").await;
     }
     for run in ablation.runs.into_values() {

@@ -1,4 +1,4 @@
-use crate::server::{Server, stage_by};
+use crate::server::{Server, configure_stage};
 use faceoff_store::*;
 use faceoff_types::*;
 use jiff::Timestamp;
@@ -15,7 +15,7 @@ pub fn plan(episodes_per_shard: u32) -> RunPlan {
     }
 }
 
-/// What must not depend on how the work was shared out: all but the measured times.
+/// The outcomes without measured times, which must not depend on the distribution of jobs.
 pub fn without_times(mut outcomes: Vec<EpisodeOutcome>) -> Vec<EpisodeOutcome> {
     for outcome in &mut outcomes {
         outcome.computation_time = ComputationTime::default();
@@ -23,7 +23,7 @@ pub fn without_times(mut outcomes: Vec<EpisodeOutcome>) -> Vec<EpisodeOutcome> {
     outcomes
 }
 
-/// Plays a day of two teams to its end; the outcomes of each.
+/// Plays a day with two teams; the outcomes of each.
 async fn play_day(
     server: &Server,
     episodes_per_shard: u32,
@@ -31,11 +31,11 @@ async fn play_day(
 ) -> Vec<Vec<EpisodeOutcome>> {
     let evaluations = server.start_day(&plan(episodes_per_shard), now).await;
     assert_eq!(evaluations.len(), 2);
-    let worker = server.work(2);
+    let worker = server.start_worker(2);
     let mut outcomes = Vec::new();
-    let stage = evaluations[0].of.stage;
+    let stage = evaluations[0].stage_day.stage;
     for evaluation in evaluations {
-        let state = server.over(evaluation.id).await;
+        let state = server.wait_for_end(evaluation.id).await;
         let EvaluationState::Finished {
             result, dataset, ..
         } = state
@@ -67,34 +67,34 @@ async fn play_day(
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-async fn two_teams_meet_the_same_episodes_however_the_work_is_shared_out() {
+async fn outcomes_do_not_depend_on_shards_and_slots() {
     let server = Server::new().await;
-    // Before there are two of it: its id enters the seeds.
-    stage_by(&server.store, &plan(1), Timestamp::now()).await;
-    let worker = server.work(2);
+    // Before the copy, since seeds depend on the stage's id.
+    configure_stage(&server.store, &plan(1), Timestamp::now()).await;
+    let worker = server.start_worker(2);
     for team in ["Alpha", "Beta"] {
         let submission = server.upload(team, "").await;
-        let state = server.settled(submission).await;
+        let state = server.wait_for_validation(submission).await;
         assert_eq!(state, SubmissionState::Valid);
         let log = server.store.submission_log(submission).await.unwrap();
         assert!(log.unwrap().contains("an agent's log"));
     }
     worker.stop().await;
-    // two servers with one past
+    // Two servers with the same history.
     let copy = server.copy().await;
     let server = Server::at(server.path()).await;
     let now = Timestamp::now();
-    let apart = play_day(&server, 1, now).await;
-    assert_eq!(apart[0], apart[1]);
-    assert_eq!(play_day(&copy, 2, now).await, apart);
+    let outcomes = play_day(&server, 1, now).await;
+    assert_eq!(outcomes[0], outcomes[1]);
+    assert_eq!(play_day(&copy, 2, now).await, outcomes);
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-async fn an_agent_that_breaks_off_is_told_why() {
+async fn failing_agent_gets_reason_and_log() {
     let server = Server::new().await;
-    let worker = server.work(1);
+    let worker = server.start_worker(1);
     let broken = server.upload("Broken", "GOOD_EPISODES = \"0\"").await;
-    let state = server.settled(broken).await;
+    let state = server.wait_for_validation(broken).await;
     let SubmissionState::Invalid { reason } = &state else {
         panic!("{state:?}")
     };
@@ -102,10 +102,10 @@ async fn an_agent_that_breaks_off_is_told_why() {
     let log = server.store.submission_log(broken).await.unwrap();
     assert!(log.unwrap().contains("an agent's log"));
 
-    // for longer than a smoke run, of at most 500 control steps and the rest of an episode, it is well; the
-    // faults of all shards add up
+    // This agent fails only after a validation run of up to 500 control steps and the rest of an episode. The faults of all
+    // shards add up.
     let late = server.upload("Late", "GOOD_EPISODES = \"15\"").await;
-    assert!(matches!(server.settled(late).await, SubmissionState::Valid));
+    assert!(matches!(server.wait_for_validation(late).await, SubmissionState::Valid));
     let plan = RunPlan {
         tasks: vec![Task::Defend],
         episodes_per_task: 60,
@@ -113,7 +113,7 @@ async fn an_agent_that_breaks_off_is_told_why() {
     };
     let evaluation = server.start_day(&plan, Timestamp::now()).await.remove(0);
     assert_eq!(evaluation.submission, late);
-    let state = server.over(evaluation.id).await;
+    let state = server.wait_for_end(evaluation.id).await;
     assert!(
         matches!(state, EvaluationState::AgentFailed { .. }),
         "{state:?}"
@@ -126,28 +126,28 @@ async fn an_agent_that_breaks_off_is_told_why() {
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-async fn an_evaluation_outlives_its_workers() {
+async fn evaluation_continues_after_worker_restarts() {
     let server = Server::new().await;
-    let worker = server.work(1);
+    let worker = server.start_worker(1);
     let submission = server.upload("Alpha", "").await;
     assert!(matches!(
-        server.settled(submission).await,
+        server.wait_for_validation(submission).await,
         SubmissionState::Valid
     ));
     worker.stop().await;
     let evaluation = server.start_day(&plan(1), Timestamp::now()).await.remove(0);
     let (id, run) = (evaluation.id, evaluation.run);
     for committed in 1..4 {
-        let worker = server.work(1);
+        let worker = server.start_worker(1);
         let mut events = server.store.events();
         while server.store.outcomes(run).await.unwrap().len() < committed {
             let _ = events.recv().await;
         }
-        // in the middle of the next shard
+        // Stops in the middle of the next shard.
         worker.stop().await;
     }
-    let worker = server.work(1);
-    let state = server.over(id).await;
+    let worker = server.start_worker(1);
+    let state = server.wait_for_end(id).await;
     assert!(
         matches!(state, EvaluationState::Finished { .. }),
         "{state:?}"

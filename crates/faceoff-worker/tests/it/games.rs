@@ -1,4 +1,4 @@
-//! Games on the server: whatever the slots, and whatever the opponent.
+//! Games on the server: independent of slots, and with hostile opponents.
 
 use crate::{
     server::Server,
@@ -8,7 +8,7 @@ use faceoff_store::*;
 use faceoff_types::TeamId;
 use serde_json::{Value, json};
 
-/// What of a score no clock has a part in.
+/// The parts of a score that do not depend on measured times.
 fn timeless(score: &Value) -> Value {
     let side = |side: &Value| {
         json!([
@@ -33,44 +33,44 @@ fn timeless(score: &Value) -> Value {
     ])
 }
 
-/// Plays a round with so many slots: of each game the score and the hash of the true motion.
+/// Plays a round with this number of slots; the score and the hash of the motion of each game.
 async fn play(server: &Server, teams: &[TeamId], slots: usize) -> Vec<(Value, blake3::Hash)> {
     let games = start(server, rules(150), &pairs(teams)).await;
-    let worker = server.work(slots);
+    let worker = server.start_worker(slots);
     let results = results(server, games[0].tournament).await;
     worker.stop().await;
-    let of = |result: &GameResultRow| {
+    let summary = |result: &GameResultRow| {
         let motion = file_of(recording(server, result), "motion.parquet");
         (timeless(&result.score), blake3::hash(&motion))
     };
-    results.iter().map(of).collect()
+    results.iter().map(summary).collect()
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-async fn two_tournaments_of_one_seed_have_the_same_tables_whatever_the_slots() {
+async fn tournament_results_do_not_depend_on_slots() {
     let server = Server::new().await;
     let mut teams = Vec::new();
     for (team, swing) in [("Alpha", 0), ("Beta", 3), ("Gamma", 6)] {
         let env = format!("SWING = \"0.{swing}\"");
         teams.push(server.valid(team, &env).await);
     }
-    // three servers with one past
+    // Three servers with the same history.
     let two = server.copy().await;
     let three = server.copy().await;
     let one = Server::at(server.path()).await;
-    let by_one = play(&one, &teams, 1).await;
-    assert_eq!(by_one.len(), 3);
-    let motions: std::collections::BTreeSet<_> = by_one
+    let expected = play(&one, &teams, 1).await;
+    assert_eq!(expected.len(), 3);
+    let motions: std::collections::BTreeSet<_> = expected
         .iter()
         .map(|(_, motion)| *motion.as_bytes())
         .collect();
-    assert_eq!(motions.len(), 3, "each game is its own");
-    assert_eq!(play(&two, &teams, 2).await, by_one);
-    assert_eq!(play(&three, &teams, 3).await, by_one);
+    assert_eq!(motions.len(), 3, "the games differ");
+    assert_eq!(play(&two, &teams, 2).await, expected);
+    assert_eq!(play(&three, &teams, 3).await, expected);
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-async fn hostile_opponents_lose_by_their_own_faults_and_the_other_sides_score_is_untouched() {
+async fn hostile_agents_lose_without_harming_the_opponent() {
     let server = Server::new().await;
     let hold = server.valid("Hold", "").await;
     let mut pairs = Vec::new();
@@ -82,7 +82,7 @@ async fn hostile_opponents_lose_by_their_own_faults_and_the_other_sides_score_is
     ] {
         let env = format!("MISCHIEF = \"{mischief}\"");
         let hostile = server.valid(team, &env).await;
-        // on either side of the table
+        // On alternating sides of the table.
         let is_away = pairs.len() % 2 == 0;
         pairs.push(if is_away {
             [hold, hostile]
@@ -92,10 +92,10 @@ async fn hostile_opponents_lose_by_their_own_faults_and_the_other_sides_score_is
     }
     let mut rules = rules(30);
     rules.game_limits.max_faults = 0;
-    // Only who never answers meets it.
+    // Only an agent that never answers exceeds it.
     rules.limits.step_s = Some(3.0);
     let games = start(&server, rules, &pairs).await;
-    let worker = server.work(1);
+    let worker = server.start_worker(1);
     let results = results(&server, games[0].tournament).await;
     worker.stop().await;
     for (game, result) in games.iter().zip(&results) {
@@ -107,7 +107,7 @@ async fn hostile_opponents_lose_by_their_own_faults_and_the_other_sides_score_is
             assert_eq!(own["violations"][kind], 0, "{score}");
         }
         assert!(own.get("forfeit").is_none(), "{score}");
-        // Numbers at the bound are answers, until the world says otherwise.
+        // Numbers at the bound are valid answers as long as the world does not diverge.
         if score["end"] == "played" {
             assert_eq!(game.teams[1 - at], pairs[3][1 - at]);
         } else {
@@ -116,19 +116,19 @@ async fn hostile_opponents_lose_by_their_own_faults_and_the_other_sides_score_is
             assert_eq!((&own["score"], &other["score"]), (&json!(10), &json!(0)));
         }
         let attempts = server.store.game_attempts(game.id).await.unwrap();
-        assert_eq!(attempts.len(), 1, "nobody breaks a game: {attempts:?}");
+        assert_eq!(attempts.len(), 1, "no attempt fails: {attempts:?}");
     }
-    let told = ["step limit", "", "exited with status 4"];
-    for ((game, side), told) in games.iter().zip([1, 0, 1]).zip(told) {
+    let messages = ["step limit", "", "exited with status 4"];
+    for ((game, side), message) in games.iter().zip([1, 0, 1]).zip(messages) {
         let side = faceoff_types::Side::BOTH[side];
         let log = server.store.game_log(game.id, side).await.unwrap().unwrap();
         assert!(log.contains("an agent's log"), "{log}");
-        assert!(log.contains(told), "{log}");
+        assert!(log.contains(message), "{log}");
     }
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-async fn who_always_answers_late_has_no_fault_and_harms_nobody() {
+async fn late_answers_are_no_fault_and_harmless() {
     let server = Server::new().await;
     let hold = server.valid("Hold", "").await;
     let late = server
@@ -137,7 +137,7 @@ async fn who_always_answers_late_has_no_fault_and_harms_nobody() {
     let mut rules = rules(30);
     rules.game_limits.in_time_s = 0.02;
     let games = start(&server, rules, &[[late, hold]]).await;
-    let worker = server.work(1);
+    let worker = server.start_worker(1);
     let results = results(&server, games[0].tournament).await;
     worker.stop().await;
     let score = &results[0].score;

@@ -1,4 +1,4 @@
-//! `kill -9` of a server in the middle of a hundred games, again and again.
+//! Repeated `kill -9` of a server during a hundred games.
 
 use crate::{
     server::Server,
@@ -15,18 +15,18 @@ use std::{
 
 const FOLDER: &str = "FACEOFF_WORKER_TEST_FOLDER";
 const TOURNAMENT: &str = "FACEOFF_WORKER_TEST_TOURNAMENT";
-const TOLD: &str = "something happened";
+const EVENT_LINE: &str = "an event";
 const GAMES: usize = 100;
 
 async fn are_over(server: &Server, tournament: TournamentId) -> bool {
-    let games = server.store.games(tournament, GamesOf::Rounds);
+    let games = server.store.games(tournament, GameFilter::Rounds);
     let games = games.await.unwrap();
     games.iter().all(|game| !game.state.is_open())
 }
 
-/// Works until it is killed or all games are over, telling of every event. Started by the test below.
+/// Runs games until it is killed or all games are over, and prints a line for each event. Started by the test below.
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-#[ignore = "the child process of a_hundred_games_survive_killed_servers"]
+#[ignore = "the child process of tournament_survives_killed_servers"]
 async fn child() {
     let Ok(folder) = std::env::var(FOLDER) else {
         return;
@@ -34,11 +34,11 @@ async fn child() {
     let server = Server::at(Path::new(&folder)).await;
     let id = std::env::var(TOURNAMENT).unwrap().parse().unwrap();
     let mut events = server.store.events();
-    let worker = server.work(2);
+    let worker = server.start_worker(2);
     while !are_over(&server, id).await {
         let _ = events.recv().await;
         let mut out = std::io::stdout().lock();
-        writeln!(out, "\n{TOLD}")
+        writeln!(out, "\n{EVENT_LINE}")
             .and_then(|()| out.flush())
             .unwrap();
     }
@@ -46,7 +46,7 @@ async fn child() {
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-async fn a_hundred_games_survive_killed_servers() {
+async fn tournament_survives_killed_servers() {
     let server = Server::new().await;
     let mut teams: Vec<TeamId> = Vec::new();
     for number in 0..20 {
@@ -74,23 +74,23 @@ async fn a_hundred_games_survive_killed_servers() {
         let lines = BufReader::new(child.stdout.take().unwrap())
             .lines()
             .map_while(Result::ok);
-        let told = lines
-            .filter(|line| line == TOLD)
+        let seen = lines
+            .filter(|line| line == EVENT_LINE)
             .take(events_to_live)
             .count();
         child.kill().unwrap();
         child.wait().unwrap();
-        assert_eq!(told, events_to_live, "the child ended by itself");
+        assert_eq!(seen, events_to_live, "the child ended early");
     }
-    let worker = server.work(2);
+    let worker = server.start_worker(2);
     let results = results(&server, tournament).await;
     worker.stop().await;
 
-    let (mut lost, mut of_team) = (0, BTreeMap::new());
+    let (mut lost, mut games_of_team) = (0, BTreeMap::new());
     for (game, result) in games.iter().zip(&results) {
         assert_eq!(result.score["steps"], 2);
         for team in game.teams {
-            *of_team.entry(team).or_insert(0) += 1;
+            *games_of_team.entry(team).or_insert(0) += 1;
         }
         recording(&server, result);
         let attempts = server.store.game_attempts(game.id).await.unwrap();
@@ -101,17 +101,17 @@ async fn a_hundred_games_survive_killed_servers() {
         );
         for attempt in &attempts {
             let end = attempt.end.as_ref().expect("no attempt is left open");
-            let how = if attempt.number == result.attempt {
+            let expected = if attempt.number == result.attempt {
                 AttemptOutcome::Played
             } else {
                 lost += 1;
                 AttemptOutcome::Lost
             };
-            assert_eq!(end.how, how, "{attempts:?}");
+            assert_eq!(end.outcome, expected, "{attempts:?}");
         }
     }
     assert!(lost > 0, "games were killed in the middle");
-    assert!(of_team.len() == 20 && of_team.values().all(|games| *games == 10));
+    assert!(games_of_team.len() == 20 && games_of_team.values().all(|games| *games == 10));
     let record = server.store.tournament_record(tournament).await.unwrap();
     assert!(record.rounds[0].over_at.is_some());
 }

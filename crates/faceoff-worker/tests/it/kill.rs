@@ -1,4 +1,4 @@
-//! `kill -9` of a working process, again and again, and what the evaluation says in the end.
+//! Repeated `kill -9` of a worker process, and the result of its evaluation.
 
 use crate::{
     evaluations::{plan, without_times},
@@ -14,11 +14,11 @@ use std::{
 
 const FOLDER: &str = "FACEOFF_WORKER_TEST_FOLDER";
 const EVALUATION: &str = "FACEOFF_WORKER_TEST_EVALUATION";
-const TOLD: &str = "something happened";
+const EVENT_LINE: &str = "an event";
 
-/// Works until it is killed or the evaluation is over, telling of every event. Started by the test below.
+/// Runs jobs until it is killed or the evaluation is over, and prints a line for each event. Started by the test below.
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-#[ignore = "the child process of a_killed_evaluation_ends_as_an_undisturbed_one"]
+#[ignore = "the child process of killed_evaluation_has_the_same_result"]
 async fn child() {
     let Ok(folder) = std::env::var(FOLDER) else {
         return;
@@ -26,11 +26,11 @@ async fn child() {
     let server = Server::at(Path::new(&folder)).await;
     let id = std::env::var(EVALUATION).unwrap().parse().unwrap();
     let mut events = server.store.events();
-    let worker = server.work(1);
+    let worker = server.start_worker(1);
     while !server.store.evaluation(id).await.unwrap().state.is_over() {
         let _ = events.recv().await;
         let mut out = std::io::stdout().lock();
-        writeln!(out, "\n{TOLD}")
+        writeln!(out, "\n{EVENT_LINE}")
             .and_then(|()| out.flush())
             .unwrap();
     }
@@ -38,33 +38,33 @@ async fn child() {
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-async fn a_killed_evaluation_ends_as_an_undisturbed_one() {
+async fn killed_evaluation_has_the_same_result() {
     let server = Server::new().await;
-    let worker = server.work(1);
-    for team in ["Calm", "Troubled"] {
+    let worker = server.start_worker(1);
+    for team in ["Undisturbed", "Killed"] {
         let submission = server.upload(team, "").await;
         assert!(matches!(
-            server.settled(submission).await,
+            server.wait_for_validation(submission).await,
             SubmissionState::Valid
         ));
     }
     let started = server.start_day(&plan(1), Timestamp::now()).await;
-    let [calm, troubled] = &started[..] else {
+    let [undisturbed, killed] = &started[..] else {
         panic!("two teams play: {started:?}")
     };
-    let finished = server.over(calm.id).await;
+    let finished = server.wait_for_end(undisturbed.id).await;
     assert!(
         matches!(finished, EvaluationState::Finished { .. }),
         "{finished:?}"
     );
-    // the other's is hardly begun
+    // The other evaluation has hardly started.
     worker.stop().await;
 
     for events_to_live in [1, 2, 3, 1, 4, 2] {
         let mut child = Command::new(std::env::current_exe().unwrap())
             .args(["--exact", "kill::child", "--ignored", "--nocapture"])
             .env(FOLDER, server.path())
-            .env(EVALUATION, troubled.id.to_string())
+            .env(EVALUATION, killed.id.to_string())
             .stdout(Stdio::piped())
             .stderr(Stdio::null())
             .spawn()
@@ -72,30 +72,30 @@ async fn a_killed_evaluation_ends_as_an_undisturbed_one() {
         let lines = BufReader::new(child.stdout.take().unwrap())
             .lines()
             .map_while(Result::ok);
-        let told = lines
-            .filter(|line| line == TOLD)
+        let seen = lines
+            .filter(|line| line == EVENT_LINE)
             .take(events_to_live)
             .count();
         child.kill().unwrap();
         child.wait().unwrap();
         let over = server
             .store
-            .evaluation(troubled.id)
+            .evaluation(killed.id)
             .await
             .unwrap()
             .state
             .is_over();
-        assert!(over || told == events_to_live, "the child ended by itself");
+        assert!(over || seen == events_to_live, "the child ended early");
     }
-    let worker = server.work(1);
-    let state = server.over(troubled.id).await;
+    let worker = server.start_worker(1);
+    let state = server.wait_for_end(killed.id).await;
     let EvaluationState::Finished { dataset, .. } = state else {
         panic!("{state:?}")
     };
     worker.stop().await;
 
-    let undisturbed = without_times(server.store.outcomes(calm.run).await.unwrap());
-    let survived = without_times(server.store.outcomes(troubled.run).await.unwrap());
+    let undisturbed = without_times(server.store.outcomes(undisturbed.run).await.unwrap());
+    let survived = without_times(server.store.outcomes(killed.run).await.unwrap());
     assert_eq!(survived, undisturbed);
     let published = server.path().join("data/artifacts").join(dataset);
     let kept = std::fs::read_dir(published.parent().unwrap()).unwrap();

@@ -1,4 +1,4 @@
-//! The worker as the server runs it: real store, real runner, real sandbox, a Python agent.
+//! The worker as in a server: real store, real runner, real sandbox, and a Python agent.
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 mod evaluations;

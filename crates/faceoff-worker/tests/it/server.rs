@@ -1,4 +1,4 @@
-//! A store, a worker, and teams that upload the agent beside this file.
+//! A store, a worker, and teams with the agent `agent.py`.
 
 use faceoff_metrics::Metrics;
 use faceoff_runner::{AgentEnvironment, TimeLimits, bundle::BundleLimits};
@@ -17,7 +17,7 @@ use tokio_util::sync::CancellationToken;
 pub struct Server {
     pub store: Store,
     folder: PathBuf,
-    /// removes the folder in the end, if it is this server's own
+    /// Removes the folder at the end, if this server created it.
     _guard: Option<tempfile::TempDir>,
 }
 
@@ -43,7 +43,7 @@ impl Server {
         }
     }
 
-    /// On a folder that is another process's, too.
+    /// A server on an existing folder, which another process may use too.
     pub async fn at(folder: &Path) -> Self {
         let store = Store::open(&folder.join("data")).await.unwrap();
         Self {
@@ -57,19 +57,19 @@ impl Server {
         &self.folder
     }
 
-    pub fn work(&self, slots: usize) -> Worker {
+    pub fn start_worker(&self, slots: usize) -> Worker {
         let runtimes = BTreeMap::from([(
             "python3".to_owned(),
             Runtime::python3().expect("this machine has Python"),
         )]);
         let config = WorkerConfig {
             slots: SlotsConfig {
-                cpus: CpuLayout::of_a_server(slots, &[]),
-                threads: SlotThreads::of_the_caller(),
+                cpus: CpuLayout::for_server(slots, &[]),
+                threads: SlotThreads::from_caller(),
                 scratch_dir: self.path().join("scratch"),
                 agent: AgentEnvironment {
                     limits: Limits::default(),
-                    // Only a dead machine meets them: what an agent does must not depend on a busy one.
+                    // So long that a busy machine does not affect the agent.
                     time: TimeLimits {
                         startup_s: 600.0,
                         reset_s: 600.0,
@@ -90,8 +90,8 @@ impl Server {
                 },
                 metrics: Metrics::new("0.0.0"),
             },
-            lot: Lot::All,
-            // Nobody waits for its end: a killed worker's successor takes over at once.
+            job_filter: JobFilter::All,
+            // Long, since the successor of a killed worker releases its leases at once.
             lease_s: 3600,
             bundle_limits: BundleLimits::default(),
         };
@@ -104,7 +104,7 @@ impl Server {
         }
     }
 
-    /// Uploads the agent with these lines in its manifest's `[env]`, as http does.
+    /// Uploads the agent with these lines in the `[env]` of its manifest, as the HTTP server does.
     pub async fn upload(&self, team: &str, env: &str) -> SubmissionId {
         let archive = self.path().join("upload.tar.gz");
         write_bundle(&archive, env);
@@ -141,30 +141,30 @@ impl Server {
             .id
     }
 
-    /// Uploads an agent and takes its smoke run as passed; its team.
+    /// Uploads an agent and commits a valid validation run; the agent's team.
     pub async fn valid(&self, team: &str, env: &str) -> TeamId {
         let id = self.upload(team, env).await;
         let (lease_s, now) = (3600, Timestamp::now());
         let claimed = self.store.claim("test", lease_s, now).await.unwrap();
-        let claim = claimed.expect("a smoke run is queued").claim;
-        let outcome = SmokeOutcome::Valid {
+        let claim = claimed.expect("a validation run is queued").claim;
+        let outcome = ValidationOutcome::Valid {
             runtime: "python3".into(),
             agent_name: "hold".into(),
             timing: Vec::new(),
             log: String::new(),
         };
-        self.store.commit_smoke(&claim, outcome, now).await.unwrap();
+        self.store.commit_validation(&claim, outcome, now).await.unwrap();
         self.store.submission(id).await.unwrap().team
     }
 
-    /// The cut, with this plan; the evaluations in the order of the uploads.
+    /// Starts a day with this plan; the evaluations in the order of the uploads.
     pub async fn start_day(&self, plan: &RunPlan, now: Timestamp) -> Vec<Evaluation> {
-        let stage = stage_by(&self.store, plan, now).await;
+        let stage = configure_stage(&self.store, plan, now).await;
         let started = self.store.start_day(Actor::Organiser, stage, now);
         started.await.unwrap()
     }
 
-    /// A copy in a folder of its own; nothing works on this one.
+    /// A copy in another folder. Closes the store of this server.
     pub async fn copy(&self) -> Self {
         self.store.close().await;
         let folder = tempfile::tempdir().unwrap();
@@ -181,20 +181,21 @@ impl Server {
         }
     }
 
-    /// The smoke run's verdict.
-    pub async fn settled(&self, id: SubmissionId) -> SubmissionState {
+    /// Waits for the end of the validation run.
+    pub async fn wait_for_validation(&self, id: SubmissionId) -> SubmissionState {
         let mut events = self.store.events();
         loop {
             let state = self.store.submission(id).await.unwrap().state;
-            if state.is_settled() {
+            if state.is_checked() {
                 return state;
             }
-            // a lagging receiver has missed something: look again
+            // After a lag, the state is read again.
             let _ = events.recv().await;
         }
     }
 
-    pub async fn over(&self, id: EvaluationId) -> EvaluationState {
+    /// Waits for the end of an evaluation.
+    pub async fn wait_for_end(&self, id: EvaluationId) -> EvaluationState {
         let mut events = self.store.events();
         loop {
             let state = self.store.evaluation(id).await.unwrap().state;
@@ -226,8 +227,8 @@ fn write_bundle(archive: &Path, env: &str) {
     tar.into_inner().unwrap().finish().unwrap();
 }
 
-/// The season's first stage, which plays by this plan from now on.
-pub async fn stage_by(store: &Store, plan: &RunPlan, now: Timestamp) -> StageId {
+/// Configures the season's first stage with this plan.
+pub async fn configure_stage(store: &Store, plan: &RunPlan, now: Timestamp) -> StageId {
     let rules = StageRules {
         runtimes: None,
         ruleset: Ruleset::CURRENT,

@@ -1,4 +1,4 @@
-//! Tournaments of the teams of a server.
+//! Helpers for tournaments.
 
 use crate::server::Server;
 use faceoff_store::*;
@@ -6,7 +6,7 @@ use faceoff_types::*;
 use jiff::Timestamp;
 use std::{io::Read as _, path::PathBuf};
 
-/// Short games, in which only an answer that takes a second is late: what a busy machine does must not decide.
+/// Rules for short games in which only answers of more than a second are late, so that a busy machine does not affect them.
 pub fn rules(steps: u32) -> TournamentRules {
     TournamentRules {
         steps,
@@ -19,7 +19,7 @@ pub fn rules(steps: u32) -> TournamentRules {
     }
 }
 
-/// Opens a tournament of these teams and starts its first round with these pairs, on one matchday; its games.
+/// Opens a tournament and starts its first round with these pairs, on one matchday; its games.
 pub async fn start(server: &Server, rules: TournamentRules, pairs: &[[TeamId; 2]]) -> Vec<Game> {
     let mut entrants: Vec<TeamId> = pairs.iter().flatten().copied().collect();
     entrants.sort_unstable();
@@ -44,7 +44,7 @@ pub async fn start(server: &Server, rules: TournamentRules, pairs: &[[TeamId; 2]
     };
     let started = store.start_round(Actor::Organiser, id, &drawn, now);
     started.await.unwrap();
-    store.games(id, GamesOf::Rounds).await.unwrap()
+    store.games(id, GameFilter::Rounds).await.unwrap()
 }
 
 pub fn pairs(teams: &[TeamId]) -> Vec<[TeamId; 2]> {
@@ -55,15 +55,15 @@ pub fn pairs(teams: &[TeamId]) -> Vec<[TeamId; 2]> {
     teams.iter().enumerate().flat_map(with).collect()
 }
 
-/// Waits until a tournament's games are over; what they came to, in the order of play.
+/// Waits until a tournament's games are over; their results in the order of play.
 pub async fn results(server: &Server, tournament: TournamentId) -> Vec<GameResultRow> {
     let mut events = server.store.events();
-    let of_rounds = || server.store.games(tournament, GamesOf::Rounds);
-    let mut games = of_rounds().await.unwrap();
+    let round_games = || server.store.games(tournament, GameFilter::Rounds);
+    let mut games = round_games().await.unwrap();
     while games.iter().any(|game| game.state.is_open()) {
-        // a lagging receiver has missed something: look again
+        // After a lag, the state is read again.
         let _ = events.recv().await;
-        games = of_rounds().await.unwrap();
+        games = round_games().await.unwrap();
     }
     let result = |game: Game| match game.state {
         GameState::Played(result) => *result,

@@ -1,4 +1,4 @@
-//! The season's archive, downloaded.
+//! Download of the season's archive.
 
 use super::Client;
 use anyhow::{Context, bail};
@@ -16,14 +16,15 @@ use tokio::{
     io::AsyncWriteExt,
 };
 
-/// Longest silence of the server: it copies its database, and reads what it has no hash of, before the first byte.
-const PATIENCE: Duration = Duration::from_secs(3600);
+/// Longest silence of the server: before the first byte it copies its database and hashes new files.
+const READ_TIMEOUT: Duration = Duration::from_secs(3600);
 
 impl Client {
-    /// Organiser: downloads the season's archive to a new file, and holds it against its manifest.
+    /// Organiser: downloads the season's archive to a new file and checks it against its manifest.
     ///
     /// # Errors
-    /// If the file exists, or the server cannot be reached or refuses, or what came is not whole: no file is left then.
+    /// If the file exists, the server cannot be reached or refuses, or the download is incomplete. No file is left
+    /// then.
     pub async fn season_archive(
         &self,
         edition: Edition,
@@ -31,31 +32,31 @@ impl Client {
     ) -> anyhow::Result<(Manifest, u64)> {
         if fs::try_exists(file).await.unwrap_or(true) {
             bail!(
-                "{} exists and was left as it is; name another file",
+                "{} already exists and was not changed; name another file",
                 file.display()
             );
         }
-        let patient = Self {
-            http: self.address.http(PATIENCE)?,
+        let slow_client = Self {
+            http: self.address.http(READ_TIMEOUT)?,
             ..self.clone()
         };
         let query = ArchiveQuery {
             edition: Some(edition),
         };
-        let request = patient
+        let request = slow_client
             .request(Method::GET, "/season/archive")
             .query(&query);
-        let response = patient.send(request).await?;
+        let response = slow_client.send(request).await?;
         let mut name = file.as_os_str().to_owned();
         name.push(".part");
         let partial = PathBuf::from(name);
         let fetched = fetch(response, &partial).await;
         let checked = match fetched {
-            Ok(bytes) => whole(&partial).await.map(|manifest| (manifest, bytes)),
+            Ok(bytes) => check_archive(&partial).await.map(|manifest| (manifest, bytes)),
             Err(error) => Err(error),
         };
         if checked.is_err() {
-            // It is of no use; the error tells more than that it stayed.
+            // The first error is more useful than a failure to remove the partial file.
             let _ = fs::remove_file(&partial).await;
             return checked;
         }
@@ -66,17 +67,17 @@ impl Client {
     }
 }
 
-/// Writes the body of an answer to a file; its length.
+/// Writes the body of a response to a file and returns its length in bytes.
 async fn fetch(response: reqwest::Response, partial: &Path) -> anyhow::Result<u64> {
     let writing = || format!("writing {}", partial.display());
-    // what a download that was killed has left
+    // A download that was killed may have left a partial file.
     match fs::remove_file(partial).await {
         Err(error) if error.kind() != ErrorKind::NotFound => {
             return Err(error).with_context(writing);
         }
         _ => {}
     }
-    // It may hold all that the organiser knows.
+    // The archive may contain everything that only organisers may read.
     let mut writer = File::options()
         .write(true)
         .create_new(true)
@@ -88,7 +89,7 @@ async fn fetch(response: reqwest::Response, partial: &Path) -> anyhow::Result<u6
     let mut stream = response.bytes_stream();
     while let Some(piece) = stream.next().await {
         let piece = piece.with_context(|| {
-            format!("the download broke off after {bytes} bytes; the server's log may say why. Try again")
+            format!("the download was interrupted after {bytes} bytes; the server's log may have the reason. Try again")
         })?;
         bytes += piece.len() as u64;
         writer.write_all(&piece).await.with_context(writing)?;
@@ -97,11 +98,11 @@ async fn fetch(response: reqwest::Response, partial: &Path) -> anyhow::Result<u6
     Ok(bytes)
 }
 
-/// The manifest of an archive that is as it says.
-async fn whole(archive: &Path) -> anyhow::Result<Manifest> {
+/// Checks an archive against its manifest and returns the manifest.
+async fn check_archive(archive: &Path) -> anyhow::Result<Manifest> {
     let archive = archive.to_owned();
     tokio::task::spawn_blocking(move || check(&archive))
         .await
         .context("reading the archive")?
-        .context("what was downloaded is not whole; try again")
+        .context("the downloaded archive is incomplete; try again")
 }

@@ -1,4 +1,4 @@
-//! Files of the server, downloaded so that a download that broke off goes on where it was.
+//! Resumable downloads of files.
 
 use super::{ApiError, Client};
 use anyhow::{Context, anyhow, bail, ensure};
@@ -12,48 +12,49 @@ use std::{
     path::{Path, PathBuf},
 };
 
-/// The server's word for a file's hash.
-const HASH: &str = "x-content-blake3";
+/// Response header with a file's BLAKE3 hash.
+const HASH_HEADER: &str = "x-content-blake3";
 
-/// A file that is there, whole.
+/// A complete downloaded file.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-pub struct Downloaded {
+pub struct DownloadedFile {
     pub file: PathBuf,
     pub bytes: u64,
-    /// How much of it was there from a download that had broken off.
+    /// Bytes that an interrupted download had left.
     pub resumed_at: u64,
     pub blake3: String,
-    /// Is that the hash that the server tells? `false`: it tells none.
+    /// The hash was compared with the server's. `false`: the server sent none.
     pub checked: bool,
 }
 
 impl Client {
-    /// Downloads what is at `path` to `file`; `published` is the hash that it has by another word than the answer's.
+    /// Downloads `path` to `file`. `published` is the expected hash, if the caller knows it from elsewhere than the
+    /// response.
     ///
-    /// What has come is in `FILE.part`, which stays if the connection breaks; `FILE.part.etag` says of what it is the
-    /// beginning. A file that exists is replaced in the end.
+    /// Received bytes go to `FILE.part`, which stays if the connection breaks; `FILE.part.etag` has the ETag of its
+    /// source. An existing file is replaced once the download is complete.
     pub(super) async fn download(
         &self,
         path: &str,
         file: &Path,
         published: Option<&str>,
         bar: &ProgressBar,
-    ) -> anyhow::Result<Downloaded> {
-        let mut part = Part::open(file)?;
-        let mut resumed_at = part.begun();
-        let mut answer = self.ask_for(path, &part, resumed_at).await;
-        if resumed_at > 0 && answer.as_ref().is_err_and(is_behind_the_end) {
+    ) -> anyhow::Result<DownloadedFile> {
+        let mut part = PartialFile::open(file)?;
+        let mut resumed_at = part.resumable_bytes();
+        let mut answer = self.request_file(path, &part, resumed_at).await;
+        if resumed_at > 0 && answer.as_ref().is_err_and(is_range_not_satisfiable) {
             resumed_at = 0;
-            answer = self.ask_for(path, &part, 0).await;
+            answer = self.request_file(path, &part, 0).await;
         }
         let response = answer?;
         if resumed_at > 0 && response.status() != StatusCode::PARTIAL_CONTENT {
-            // It is another file by now, or the server sends whole ones alone.
+            // The file has changed meanwhile, or the server does not support ranges.
             resumed_at = 0;
         }
-        let told = Told::by(&response, resumed_at)?;
-        part.write_from(resumed_at, told.tag.as_deref())?;
-        bar.set_length(told.total.unwrap_or(0));
+        let info = FileInfo::from_response(&response, resumed_at)?;
+        part.truncate_to(resumed_at, info.tag.as_deref())?;
+        bar.set_length(info.total.unwrap_or(0));
         bar.set_position(resumed_at);
         let mut bytes = resumed_at;
         let mut stream = response.bytes_stream();
@@ -71,35 +72,35 @@ impl Client {
                 }
             }
         }
-        if broken.is_some() || told.total.is_some_and(|total| total != bytes) {
-            let next = if told.tag.is_some() {
-                "the same command goes on from there"
+        if broken.is_some() || info.total.is_some_and(|total| total != bytes) {
+            let advice = if info.tag.is_some() {
+                "run the same command again to resume it"
             } else {
                 "try again"
             };
-            let words = format!("the download broke off after {bytes} bytes; {next}");
+            let message = format!("the download was interrupted after {bytes} bytes; {advice}");
             return Err(match broken {
-                Some(error) => anyhow!(error).context(words),
-                None => anyhow!(super::Unreachable(words)),
+                Some(error) => anyhow!(error).context(message),
+                None => anyhow!(super::Unreachable(message)),
             });
         }
-        let expected = published.map(str::to_owned).or(told.hash);
-        let blake3 = tokio::task::spawn_blocking(move || {
-            part.settle(expected.as_deref())
+        let expected = published.map(str::to_owned).or(info.hash);
+        let (blake3, checked) = tokio::task::spawn_blocking(move || {
+            part.finish(expected.as_deref())
                 .map(|hash| (hash, expected.is_some()))
         })
         .await
-        .context("reading what was downloaded")??;
-        Ok(Downloaded {
+        .context("reading the downloaded file")??;
+        Ok(DownloadedFile {
             file: file.to_owned(),
             bytes,
             resumed_at,
-            blake3: blake3.0,
-            checked: blake3.1,
+            blake3,
+            checked,
         })
     }
 
-    async fn ask_for(&self, path: &str, part: &Part, from: u64) -> anyhow::Result<Response> {
+    async fn request_file(&self, path: &str, part: &PartialFile, from: u64) -> anyhow::Result<Response> {
         let mut request = self.request(Method::GET, path);
         if let (true, Some(tag)) = (from > 0, &part.tag) {
             request = request
@@ -110,22 +111,22 @@ impl Client {
     }
 }
 
-fn is_behind_the_end(error: &anyhow::Error) -> bool {
+fn is_range_not_satisfiable(error: &anyhow::Error) -> bool {
     error
         .downcast_ref::<ApiError>()
         .is_some_and(|error| error.status == StatusCode::RANGE_NOT_SATISFIABLE)
 }
 
-/// What an answer tells of the whole file.
-struct Told {
+/// Headers of a response that describe the complete file.
+struct FileInfo {
     total: Option<u64>,
-    /// A strong one: of one sequence of bytes.
+    /// A strong ETag, which identifies one sequence of bytes.
     tag: Option<String>,
     hash: Option<String>,
 }
 
-impl Told {
-    fn by(response: &Response, resumed_at: u64) -> anyhow::Result<Self> {
+impl FileInfo {
+    fn from_response(response: &Response, resumed_at: u64) -> anyhow::Result<Self> {
         let text = |name: &str| {
             let value = response.headers().get(name)?;
             value.to_str().ok().map(str::to_owned)
@@ -139,19 +140,19 @@ impl Told {
                     Some((part.split_once('-')?.0.parse::<u64>().ok()?, total))
                 })
                 .with_context(|| {
-                    format!("the server sends the part {range:?} of a file, which is none")
+                    format!("the server sent the invalid content range {range:?}")
                 })?;
             ensure!(
                 from == resumed_at,
-                "the server was asked for a file from byte {resumed_at} on, and sends it from byte {from} on"
+                "the server was asked for the file from byte {resumed_at}, but sent it from byte {from}"
             );
             total.parse().ok()
         } else {
             response.content_length()
         };
         let tag = text("etag").filter(|tag| tag.starts_with('"'));
-        // Either says it.
-        let hash = text(HASH).or_else(|| {
+        // Some responses have the hash only in the ETag.
+        let hash = text(HASH_HEADER).or_else(|| {
             let tag = tag.as_deref()?.trim_matches('"');
             tag.strip_prefix("blake3-").map(str::to_owned)
         });
@@ -159,64 +160,64 @@ impl Told {
     }
 }
 
-/// The beginning of a file, and what it is the beginning of.
-struct Part {
+/// The part of a file that has been received, and the ETag of its source.
+struct PartialFile {
     target: PathBuf,
-    place: PathBuf,
-    tag_place: PathBuf,
+    path: PathBuf,
+    tag_path: PathBuf,
     tag: Option<String>,
-    /// Held: two downloads of one file would write into each other's.
+    /// Locked, because two downloads of one file would overwrite each other.
     file: File,
 }
 
-impl Part {
+impl PartialFile {
     fn open(target: &Path) -> anyhow::Result<Self> {
-        let beside = |end: &str| {
+        let sibling = |suffix: &str| {
             let mut name = target.as_os_str().to_owned();
-            name.push(end);
+            name.push(suffix);
             PathBuf::from(name)
         };
-        let (place, tag_place) = (beside(".part"), beside(".part.etag"));
+        let (path, tag_path) = (sibling(".part"), sibling(".part.etag"));
         let file = File::options()
             .read(true)
             .write(true)
             .create(true)
             .truncate(false)
-            .open(&place)
-            .with_context(|| format!("making {}", place.display()))?;
+            .open(&path)
+            .with_context(|| format!("creating {}", path.display()))?;
         match file.try_lock() {
             Ok(()) => {}
             Err(TryLockError::WouldBlock) => {
-                bail!("another download to {} is under way", target.display())
+                bail!("another download to {} is running", target.display())
             }
             Err(TryLockError::Error(error)) => {
-                return Err(error).with_context(|| format!("locking {}", place.display()));
+                return Err(error).with_context(|| format!("locking {}", path.display()));
             }
         }
-        let tag = fs::read_to_string(&tag_place).ok();
+        let tag = fs::read_to_string(&tag_path).ok();
         Ok(Self {
             target: target.to_owned(),
-            place,
-            tag_place,
+            path,
+            tag_path,
             tag: tag.filter(|tag| tag.starts_with('"')),
             file,
         })
     }
 
-    /// How much there is of a file that is known.
-    fn begun(&self) -> u64 {
+    /// Bytes that a download can be resumed from: 0 if their source is unknown.
+    fn resumable_bytes(&self) -> u64 {
         match (&self.tag, self.file.metadata()) {
             (Some(_), Ok(metadata)) => metadata.len(),
             _ => 0,
         }
     }
 
-    /// Keeps so much, and notes of what file it is.
-    fn write_from(&mut self, at: u64, tag: Option<&str>) -> anyhow::Result<()> {
-        let writing = || format!("writing {}", self.place.display());
+    /// Keeps the first `at` bytes and records the ETag of their source.
+    fn truncate_to(&mut self, at: u64, tag: Option<&str>) -> anyhow::Result<()> {
+        let writing = || format!("writing {}", self.path.display());
         if at == 0 {
-            // Nothing of another file under this one's name.
-            match fs::remove_file(&self.tag_place) {
+            // The old ETag does not describe the new file.
+            match fs::remove_file(&self.tag_path) {
                 Err(error) if error.kind() != ErrorKind::NotFound => {
                     return Err(error).with_context(writing);
                 }
@@ -226,8 +227,8 @@ impl Part {
         self.file.set_len(at).with_context(writing)?;
         self.file.seek(SeekFrom::Start(at)).with_context(writing)?;
         if let (0, Some(tag)) = (at, tag) {
-            fs::write(&self.tag_place, tag)
-                .with_context(|| format!("writing {}", self.tag_place.display()))?;
+            fs::write(&self.tag_path, tag)
+                .with_context(|| format!("writing {}", self.tag_path.display()))?;
         }
         Ok(())
     }
@@ -235,12 +236,12 @@ impl Part {
     fn write(&mut self, piece: &[u8]) -> anyhow::Result<()> {
         self.file
             .write_all(piece)
-            .with_context(|| format!("writing {}", self.place.display()))
+            .with_context(|| format!("writing {}", self.path.display()))
     }
 
-    /// Has it be the file, if it has the hash that it should; its hash.
-    fn settle(mut self, expected: Option<&str>) -> anyhow::Result<String> {
-        let reading = || format!("reading {}", self.place.display());
+    /// Moves the file to its target, if it has the expected hash, and returns its hash.
+    fn finish(mut self, expected: Option<&str>) -> anyhow::Result<String> {
+        let reading = || format!("reading {}", self.path.display());
         self.file.seek(SeekFrom::Start(0)).with_context(reading)?;
         let mut hasher = blake3::Hasher::new();
         hasher.update_reader(&self.file).with_context(reading)?;
@@ -250,34 +251,34 @@ impl Part {
         {
             self.remove();
             bail!(
-                "what came has the BLAKE3 hash {hash}, and the server's file {expected}: it was changed on the way; nothing is \
-                 kept of it, try again"
+                "the download has the BLAKE3 hash {hash}, but the server's file has {expected}: it was damaged in transfer and is \
+                deleted; try again"
             );
         }
-        fs::rename(&self.place, &self.target)
+        fs::rename(&self.path, &self.target)
             .with_context(|| format!("naming {}", self.target.display()))?;
-        // Without its file it says nothing.
-        let _ = fs::remove_file(&self.tag_place);
+        // The ETag is useless without the partial file.
+        let _ = fs::remove_file(&self.tag_path);
         Ok(hash)
     }
 
     fn remove(&self) {
-        // What stays is written anew.
-        let _ = fs::remove_file(&self.tag_place);
-        let _ = fs::remove_file(&self.place);
+        // A file that cannot be removed is overwritten by the next download.
+        let _ = fs::remove_file(&self.tag_path);
+        let _ = fs::remove_file(&self.path);
     }
 }
 
-impl Drop for Part {
+impl Drop for PartialFile {
     fn drop(&mut self) {
-        // An empty one, of a refusal, is of no use to anybody.
+        // A refused download leaves an empty file.
         if self
             .file
             .metadata()
             .is_ok_and(|metadata| metadata.len() == 0)
-            && self.place.exists()
+            && self.path.exists()
         {
-            let _ = fs::remove_file(&self.place);
+            let _ = fs::remove_file(&self.path);
         }
     }
 }

@@ -1,14 +1,14 @@
-//! What a client asks about single games.
+//! Requests about single games.
 
 use super::{
     Client,
-    download::Downloaded,
+    download::DownloadedFile,
     sse::{self, ServerEvent},
 };
 use anyhow::Context;
 use faceoff_api::{
     requests::Decision,
-    views::{attempt::AttemptView, game::GameView},
+    views::{attempt::GameAttemptView, game::GameView},
 };
 use faceoff_types::{GameId, Side};
 use futures::{Stream, StreamExt};
@@ -21,59 +21,59 @@ impl Client {
         self.get(&format!("/games/{id}")).await
     }
 
-    /// Team or organiser: calls off a game that does not count.
+    /// Team or organiser: cancels a game that does not count.
     pub async fn cancel_game(&self, id: GameId) -> anyhow::Result<GameView> {
-        self.act(Method::DELETE, &format!("/games/{id}")).await
+        self.call(Method::DELETE, &format!("/games/{id}")).await
     }
 
-    /// Organiser: each time that a slot began it.
-    pub async fn attempts(&self, id: GameId) -> anyhow::Result<Vec<AttemptView>> {
+    /// Organiser: every attempt of a slot to run the game.
+    pub async fn attempts(&self, id: GameId) -> anyhow::Result<Vec<GameAttemptView>> {
         self.get(&format!("/games/{id}/attempts")).await
     }
 
-    /// Organiser: has its result count no more; `confirm` is `HOME - AWAY`.
+    /// Organiser: voids the result of a game; `confirm` is `HOME - AWAY`.
     pub async fn void_game(&self, id: GameId, decision: &Decision) -> anyhow::Result<GameView> {
         let path = format!("/games/{id}/void");
-        self.tell(Method::POST, &path, decision).await
+        self.call_with_body(Method::POST, &path, decision).await
     }
 
-    /// Organiser: has it played again.
+    /// Organiser: repeats a game.
     pub async fn rerun_game(&self, id: GameId) -> anyhow::Result<GameView> {
-        self.act(Method::POST, &format!("/games/{id}/rerun")).await
+        self.call(Method::POST, &format!("/games/{id}/rerun")).await
     }
 
-    /// Downloads a side's own file.
+    /// Downloads the dataset of one side.
     pub async fn download_side(
         &self,
         id: GameId,
         side: Side,
         file: &Path,
         bar: &ProgressBar,
-    ) -> anyhow::Result<Downloaded> {
+    ) -> anyhow::Result<DownloadedFile> {
         let path = format!("/games/{id}/sides/{}", side.number());
         self.download(&path, file, None, bar).await
     }
 
-    /// Downloads the recording of both sides.
+    /// Downloads the recording of the game, with both sides.
     pub async fn download_recording(
         &self,
         id: GameId,
         file: &Path,
         bar: &ProgressBar,
-    ) -> anyhow::Result<Downloaded> {
+    ) -> anyhow::Result<DownloadedFile> {
         let path = format!("/games/{id}/recording");
         self.download(&path, file, None, bar).await
     }
 
-    /// Team or organiser: the end of what a side's agent wrote.
+    /// Team or organiser: the end of the log of a side's agent.
     pub async fn game_log(&self, id: GameId, side: Side) -> anyhow::Result<String> {
         let path = format!("/games/{id}/sides/{}/log", side.number());
         let response = self.send(self.request(Method::GET, &path)).await?;
         response.text().await.context("reading the server's answer")
     }
 
-    /// What happens in a game, from after the event of that id on. The stream ends when the server ends it, and with an
-    /// error if the connection does.
+    /// The live events of a game after the event `last`. The stream ends when the server ends it; a broken connection
+    /// ends it with an error.
     pub async fn watch_game(
         &self,
         id: GameId,

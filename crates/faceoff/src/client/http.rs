@@ -3,24 +3,24 @@ use reqwest::redirect::Policy;
 use rustls::ClientConfig;
 use std::{path::Path, time::Duration};
 
-/// A server's address, and whom to believe that they are it.
+/// A server's address and the certificate authorities that may vouch for it.
 #[derive(Debug, Clone)]
 pub(super) struct Address {
-    /// Without a slash at its end.
+    /// Without a trailing slash.
     pub base: String,
     tls: ClientConfig,
 }
 
 impl Address {
     /// # Errors
-    /// If it is none, or names a way that this program does not speak, or nobody could be believed.
+    /// If `server` is no address, its scheme is neither `http` nor `https`, or no certificate authority is available.
     pub(super) fn new(server: &str, ca_file: Option<&Path>) -> anyhow::Result<Self> {
         let url = reqwest::Url::parse(server).with_context(|| {
-            format!("{server:?} is no address; expected e.g. https://faceoff.example.org or http://127.0.0.1:8080")
+            format!("{server:?} is not an address; expected e.g. https://faceoff.example.org or http://127.0.0.1:8080")
         })?;
         let tls = match url.scheme() {
-            "https" => super::tls::trusting(ca_file)?,
-            "http" => super::tls::none(),
+            "https" => super::tls::tls_client_config(ca_file)?,
+            "http" => super::tls::plain_client_config(),
             other => bail!("{server}: expected http:// or https://, got {other}://"),
         };
         Ok(Self {
@@ -29,15 +29,15 @@ impl Address {
         })
     }
 
-    /// What speaks to it, and waits so long for a silent one.
-    pub(super) fn http(&self, patience: Duration) -> anyhow::Result<reqwest::Client> {
+    /// An HTTP client that gives up after a silence of `read_timeout`.
+    pub(super) fn http(&self, read_timeout: Duration) -> anyhow::Result<reqwest::Client> {
         reqwest::Client::builder()
             .user_agent(concat!("faceoff/", env!("CARGO_PKG_VERSION")))
             .connect_timeout(Duration::from_secs(10))
-            .read_timeout(patience)
-            // The server is named by the user; a proxy of the environment is meant for other hosts.
+            .read_timeout(read_timeout)
+            // The user names the server; a proxy in the environment is meant for other hosts.
             .no_proxy()
-            // A redirection would make a POST a GET, and leave the token behind; the user is told instead.
+            // A redirect would turn a POST into a GET and drop the token; the user gets an error instead.
             .redirect(Policy::none())
             .tls_backend_preconfigured(self.tls.clone())
             .build()

@@ -5,31 +5,32 @@ use faceoff_api::{requests::NewLink, views::link::LinkView};
 use faceoff_types::{EvaluationId, GameId, Side, SubmissionId};
 use reqwest::Method;
 
-/// What a link downloads.
+/// The file that a link downloads.
 #[derive(Debug, Clone, Copy)]
-pub enum Linked {
+pub enum LinkTarget {
     Dataset(EvaluationId),
-    /// As it was uploaded.
+    /// The bundle as it was uploaded.
     Submission(SubmissionId),
-    /// A side's own file of a game.
+    /// The dataset of one side of a game.
     Side(GameId, Side),
-    /// Both sides' recording of a game.
+    /// The recording of a game, with both sides.
     Recording(GameId),
 }
 
 impl Client {
-    /// Makes a link, which comes this once; whole, also where the server does not know its own address.
-    pub async fn link(&self, to: Linked, wanted: NewLink) -> anyhow::Result<LinkView> {
-        let path = match to {
-            Linked::Dataset(id) => format!("/evaluations/{id}/dataset/link"),
-            Linked::Submission(id) => format!("/submissions/{id}/archive/link"),
-            Linked::Side(id, side) => format!("/games/{id}/sides/{}/link", side.number()),
-            Linked::Recording(id) => format!("/games/{id}/recording/link"),
+    /// Creates a link; only this response contains it. A server without a public address sends a relative URL, which
+    /// is made absolute here.
+    pub async fn link(&self, target: LinkTarget, new: NewLink) -> anyhow::Result<LinkView> {
+        let path = match target {
+            LinkTarget::Dataset(id) => format!("/evaluations/{id}/dataset/link"),
+            LinkTarget::Submission(id) => format!("/submissions/{id}/archive/link"),
+            LinkTarget::Side(id, side) => format!("/games/{id}/sides/{}/link", side.number()),
+            LinkTarget::Recording(id) => format!("/games/{id}/recording/link"),
         };
-        let mut made: LinkView = self.tell(Method::POST, &path, &wanted).await?;
-        if made.url.starts_with('/') {
-            made.url.insert_str(0, &self.address.base);
+        let mut link: LinkView = self.call_with_body(Method::POST, &path, &new).await?;
+        if link.url.starts_with('/') {
+            link.url.insert_str(0, &self.address.base);
         }
-        Ok(made)
+        Ok(link)
     }
 }

@@ -1,6 +1,6 @@
-//! Lists that the server gives page by page, read to their end.
+//! Paginated lists.
 
-use super::{Client, read};
+use super::{Client, read_json};
 use anyhow::Context;
 use faceoff_api::API_BASE;
 use reqwest::{
@@ -10,7 +10,7 @@ use reqwest::{
 use serde::de::DeserializeOwned;
 
 impl Client {
-    /// All of a list.
+    /// Reads all pages of a list.
     pub(super) async fn list<T: DeserializeOwned>(
         &self,
         request: RequestBuilder,
@@ -18,9 +18,9 @@ impl Client {
         let mut rows: Vec<T> = Vec::new();
         let mut request = request;
         loop {
-            let answer = self.send(request).await?;
-            let next = next(answer.headers())?;
-            let page: Vec<T> = read(answer).await?;
+            let response = self.send(request).await?;
+            let next = next_page(response.headers())?;
+            let page: Vec<T> = read_json(response).await?;
             let is_last = page.is_empty();
             rows.extend(page);
             match next {
@@ -31,8 +31,8 @@ impl Client {
     }
 }
 
-/// Where the next page is, below the API's own path.
-fn next(headers: &HeaderMap) -> anyhow::Result<Option<String>> {
+/// The path of the next page, relative to [`API_BASE`].
+fn next_page(headers: &HeaderMap) -> anyhow::Result<Option<String>> {
     let links = headers.get_all(LINK).into_iter();
     let mut links = links.filter_map(|value| value.to_str().ok());
     let Some(link) = links.find(|link| link.contains("rel=\"next\"")) else {
@@ -41,7 +41,7 @@ fn next(headers: &HeaderMap) -> anyhow::Result<Option<String>> {
     let target = link.strip_prefix('<').and_then(|link| link.split_once('>'));
     let path = target.and_then(|(target, _)| target.strip_prefix(API_BASE));
     let path = path.with_context(|| {
-        format!("the server names the next page of a list as {link:?}, which is no path of its API")
+        format!("the server links to the next page of a list as {link:?}, which is no path of its API")
     })?;
     Ok(Some(path.to_owned()))
 }
@@ -51,15 +51,15 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_next_page_is_a_path_of_the_api() {
-        let of = |link: &str| {
+    fn next_page_is_a_path_of_the_api() {
+        let parse = |link: &str| {
             let headers = HeaderMap::from_iter([(LINK, link.parse().unwrap())]);
-            next(&headers)
+            next_page(&headers)
         };
         let link = "</api/v1/teams?limit=2&after=x>; rel=\"next\"";
-        assert_eq!(of(link).unwrap().as_deref(), Some("/teams?limit=2&after=x"));
-        assert_eq!(of("</other>; rel=\"help\"").unwrap(), None);
-        assert!(of("<http://elsewhere/>; rel=\"next\"").is_err());
-        assert_eq!(next(&HeaderMap::new()).unwrap(), None);
+        assert_eq!(parse(link).unwrap().as_deref(), Some("/teams?limit=2&after=x"));
+        assert_eq!(parse("</other>; rel=\"help\"").unwrap(), None);
+        assert!(parse("<http://elsewhere/>; rel=\"next\"").is_err());
+        assert_eq!(next_page(&HeaderMap::new()).unwrap(), None);
     }
 }

@@ -1,124 +1,124 @@
-//! What a client asks about people, their teams and their tokens.
+//! Requests about users, their teams and their tokens.
 
 use super::Client;
 use faceoff_api::{
     requests::{
-        Confirmation, Join, NewAnnouncement, NewAnswer, NewInvitation, NewPassword, NewQuestion,
-        NewTerms, NewToken, Reason, Register, SeasonChange, TeamChange,
+        Confirmation, JoinRequest, NewAnnouncement, NewAnswer, NewInvitation, NewPassword, NewQuestion,
+        NewTerms, NewToken, Reason, RegistrationRequest, SeasonChange, TeamChange,
     },
     views::{
         announcement::{AnnouncementView, QuestionView, TermsView},
         invitation::{InvitationView, NewInvitationView, NewRegistrationView, RegistrationView},
-        person::{JoinedView, PersonView, WhoView},
+        user::{NewAccountView, UserView, CallerView},
         season::SeasonView,
         team::TeamView,
         token::{NewTokenView, TokenView},
     },
 };
-use faceoff_types::{InvitationId, PersonId, QuestionId, RegistrationId, TeamId, TokenId};
+use faceoff_types::{InvitationId, UserId, QuestionId, RegistrationId, TeamId, TokenId};
 use reqwest::Method;
 
 impl Client {
-    pub async fn whoami(&self) -> anyhow::Result<WhoView> {
+    pub async fn whoami(&self) -> anyhow::Result<CallerView> {
         self.get("/whoami").await
     }
 
-    /// The tokens and sessions that we may manage, the newest first.
+    /// The tokens and sessions that the caller may manage, the newest first.
     pub async fn tokens(&self) -> anyhow::Result<Vec<TokenView>> {
         self.list(self.request(Method::GET, "/tokens")).await
     }
 
-    /// Makes a token; its text comes this once.
+    /// Creates a token; only this response has its text.
     pub async fn create_token(&self, new: &NewToken) -> anyhow::Result<NewTokenView> {
-        self.tell(Method::POST, "/tokens", new).await
+        self.call_with_body(Method::POST, "/tokens", new).await
     }
 
-    /// Gives a token another secret, which comes this once.
+    /// Replaces the secret of a token; only this response has the new one.
     pub async fn rotate_token(&self, id: TokenId) -> anyhow::Result<NewTokenView> {
-        self.act(Method::POST, &format!("/tokens/{id}/rotate"))
+        self.call(Method::POST, &format!("/tokens/{id}/rotate"))
             .await
     }
 
     pub async fn revoke_token(&self, id: TokenId) -> anyhow::Result<TokenView> {
-        self.act(Method::DELETE, &format!("/tokens/{id}")).await
+        self.call(Method::DELETE, &format!("/tokens/{id}")).await
     }
 
-    /// The people whom we may see.
-    pub async fn people(&self) -> anyhow::Result<Vec<PersonView>> {
+    /// The users that the caller may see.
+    pub async fn people(&self) -> anyhow::Result<Vec<UserView>> {
         self.list(self.request(Method::GET, "/people")).await
     }
 
-    /// Lets a person do nothing any more; `confirm` is their name.
+    /// Removes a user; `confirm` is their name.
     pub async fn remove_person(
         &self,
-        id: PersonId,
+        id: UserId,
         confirm: Option<String>,
-    ) -> anyhow::Result<PersonView> {
+    ) -> anyhow::Result<UserView> {
         let path = format!("/people/{id}/remove");
-        self.tell(Method::POST, &path, &Confirmation { confirm })
+        self.call_with_body(Method::POST, &path, &Confirmation { confirm })
             .await
     }
 
-    /// Sets our own password; all our other tokens and sessions are worth nothing from then on.
+    /// Sets the caller's password and revokes all their other tokens and sessions.
     pub async fn set_password(
         &self,
-        id: PersonId,
+        id: UserId,
         new: &NewPassword,
-    ) -> anyhow::Result<PersonView> {
-        self.tell(Method::PUT, &format!("/people/{id}/password"), new)
+    ) -> anyhow::Result<UserView> {
+        self.call_with_body(Method::PUT, &format!("/people/{id}/password"), new)
             .await
     }
 
-    /// Registers a team; its link comes this once.
-    pub async fn register(&self, new: &Register) -> anyhow::Result<NewRegistrationView> {
-        self.tell(Method::POST, "/registrations", new).await
+    /// Registers a team; only this response has its link.
+    pub async fn register(&self, new: &RegistrationRequest) -> anyhow::Result<NewRegistrationView> {
+        self.call_with_body(Method::POST, "/registrations", new).await
     }
 
-    /// Makes an invitation; its link comes this once.
+    /// Creates an invitation; only this response has its link.
     pub async fn invite(&self, new: &NewInvitation) -> anyhow::Result<NewInvitationView> {
-        self.tell(Method::POST, "/invitations", new).await
+        self.call_with_body(Method::POST, "/invitations", new).await
     }
 
-    /// The invitations that we may manage, the newest first.
+    /// The invitations that the caller may manage, the newest first.
     pub async fn invitations(&self) -> anyhow::Result<Vec<InvitationView>> {
         self.list(self.request(Method::GET, "/invitations")).await
     }
 
-    /// Takes an invitation back.
+    /// Revokes an invitation.
     pub async fn revoke_invitation(&self, id: InvitationId) -> anyhow::Result<InvitationView> {
-        self.act(Method::DELETE, &format!("/invitations/{id}"))
+        self.call(Method::DELETE, &format!("/invitations/{id}"))
             .await
     }
 
-    /// Follows an invitation; the token comes this once.
-    pub async fn join(&self, join: &Join) -> anyhow::Result<JoinedView> {
-        self.tell(Method::POST, "/invitations/accept", join).await
+    /// Accepts an invitation; only this response has the token.
+    pub async fn join(&self, join: &JoinRequest) -> anyhow::Result<NewAccountView> {
+        self.call_with_body(Method::POST, "/invitations/accept", join).await
     }
 
     pub async fn team(&self, id: TeamId) -> anyhow::Result<TeamView> {
         self.get(&format!("/teams/{id}")).await
     }
 
-    /// Changes a team's name, or what it tells of itself.
+    /// Changes a team's name or its description.
     pub async fn change_team(&self, id: TeamId, change: &TeamChange) -> anyhow::Result<TeamView> {
-        self.tell(Method::PATCH, &format!("/teams/{id}"), change)
+        self.call_with_body(Method::PATCH, &format!("/teams/{id}"), change)
             .await
     }
 
-    /// Takes a team out of all days to come; `confirm` is its name.
+    /// Retires a team from all future evaluation days; `confirm` is its name.
     pub async fn retire_team(
         &self,
         id: TeamId,
         confirm: Option<String>,
     ) -> anyhow::Result<TeamView> {
         let path = format!("/teams/{id}/retire");
-        self.tell(Method::POST, &path, &Confirmation { confirm })
+        self.call_with_body(Method::POST, &path, &Confirmation { confirm })
             .await
     }
 
-    /// Lets a team that has retired play again.
+    /// Returns a retired team to the competition.
     pub async fn return_team(&self, id: TeamId) -> anyhow::Result<TeamView> {
-        self.act(Method::POST, &format!("/teams/{id}/return")).await
+        self.call(Method::POST, &format!("/teams/{id}/return")).await
     }
 
     /// All versions of the terms, the newest first.
@@ -126,35 +126,35 @@ impl Client {
         self.get("/terms").await
     }
 
-    /// Organiser: publishes other terms.
+    /// Organiser: publishes a new version of the terms.
     pub async fn publish_terms(&self, text: String) -> anyhow::Result<TermsView> {
-        self.tell(Method::POST, "/terms", &NewTerms { text }).await
+        self.call_with_body(Method::POST, "/terms", &NewTerms { text }).await
     }
 
     /// Accepts the terms.
-    pub async fn accept_terms(&self, version: u32) -> anyhow::Result<PersonView> {
-        self.act(Method::POST, &format!("/terms/{version}/accept"))
+    pub async fn accept_terms(&self, version: u32) -> anyhow::Result<UserView> {
+        self.call(Method::POST, &format!("/terms/{version}/accept"))
             .await
     }
 
-    /// What everybody was told, the newest first.
+    /// All announcements, the newest first.
     pub async fn announcements(&self) -> anyhow::Result<Vec<AnnouncementView>> {
         self.list(self.request(Method::GET, "/announcements")).await
     }
 
     pub async fn announce(&self, title: String, text: String) -> anyhow::Result<AnnouncementView> {
         let new = NewAnnouncement { title, text };
-        self.tell(Method::POST, "/announcements", &new).await
+        self.call_with_body(Method::POST, "/announcements", &new).await
     }
 
-    /// The questions that we may read, the newest first.
+    /// The questions that the caller may read, the newest first.
     pub async fn questions(&self) -> anyhow::Result<Vec<QuestionView>> {
         self.list(self.request(Method::GET, "/questions")).await
     }
 
     /// Team: asks the organisers.
     pub async fn ask(&self, text: String) -> anyhow::Result<QuestionView> {
-        self.tell(Method::POST, "/questions", &NewQuestion { text })
+        self.call_with_body(Method::POST, "/questions", &NewQuestion { text })
             .await
     }
 
@@ -166,7 +166,7 @@ impl Client {
         public: bool,
     ) -> anyhow::Result<QuestionView> {
         let new = NewAnswer { text, public };
-        self.tell(Method::PUT, &format!("/questions/{id}/answer"), &new)
+        self.call_with_body(Method::PUT, &format!("/questions/{id}/answer"), &new)
             .await
     }
 
@@ -175,9 +175,9 @@ impl Client {
         self.list(self.request(Method::GET, "/registrations")).await
     }
 
-    /// Organiser: lets a registered team take part.
+    /// Organiser: approves a registration.
     pub async fn approve(&self, id: RegistrationId) -> anyhow::Result<RegistrationView> {
-        self.act(Method::POST, &format!("/registrations/{id}/approve"))
+        self.call(Method::POST, &format!("/registrations/{id}/approve"))
             .await
     }
 
@@ -188,11 +188,11 @@ impl Client {
         reason: String,
     ) -> anyhow::Result<RegistrationView> {
         let path = format!("/registrations/{id}/refuse");
-        self.tell(Method::POST, &path, &Reason { reason }).await
+        self.call_with_body(Method::POST, &path, &Reason { reason }).await
     }
 
-    /// Organiser: lets anybody register, or nobody; sets the divisions.
+    /// Organiser: opens or closes registration, or sets the divisions.
     pub async fn change_season(&self, change: &SeasonChange) -> anyhow::Result<SeasonView> {
-        self.tell(Method::PATCH, "/season", change).await
+        self.call_with_body(Method::PATCH, "/season", change).await
     }
 }

@@ -1,6 +1,6 @@
-//! Trials and re-evaluations.
+//! Trials and proposed re-evaluations.
 
-use super::{Client, read};
+use super::{Client, read_json};
 use faceoff_api::{
     requests::{Confirmation, NewProposal, Trial},
     views::proposal::ProposalView,
@@ -14,44 +14,44 @@ impl Client {
         self.list(self.request(Method::GET, "/proposals")).await
     }
 
-    /// Organiser: one, with what it plays and what it would change.
+    /// Organiser: one proposal, with its evaluations and the changes of the board.
     pub async fn proposal(&self, id: ProposalId) -> anyhow::Result<ProposalView> {
         self.get(&format!("/proposals/{id}")).await
     }
 
-    /// Organiser: tries what is active without counting.
-    pub async fn trial(&self, stage: StageId, wanted: &Trial) -> anyhow::Result<ProposalView> {
+    /// Organiser: starts a trial of active submissions, which does not count.
+    pub async fn trial(&self, stage: StageId, trial: &Trial) -> anyhow::Result<ProposalView> {
         let request = self.request(Method::POST, &format!("/stages/{stage}/trial"));
-        read(self.send(request.json(wanted)).await?).await
+        read_json(self.send(request.json(trial)).await?).await
     }
 
-    /// Organiser: plays results again beside what counts.
+    /// Organiser: proposes a re-evaluation of results; the old ones count until it is applied.
     pub async fn propose(
         &self,
         stage: StageId,
-        wanted: &NewProposal,
+        new: &NewProposal,
     ) -> anyhow::Result<ProposalView> {
         let request = self.request(Method::POST, &format!("/stages/{stage}/proposals"));
-        read(self.send(request.json(wanted)).await?).await
+        read_json(self.send(request.json(new)).await?).await
     }
 
-    /// Organiser: has what was played again count.
+    /// Organiser: applies a proposed re-evaluation.
     pub async fn apply_proposal(
         &self,
         id: ProposalId,
         confirm: Option<String>,
     ) -> anyhow::Result<ProposalView> {
         let request = self.request(Method::POST, &format!("/proposals/{id}/apply"));
-        read(self.send(request.json(&Confirmation { confirm })).await?).await
+        read_json(self.send(request.json(&Confirmation { confirm })).await?).await
     }
 
-    /// Organiser: has it never count.
+    /// Organiser: drops a proposed re-evaluation.
     pub async fn drop_proposal(
         &self,
         id: ProposalId,
         confirm: Option<String>,
     ) -> anyhow::Result<ProposalView> {
         let request = self.request(Method::POST, &format!("/proposals/{id}/drop"));
-        read(self.send(request.json(&Confirmation { confirm })).await?).await
+        read_json(self.send(request.json(&Confirmation { confirm })).await?).await
     }
 }

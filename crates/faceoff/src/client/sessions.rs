@@ -1,25 +1,25 @@
-//! Signing in by name and password, and out.
+//! Signing in with name and password, and signing out.
 
-use super::{Client, Unreachable, read};
+use super::{Client, Unreachable, read_json};
 use anyhow::{Context, anyhow};
 use faceoff_api::{
-    requests::{NewToken, SignIn},
+    requests::{NewToken, SignInRequest},
     views::token::NewTokenView,
 };
 use reqwest::{Method, header};
 
 impl Client {
-    /// A token of the person's who has this name and password. The session by which it is made ends at once.
+    /// Signs in with name and password, creates a token and ends the session.
     ///
     /// # Errors
-    /// If they do not belong together, or a person may make no token.
+    /// If name or password is wrong, or the user may not create tokens.
     pub async fn token_by_password(
         &self,
         name: &str,
         password: &str,
         new: &NewToken,
     ) -> anyhow::Result<String> {
-        let sign_in = SignIn {
+        let sign_in = SignInRequest {
             name: name.to_owned(),
             password: password.to_owned(),
         };
@@ -28,30 +28,30 @@ impl Client {
         let cookie = response.headers().get(header::SET_COOKIE);
         let cookie = cookie
             .and_then(|cookie| cookie.to_str().ok()?.split(';').next())
-            .ok_or_else(|| anyhow!("it has signed us in without a cookie"))
+            .ok_or_else(|| anyhow!("the server sent no session cookie"))
             .context(Unreachable("is it another version of Faceoff?".to_owned()))?
             .to_owned();
-        // A cookie comes from pages of the server, and so does this.
-        let as_page = |method, path: &str| {
+        // The server accepts a session cookie only from its own pages.
+        let browser_request = |method, path: &str| {
             self.request(method, path)
                 .header(header::COOKIE, &cookie)
                 .header("sec-fetch-site", "same-origin")
         };
-        let made = self.send(as_page(Method::POST, "/tokens").json(new)).await;
-        let made = match made {
-            Ok(response) => read::<NewTokenView>(response).await,
+        let created = self.send(browser_request(Method::POST, "/tokens").json(new)).await;
+        let created = match created {
+            Ok(response) => read_json::<NewTokenView>(response).await,
             Err(error) => Err(error),
         };
         let ended = self
-            .send(as_page(Method::DELETE, "/sessions/current"))
+            .send(browser_request(Method::DELETE, "/sessions/current"))
             .await;
-        let made = made?;
-        ended.context("ending the session by which the token was made")?;
-        Ok(made.secret)
+        let created = created?;
+        ended.context("ending the session that created the token")?;
+        Ok(created.secret)
     }
 
-    /// Revokes the token by which we call.
-    pub async fn end_token(&self) -> anyhow::Result<()> {
+    /// Revokes the client's own token.
+    pub async fn revoke_own_token(&self) -> anyhow::Result<()> {
         let request = self.request(Method::DELETE, "/sessions/current");
         self.send(request).await.map(drop)
     }

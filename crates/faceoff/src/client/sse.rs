@@ -1,22 +1,22 @@
-//! Server-sent events, as <https://html.spec.whatwg.org/multipage/server-sent-events.html> has them; of line ends only
-//! `\n` and `\r\n`, which is what servers send.
+//! Decoder of server-sent events, <https://html.spec.whatwg.org/multipage/server-sent-events.html>. It accepts `\n` and
+//! `\r\n` as line ends, but not a lone `\r`.
 
 use anyhow::{Result, bail};
 use futures::{Stream, StreamExt, stream};
 use std::collections::VecDeque;
 
-/// No event of ours is nearly as long; a server that sends more is none of ours.
+/// Far longer than any event of a Faceoff server.
 const LONGEST_EVENT_BYTES: usize = 1 << 20;
 
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct ServerEvent {
     pub name: String,
     pub data: String,
-    /// By which a stream can be resumed after it.
+    /// Resumes the stream after this event, as `Last-Event-ID`.
     pub id: Option<String>,
 }
 
-/// The events of a body that comes in pieces.
+/// Decodes a response body that arrives in pieces.
 pub fn events<B: AsRef<[u8]>>(
     pieces: impl Stream<Item = Result<B>>,
 ) -> impl Stream<Item = Result<ServerEvent>> {
@@ -39,7 +39,7 @@ pub fn events<B: AsRef<[u8]>>(
 
 #[derive(Debug, Default)]
 struct Decoder {
-    /// Of the last line, what has come.
+    /// The received beginning of the current line.
     line: Vec<u8>,
     event: ServerEvent,
     ready: VecDeque<ServerEvent>,
@@ -50,21 +50,21 @@ impl Decoder {
         for part in piece.split_inclusive(|byte| *byte == b'\n') {
             self.line.extend_from_slice(part);
             if self.line.len() + self.event.data.len() > LONGEST_EVENT_BYTES {
-                bail!("the server sends an event without end; is it another version of Faceoff?");
+                bail!("the server sent an event of more than 1 MiB; is it another version of Faceoff?");
             }
             if self.line.pop_if(|byte| *byte == b'\n').is_some() {
                 self.line.pop_if(|byte| *byte == b'\r');
                 let line = std::mem::take(&mut self.line);
-                self.take(&String::from_utf8_lossy(&line));
+                self.process_line(&String::from_utf8_lossy(&line));
             }
         }
         Ok(())
     }
 
-    fn take(&mut self, line: &str) {
+    fn process_line(&mut self, line: &str) {
         if line.is_empty() {
             let event = std::mem::take(&mut self.event);
-            // One without data is none.
+            // The standard drops events without data.
             if !event.data.is_empty() {
                 self.ready.push_back(event);
             }
@@ -81,7 +81,7 @@ impl Decoder {
                 }
                 self.event.data.push_str(value);
             }
-            // A comment that keeps the connection alive, or what is of no use here.
+            // Comments keep the connection alive; other fields are not needed.
             _ => {}
         }
     }
@@ -108,7 +108,7 @@ mod tests {
     }
 
     #[test]
-    fn events_are_the_same_wherever_the_pieces_are_cut() {
+    fn events_do_not_depend_on_the_piece_boundaries() {
         let text = "event: happening\nid: 1.17\ndata: {\"a\":\ndata: \"ü\"}\n\n: still there\n\nevent:over\r\ndata:x\r\n\r\n\
                     event: unfinished\ndata: lost\n";
         let expected = [
@@ -123,12 +123,12 @@ mod tests {
     }
 
     #[test]
-    fn an_event_without_end_is_refused() {
+    fn endless_event_is_refused() {
         let mut decoder = Decoder::default();
         let piece = vec![b'x'; 1 << 19];
         decoder.feed(&piece).unwrap();
         decoder.feed(&piece).unwrap();
         let error = decoder.feed(&piece).unwrap_err().to_string();
-        assert!(error.contains("without end"), "{error}");
+        assert!(error.contains("more than 1 MiB"), "{error}");
     }
 }

@@ -1,4 +1,4 @@
-//! The client against the real site on a loopback port.
+//! The client against a real server on a loopback port.
 
 use super::*;
 use faceoff_api::{
@@ -7,12 +7,12 @@ use faceoff_api::{
     views::{evaluation::EvaluationStatus, submission::SubmissionStatus},
 };
 use faceoff_http::{
-    Capacity, ConnectionLimits, HttpConfig, HttpLimits, LinkKey, Offer, RateLimits,
+    Capacity, ConnectionLimits, HttpConfig, HttpLimits, LinkKey, AgentResources, RateLimits,
 };
 use faceoff_metrics::{Metrics, Process};
-use faceoff_store::{Claimed, Store, Work};
+use faceoff_store::{ClaimedJob, Store, Job};
 use faceoff_types::{
-    Clock, DayDeadline, Profile, Ruleset, SmokeOutcome, StageRules, StageSettings, Standings, Task,
+    Clock, DayDeadline, Profile, Ruleset, ValidationOutcome, StageRules, StageSettings, CountingResult, Task,
     TimeLimits, Zone,
 };
 use indicatif::ProgressBar;
@@ -31,7 +31,7 @@ struct Site {
     folder: TempDir,
 }
 
-/// One moment for site and test: leases do not run out, and the day does not change, under a test.
+/// A fixed time for server and tests, so that no lease expires and the date does not change.
 fn now() -> Timestamp {
     "2026-03-01T10:00:00Z".parse().unwrap()
 }
@@ -70,8 +70,8 @@ async fn site(max_bundle_bytes: u64) -> Site {
             time: TimeLimits::default(),
             runtimes: ["native", "python3"].map(str::to_owned).to_vec(),
         },
-        offer: Offer::nothing(),
-        rates: RateLimits::default(),
+        agent_resources: AgentResources::none(),
+        rate_limits: RateLimits::default(),
         link_key: LinkKey::generate().unwrap(),
         metrics: Metrics::new("0.0.0"),
         process: Process::default,
@@ -103,7 +103,7 @@ fn bundle(site: &Site) -> std::path::PathBuf {
 }
 
 #[tokio::test]
-async fn a_folder_is_packed_uploaded_and_followed() {
+async fn submission_passes_from_upload_to_evaluation() {
     let site = site(1 << 20).await;
     site.organiser.health().await.unwrap();
     let team = site.organiser.create_team("Alpha").await.unwrap();
@@ -112,7 +112,7 @@ async fn a_folder_is_packed_uploaded_and_followed() {
     assert_eq!(uploaded.file_name, "my-agent.tar.gz");
     assert_eq!(uploaded.status, SubmissionStatus::Validating);
 
-    // What arrived is the folder.
+    // The stored bundle has the files of the folder.
     let stored = site.store.submission(uploaded.id).await.unwrap();
     let archive = site.folder.path().join("arrived.tar.gz");
     site.store
@@ -132,16 +132,16 @@ async fn a_folder_is_packed_uploaded_and_followed() {
     assert_eq!(files, ["agent.py", "agent.toml"]);
 
     let claimed = site.store.claim("slot 0", 60, now());
-    let Claimed { claim, work } = claimed.await.unwrap().expect("the smoke run is queued");
-    assert!(matches!(work, Work::Smoke { .. }), "{work:?}");
-    let outcome = SmokeOutcome::Valid {
+    let ClaimedJob { claim, job } = claimed.await.unwrap().expect("the validation run is queued");
+    assert!(matches!(job, Job::Validation { .. }), "{job:?}");
+    let outcome = ValidationOutcome::Valid {
         runtime: "native".into(),
         agent_name: "mine".into(),
         timing: Vec::new(),
         log: "hello".into(),
     };
     site.store
-        .commit_smoke(&claim, outcome, now())
+        .commit_validation(&claim, outcome, now())
         .await
         .unwrap();
     let valid = client.submission(uploaded.id).await.unwrap();
@@ -155,10 +155,10 @@ async fn a_folder_is_packed_uploaded_and_followed() {
     assert_eq!(client.activate(uploaded.id).await.unwrap(), valid);
     let me = client.me().await.unwrap();
     assert_eq!(me.active_submission, Some(uploaded.id));
-    let first_cut = me.next_cut.expect("the season is open");
+    let next_cutoff = me.next_cut.expect("the season is open");
     assert_eq!(
-        first_cut.to_string(),
-        "2026-03-01 (UTC) or later, when the organiser starts the day"
+        next_cutoff.to_string(),
+        "2026-03-01 (UTC) at the earliest, started by an organiser"
     );
 
     let day = site.organiser.start_day(None).await.unwrap();
@@ -191,19 +191,19 @@ async fn a_folder_is_packed_uploaded_and_followed() {
     assert!(!dataset.exists());
     let cancelled = site.organiser.cancel(id, "enough").await.unwrap();
     assert!(cancelled.status.is_final());
-    let again = site.organiser.start_day(None).await.unwrap_err();
-    assert!(again.to_string().contains("2026-03-02"), "{again}");
+    let refusal = site.organiser.start_day(None).await.unwrap_err();
+    assert!(refusal.to_string().contains("2026-03-02"), "{refusal}");
     let rerun = site.organiser.rerun(id).await.unwrap();
     assert_eq!((rerun.rerun_of, rerun.submission), (Some(id), uploaded.id));
 
-    // What arrived can be had again, takes room, and is not deleted while it plays.
-    let again = site.folder.path().join("again.tar.gz");
-    let bytes = client
-        .download_submission(uploaded.id, &again, &uploaded.blake3, &bar)
+    // The bundle can be downloaded, uses disk space, and cannot be deleted while it is active.
+    let copy = site.folder.path().join("copy.tar.gz");
+    let downloaded = client
+        .download_submission(uploaded.id, &copy, &uploaded.blake3, &bar)
         .await;
-    assert_eq!(bytes.unwrap().bytes, uploaded.bytes);
+    assert_eq!(downloaded.unwrap().bytes, uploaded.bytes);
     assert_eq!(
-        std::fs::read(&again).unwrap(),
+        std::fs::read(&copy).unwrap(),
         std::fs::read(&archive).unwrap()
     );
     let storage = client.team_storage(team.team.id).await.unwrap();
@@ -213,23 +213,23 @@ async fn a_folder_is_packed_uploaded_and_followed() {
     );
     let all = site.organiser.storage().await.unwrap();
     assert_eq!(all[0].proposal_bytes, Some(0));
-    let wanted = DeleteSubmission::default();
-    let refused = client.delete_submission(uploaded.id, &wanted).await;
-    let refused = refused.unwrap_err().to_string();
-    assert!(refused.contains("it is active"), "{refused}");
+    let deletion = DeleteSubmission::default();
+    let refusal = client.delete_submission(uploaded.id, &deletion).await;
+    let refusal = refusal.unwrap_err().to_string();
+    assert!(refusal.contains("it is active"), "{refusal}");
     let withdrawn = client.withdraw(uploaded.id).await.unwrap();
     assert!(!withdrawn.active);
     site.organiser.cancel(rerun.id, "enough").await.unwrap();
-    let wanted = DeleteSubmission {
+    let deletion = DeleteSubmission {
         confirm: Some(uploaded.file_name),
         ..DeleteSubmission::default()
     };
-    let deleted = client.delete_submission(uploaded.id, &wanted).await;
+    let deleted = client.delete_submission(uploaded.id, &deletion).await;
     assert!(deleted.unwrap().deleted.is_some());
 }
 
 #[tokio::test]
-async fn what_cannot_be_uploaded_is_said_before_it_is_sent() {
+async fn invalid_bundle_is_refused_before_the_upload() {
     let site = site(64).await;
     let team = site.organiser.create_team("Alpha").await.unwrap();
     let client = site.organiser.with_token(&team.token);
@@ -248,14 +248,14 @@ async fn what_cannot_be_uploaded_is_said_before_it_is_sent() {
 }
 
 #[tokio::test]
-async fn a_refusal_keeps_the_servers_words() {
+async fn api_error_keeps_status_and_detail() {
     let site = site(64).await;
     let stranger = site.organiser.with_token("fo_team_wrong");
     let error = stranger.me().await.unwrap_err();
     let refused = error.downcast_ref::<ApiError>().unwrap();
     assert_eq!(refused.status, StatusCode::UNAUTHORIZED);
     assert!(
-        error.to_string().contains("ask the organiser for one"),
+        error.to_string().contains("ask an organiser for one"),
         "{error}"
     );
     assert!(Client::new("ftp://127.0.0.1", None, None).is_err());
@@ -263,7 +263,7 @@ async fn a_refusal_keeps_the_servers_words() {
 }
 
 #[tokio::test]
-async fn a_season_is_closed_by_its_name() {
+async fn season_is_closed_only_with_its_name() {
     let site = site(64).await;
     let refused = site.organiser.close_season("Season").await.unwrap_err();
     assert!(refused.to_string().contains("Season 1"), "{refused}");
@@ -282,7 +282,7 @@ async fn a_season_is_closed_by_its_name() {
 }
 
 #[tokio::test]
-async fn a_stage_is_changed_by_what_is_said_and_by_nothing_else() {
+async fn stage_change_keeps_the_fields_it_leaves_out() {
     let site = site(64).await;
     let new = NewStage {
         name: "Final".into(),
@@ -305,27 +305,27 @@ async fn a_stage_is_changed_by_what_is_said_and_by_nothing_else() {
         episodes_per_shard: None,
         blind: Some(true),
         publishes: None,
-        standings: Some(Standings::MeanOfLast(3)),
+        standings: Some(CountingResult::MeanOfLast(3)),
         retention: serde_json::from_str(r#"{"last":3}"#).unwrap(),
     };
     let made = site.organiser.create_stage(&new).await.unwrap();
     assert_eq!(made.settings.schedule, new.schedule);
-    let nothing = StageChange::default();
+    let no_change = StageChange::default();
     let same = site
         .organiser
-        .change_stage(made.id, &nothing)
+        .change_stage(made.id, &no_change)
         .await
         .unwrap();
     assert_eq!(same, made);
-    // Null is said, and is not the same as nothing.
-    let neither = StageChange {
+    // An explicit null clears a field.
+    let cleared = StageChange {
         closes_at: Some(None),
         schedule: Some(None),
         ..StageChange::default()
     };
     let changed = site
         .organiser
-        .change_stage(made.id, &neither)
+        .change_stage(made.id, &cleared)
         .await
         .unwrap();
     assert_eq!((changed.closes_at, changed.settings.schedule), (None, None));

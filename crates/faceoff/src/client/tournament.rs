@@ -1,4 +1,4 @@
-//! What a client asks about tournaments.
+//! Requests about tournaments.
 
 use super::Client;
 use faceoff_api::{
@@ -7,7 +7,7 @@ use faceoff_api::{
         NewTestGames, NewTournament, Reason, TournamentChange,
     },
     views::{
-        certainty::CertaintyView,
+        champion_shares::ChampionSharesView,
         game::{GameView, TestGamesView},
         tournament::{RoundView, TournamentHead, TournamentView},
     },
@@ -17,43 +17,43 @@ use faceoff_types::{RoundNumber, TeamName, TournamentId};
 use reqwest::Method;
 
 impl Client {
-    /// All tournaments, the first one first.
+    /// All tournaments, the oldest first.
     pub async fn tournaments(&self) -> anyhow::Result<Vec<TournamentHead>> {
         self.get("/tournaments").await
     }
 
-    /// One, with rules, teams, rounds and tables.
+    /// One tournament, with rules, teams, rounds and standings.
     pub async fn tournament(&self, id: TournamentId) -> anyhow::Result<TournamentView> {
-        self.get(&of(id, "")).await
+        self.get(&tournament_path(id, "")).await
     }
 
-    /// The games of its rounds, or of one of them, in the order of play.
+    /// The games of all rounds or of one, in playing sequence.
     pub async fn games(
         &self,
         id: TournamentId,
         round: Option<RoundNumber>,
     ) -> anyhow::Result<Vec<GameView>> {
-        let request = self.request(Method::GET, &of(id, "/games"));
+        let request = self.request(Method::GET, &tournament_path(id, "/games"));
         self.list(request.query(&GamesQuery { round })).await
     }
 
-    /// Ratings of the submissions that played.
+    /// Ratings of the submissions.
     pub async fn ratings(&self, id: TournamentId) -> anyhow::Result<Ratings> {
-        self.get(&of(id, "/ratings")).await
+        self.get(&tournament_path(id, "/ratings")).await
     }
 
-    /// The record of each two teams that met.
+    /// The record of every pair of teams that have met.
     pub async fn head_to_head(&self, id: TournamentId) -> anyhow::Result<Vec<HeadToHead>> {
-        self.get(&of(id, "/head-to-head")).await
+        self.get(&tournament_path(id, "/head-to-head")).await
     }
 
-    /// Who was champion how often when the schedule was played again.
-    pub async fn certainty(&self, id: TournamentId) -> anyhow::Result<CertaintyView> {
-        self.get(&of(id, "/certainty")).await
+    /// How often each team won when the whole schedule was replayed.
+    pub async fn certainty(&self, id: TournamentId) -> anyhow::Result<ChampionSharesView> {
+        self.get(&tournament_path(id, "/certainty")).await
     }
 
     pub async fn open_tournament(&self, new: &NewTournament) -> anyhow::Result<TournamentView> {
-        self.tell(Method::POST, "/tournaments", new).await
+        self.call_with_body(Method::POST, "/tournaments", new).await
     }
 
     pub async fn change_tournament(
@@ -61,7 +61,7 @@ impl Client {
         id: TournamentId,
         change: &TournamentChange,
     ) -> anyhow::Result<TournamentView> {
-        self.tell(Method::PATCH, &of(id, ""), change).await
+        self.call_with_body(Method::PATCH, &tournament_path(id, ""), change).await
     }
 
     /// Organiser: enters teams.
@@ -70,17 +70,17 @@ impl Client {
         id: TournamentId,
         teams: Vec<TeamName>,
     ) -> anyhow::Result<TournamentView> {
-        let path = of(id, "/entrants");
-        self.tell(Method::POST, &path, &NewEntrants { teams }).await
+        let path = tournament_path(id, "/entrants");
+        self.call_with_body(Method::POST, &path, &NewEntrants { teams }).await
     }
 
-    /// Organiser: takes a team out.
+    /// Organiser: removes a team from a tournament.
     pub async fn depart(
         &self,
         id: TournamentId,
         departure: &NewDeparture,
     ) -> anyhow::Result<TournamentView> {
-        self.tell(Method::POST, &of(id, "/departures"), departure)
+        self.call_with_body(Method::POST, &tournament_path(id, "/departures"), departure)
             .await
     }
 
@@ -89,85 +89,85 @@ impl Client {
         id: TournamentId,
         decision: &Decision,
     ) -> anyhow::Result<TournamentView> {
-        self.tell(Method::POST, &of(id, "/withdrawal"), decision)
+        self.call_with_body(Method::POST, &tournament_path(id, "/withdrawal"), decision)
             .await
     }
 
     /// Organiser: draws the next round and starts it.
     pub async fn start_round(&self, id: TournamentId) -> anyhow::Result<RoundView> {
-        self.act(Method::POST, &of(id, "/rounds")).await
+        self.call(Method::POST, &tournament_path(id, "/rounds")).await
     }
 
-    /// Organiser: lets no game of it begin.
+    /// Organiser: pauses a tournament: no further game starts.
     pub async fn pause_tournament(
         &self,
         id: TournamentId,
         reason: String,
     ) -> anyhow::Result<TournamentView> {
-        self.tell(Method::POST, &of(id, "/pause"), &Reason { reason })
+        self.call_with_body(Method::POST, &tournament_path(id, "/pause"), &Reason { reason })
             .await
     }
 
-    /// Organiser: lets it go on.
+    
     pub async fn resume_tournament(&self, id: TournamentId) -> anyhow::Result<TournamentView> {
-        self.act(Method::POST, &of(id, "/resume")).await
+        self.call(Method::POST, &tournament_path(id, "/resume")).await
     }
 
-    /// Organiser: closes it for good; `confirm` is its name.
+    /// Organiser: closes a tournament permanently; `confirm` is its name.
     pub async fn close_tournament(
         &self,
         id: TournamentId,
         confirm: Option<String>,
     ) -> anyhow::Result<TournamentView> {
-        let path = of(id, "/close");
-        self.tell(Method::POST, &path, &Confirmation { confirm })
+        let path = tournament_path(id, "/close");
+        self.call_with_body(Method::POST, &path, &Confirmation { confirm })
             .await
     }
 
-    /// Team: has its agent play the baseline. Organiser: these teams' agents, or everybody's.
-    pub async fn order_test_games(
+    /// Team: requests a game of its agent against the baseline. Organiser: such games of `teams`, by default of all.
+    pub async fn request_test_games(
         &self,
         id: TournamentId,
         teams: Option<Vec<TeamName>>,
     ) -> anyhow::Result<TestGamesView> {
-        let path = of(id, "/test-games");
-        self.tell(Method::POST, &path, &NewTestGames { teams })
+        let path = tournament_path(id, "/test-games");
+        self.call_with_body(Method::POST, &path, &NewTestGames { teams })
             .await
     }
 
-    /// Team: plays another one without counting.
-    pub async fn order_friendly_game(
+    /// Team: requests a friendly game against another team.
+    pub async fn request_friendly_game(
         &self,
         id: TournamentId,
         opponent: TeamName,
     ) -> anyhow::Result<GameView> {
-        let path = of(id, "/friendly-games");
-        self.tell(Method::POST, &path, &NewFriendlyGame { opponent })
+        let path = tournament_path(id, "/friendly-games");
+        self.call_with_body(Method::POST, &path, &NewFriendlyGame { opponent })
             .await
     }
 
-    /// Team: its games that do not count, the newest first. Organiser: all.
-    pub async fn free_games(&self, id: TournamentId) -> anyhow::Result<Vec<GameView>> {
-        self.list(self.request(Method::GET, &of(id, "/free-games")))
+    /// Team: its friendly and test games, the newest first. Organiser: all of them.
+    pub async fn uncounted_games(&self, id: TournamentId) -> anyhow::Result<Vec<GameView>> {
+        self.list(self.request(Method::GET, &tournament_path(id, "/free-games")))
             .await
     }
 
-    /// Organiser: has the whole schedule played again so many times.
-    pub async fn order_replays(
+    /// Organiser: requests replays of the whole schedule.
+    pub async fn request_replays(
         &self,
         id: TournamentId,
         times: u32,
-    ) -> anyhow::Result<CertaintyView> {
-        let path = of(id, "/replays");
-        self.tell(Method::POST, &path, &NewReplays { times }).await
+    ) -> anyhow::Result<ChampionSharesView> {
+        let path = tournament_path(id, "/replays");
+        self.call_with_body(Method::POST, &path, &NewReplays { times }).await
     }
 
-    /// Organiser: calls off the replays that are not over.
-    pub async fn cancel_replays(&self, id: TournamentId) -> anyhow::Result<CertaintyView> {
-        self.act(Method::DELETE, &of(id, "/replays")).await
+    /// Organiser: cancels the unfinished replays.
+    pub async fn cancel_replays(&self, id: TournamentId) -> anyhow::Result<ChampionSharesView> {
+        self.call(Method::DELETE, &tournament_path(id, "/replays")).await
     }
 }
 
-fn of(id: TournamentId, what: &str) -> String {
-    format!("/tournaments/{id}{what}")
+fn tournament_path(id: TournamentId, suffix: &str) -> String {
+    format!("/tournaments/{id}{suffix}")
 }

@@ -1,10 +1,10 @@
 //! A team's submissions.
 
-use super::{Client, read};
+use super::{Client, read_json};
 use crate::packing::BundleFile;
 use anyhow::{Context, bail};
 use faceoff_api::{
-    requests::{OrderAblation, SubmissionChange},
+    requests::{NewAblation, SubmissionChange},
     views::{ablation::AblationView, submission::SubmissionView},
 };
 use faceoff_types::SubmissionId;
@@ -15,7 +15,7 @@ use std::path::Path;
 use tokio_util::io::ReaderStream;
 
 impl Client {
-    /// Team: uploads a bundle, an archive or a folder (packed on the way).
+    /// Team: uploads a bundle; a folder is packed first.
     pub async fn upload(&self, bundle: &Path) -> anyhow::Result<SubmissionView> {
         let path = bundle.to_owned();
         let bundle = tokio::task::spawn_blocking(move || BundleFile::open(&path))
@@ -24,7 +24,7 @@ impl Client {
         self.upload_with(&bundle, &ProgressBar::hidden()).await
     }
 
-    /// Team: uploads a bundle and shows how far it is.
+    /// Team: uploads a bundle and reports its progress.
     pub async fn upload_with(
         &self,
         bundle: &BundleFile,
@@ -34,8 +34,8 @@ impl Client {
         let limit = self.me().await?.max_bundle_bytes;
         if bytes > limit {
             bail!(
-                "the bundle has {bytes} bytes, the server takes at most {limit}; leave out what the \
-                 agent does not need to run"
+                "the bundle has {bytes} bytes, the server accepts at most {limit}; leave out files that the \
+                agent does not need"
             );
         }
         progress.set_length(bytes);
@@ -52,7 +52,7 @@ impl Client {
             .header(header::CONTENT_TYPE, "application/octet-stream")
             .header(header::CONTENT_LENGTH, bytes)
             .body(reqwest::Body::wrap_stream(stream));
-        read(self.send(request).await?).await
+        read_json(self.send(request).await?).await
     }
 
     /// Team or organiser: one submission.
@@ -65,20 +65,20 @@ impl Client {
         self.get(&format!("/submissions/{id}/ablation")).await
     }
 
-    /// Organiser: orders one.
-    pub async fn order_ablation(
+    /// Organiser: requests an ablation of a submission.
+    pub async fn request_ablation(
         &self,
         id: SubmissionId,
-        wanted: &OrderAblation,
+        request: &NewAblation,
     ) -> anyhow::Result<AblationView> {
         let path = format!("/submissions/{id}/ablation");
-        self.tell(Method::POST, &path, wanted).await
+        self.call_with_body(Method::POST, &path, request).await
     }
 
-    /// Team: chooses the submission that plays at the next cut.
+    /// Team: makes a submission active for the next cutoff.
     pub async fn activate(&self, id: SubmissionId) -> anyhow::Result<SubmissionView> {
         let request = self.request(Method::POST, &format!("/submissions/{id}/activate"));
-        read(self.send(request).await?).await
+        read_json(self.send(request).await?).await
     }
 
     /// Team: its submissions, newest first.
@@ -86,19 +86,19 @@ impl Client {
         self.list(self.request(Method::GET, "/submissions")).await
     }
 
-    /// Team: takes a submission back.
+    /// Team: withdraws its active submission.
     pub async fn withdraw(&self, id: SubmissionId) -> anyhow::Result<SubmissionView> {
         let request = self.request(Method::POST, &format!("/submissions/{id}/withdraw"));
-        read(self.send(request).await?).await
+        read_json(self.send(request).await?).await
     }
 
-    /// Team: changes what it says of a submission.
+    /// Team: changes the description of a submission.
     pub async fn describe(
         &self,
         id: SubmissionId,
         change: &SubmissionChange,
     ) -> anyhow::Result<SubmissionView> {
         let request = self.request(Method::PATCH, &format!("/submissions/{id}"));
-        read(self.send(request.json(change)).await?).await
+        read_json(self.send(request.json(change)).await?).await
     }
 }

@@ -1,4 +1,4 @@
-//! Programs that are told of what happens.
+//! Webhooks, which notify other programs of events.
 
 use super::Client;
 use faceoff_api::{
@@ -9,14 +9,14 @@ use faceoff_types::WebhookId;
 use reqwest::Method;
 
 impl Client {
-    /// Ours, or as an organiser all.
+    /// The team's webhooks; for an organiser, all.
     pub async fn webhooks(&self) -> anyhow::Result<Vec<WebhookView>> {
         self.get("/webhooks").await
     }
 
-    /// Makes one; its secret comes this once.
+    /// Creates a webhook; only this response has its secret.
     pub async fn create_webhook(&self, new: &NewWebhook) -> anyhow::Result<NewWebhookView> {
-        self.tell(Method::POST, "/webhooks", new).await
+        self.call_with_body(Method::POST, "/webhooks", new).await
     }
 
     pub async fn change_webhook(
@@ -24,29 +24,29 @@ impl Client {
         id: WebhookId,
         changes: &WebhookChanges,
     ) -> anyhow::Result<WebhookView> {
-        self.tell(Method::PATCH, &format!("/webhooks/{id}"), changes)
+        self.call_with_body(Method::PATCH, &format!("/webhooks/{id}"), changes)
             .await
     }
 
-    /// Gives one another secret, which comes this once.
+    /// Replaces the secret of a webhook; only this response has the new one.
     pub async fn rotate_webhook(&self, id: WebhookId) -> anyhow::Result<NewWebhookView> {
-        self.act(Method::POST, &format!("/webhooks/{id}/rotate"))
+        self.call(Method::POST, &format!("/webhooks/{id}/rotate"))
             .await
     }
 
-    /// Has one told something, to see whether it takes it.
+    /// Sends a test delivery.
     pub async fn test_webhook(&self, id: WebhookId) -> anyhow::Result<DeliveryView> {
-        self.act(Method::POST, &format!("/webhooks/{id}/test"))
+        self.call(Method::POST, &format!("/webhooks/{id}/test"))
             .await
     }
 
-    /// Has one told nothing more.
+    
     pub async fn remove_webhook(&self, id: WebhookId) -> anyhow::Result<()> {
         let request = self.request(Method::DELETE, &format!("/webhooks/{id}"));
         self.send(request).await.map(drop)
     }
 
-    /// What one was told of late, the newest first.
+    /// The latest deliveries, the newest first.
     pub async fn deliveries(&self, id: WebhookId) -> anyhow::Result<Vec<DeliveryView>> {
         self.get(&format!("/webhooks/{id}/deliveries")).await
     }

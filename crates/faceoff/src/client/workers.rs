@@ -1,4 +1,4 @@
-//! Who plays on other machines.
+//! Remote workers.
 
 use super::Client;
 use faceoff_api::{requests::Reason, views::workers::WorkersView};
@@ -6,18 +6,18 @@ use faceoff_store::WorkerName;
 use reqwest::Method;
 
 impl Client {
-    /// Organiser: who plays beside the server's own slots, and of whom nothing is taken.
+    /// Organiser: the remote workers and the bans.
     pub async fn workers(&self) -> anyhow::Result<WorkersView> {
         self.get("/workers").await
     }
 
-    /// Organiser: takes nothing of a worker any more.
+    /// Organiser: bans a worker.
     pub async fn ban_worker(&self, name: &WorkerName, reason: String) -> anyhow::Result<()> {
         let request = self.request(Method::POST, &format!("/workers/{name}/ban"));
         self.send(request.json(&Reason { reason })).await.map(drop)
     }
 
-    /// Organiser: takes a banned worker's work again.
+    /// Organiser: lifts the ban of a worker.
     pub async fn readmit_worker(&self, name: &WorkerName) -> anyhow::Result<()> {
         let request = self.request(Method::POST, &format!("/workers/{name}/readmit"));
         self.send(request).await.map(drop)

@@ -1,14 +1,14 @@
 use faceoff_api::views::ablation::{AblationStatus, AblationView};
 
-/// An ablation, in words.
-pub(super) fn ablation(view: &AblationView) -> String {
+/// Formats an ablation for people.
+pub(super) fn ablation_text(view: &AblationView) -> String {
     let mut lines = vec![format!(
-        "ablation of {}, {} episodes of each task and profile",
+        "ablation of {}, {} episodes per task and profile",
         view.submission, view.episodes_per_task
     )];
     match &view.status {
         AblationStatus::Open { progress } => lines.push(format!(
-            "{} of {} episodes are played",
+            "{} of {} episodes finished",
             progress.episodes_done, progress.episodes_total
         )),
         AblationStatus::Failed { reason, .. } => lines.push(format!("no result: {reason}")),
@@ -16,7 +16,7 @@ pub(super) fn ablation(view: &AblationView) -> String {
             for (task, effects) in tasks {
                 lines.extend(effects.iter().map(|effect| {
                     format!(
-                        "{task:<8} {:<17} {:>6.1} %, {:+.1} to ideal, p {:.4}, {:.1} penalty points",
+                        "{task:<8} {:<17} {:>6.1} %, {:+.1} against ideal, p {:.4}, {:.1} penalty points",
                         effect.profile.to_string(),
                         100.0 * effect.success_rate,
                         100.0 * effect.difference,

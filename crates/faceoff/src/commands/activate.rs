@@ -1,11 +1,11 @@
-//! `faceoff activate`: chooses which submission plays next.
+//! `faceoff activate`: makes a submission active.
 
-use super::{next_cut::next_cut, output::print, server::ServerArgs};
+use super::{next_cutoff::next_cutoff_text, output::print, server::ServerArgs};
 use clap::Args;
 use faceoff_types::SubmissionId;
 
-/// Makes one of the team's valid submissions the active one: it plays at the next cut, and at those after
-/// it, until a later upload turns valid.
+/// Makes one of the team's valid submissions active. It is evaluated at the next cutoff and at every later
+/// one, until a newer upload becomes valid or another submission is activated.
 #[derive(Debug, Args)]
 pub struct ActivateCommand {
     /// The submission's id, as `faceoff submit` printed it
@@ -15,7 +15,7 @@ pub struct ActivateCommand {
 }
 
 impl ActivateCommand {
-    /// Chooses it.
+    /// Activates the submission.
     ///
     /// # Errors
     /// If the server cannot be reached or refuses.
@@ -32,7 +32,7 @@ impl ActivateCommand {
                 "active: {} ({})\n{}",
                 active.file_name,
                 active.id,
-                next_cut(&me, active.id)
+                next_cutoff_text(&me, active.id)
             )
         })
     }

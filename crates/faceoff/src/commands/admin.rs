@@ -1,14 +1,14 @@
-//! `faceoff admin`: organises a running competition through its API.
+//! `faceoff admin`: the organisers' half of the API.
 
 mod day;
 mod export;
-mod find;
+mod team_lookup;
 mod lines;
-mod news;
+mod announcements;
 mod people;
-mod played;
+mod results;
 mod proposal;
-mod speaker;
+mod authentication;
 mod stage;
 mod storage;
 mod teams;
@@ -17,9 +17,9 @@ mod workers;
 
 use super::{
     ca_file::CaFile,
-    find_stage::find_stage,
-    output::{or_none, print},
-    season::of_season,
+    stage_lookup::find_stage,
+    output::{lines_or, print},
+    season::season_text,
     token::{self, TokenAction},
     webhook::{self, WebhookAction},
 };
@@ -31,17 +31,17 @@ use faceoff_api::{
 };
 use faceoff_types::{EvaluationId, QuestionId, StageDay};
 use jiff::civil::Date;
-use lines::line;
+use lines::evaluation_line;
 use serde_json::Value;
 use std::path::PathBuf;
 
-/// Organises a running competition.
+/// Runs a competition.
 #[derive(Debug, Args)]
 pub struct AdminCommand {
-    /// The server [default: that of faceoff login, or http://127.0.0.1:8080]
+    /// The server [default: the server of the last faceoff login, or http://127.0.0.1:8080]
     #[arg(long, global = true, value_name = "URL", env = "FACEOFF_SERVER")]
     server: Option<String>,
-    /// The organiser's token [default: the file admin-token in the data folder, or that of faceoff login]
+    /// An organiser's token [default: the file admin-token in the data folder, or the token of faceoff login]
     #[arg(
         long,
         global = true,
@@ -54,7 +54,7 @@ pub struct AdminCommand {
     data_dir: Option<PathBuf>,
     #[command(flatten)]
     ca: CaFile,
-    /// Print the server's answer as JSON
+    /// Print the server's response as JSON
     #[arg(long, global = true)]
     json: bool,
     #[command(subcommand)]
@@ -65,39 +65,39 @@ pub struct AdminCommand {
 enum Action {
     #[command(flatten)]
     Team(teams::TeamAction),
-    /// Invite and remove people, organisers and members of teams
+    /// Invite and remove users: organisers and team members
     People {
         #[command(subcommand)]
         action: people::PeopleAction,
     },
-    /// Let teams register, approve and refuse them, set the divisions
+    /// Open and close registration, approve and refuse teams, set the divisions
     Registration {
         #[command(subcommand)]
         action: people::RegistrationAction,
     },
-    /// Make, list, rotate and revoke tokens
+    /// Create, list, rotate and revoke tokens
     Token {
         #[command(subcommand)]
         action: TokenAction,
     },
-    /// Have programs told of what happens
+    /// Manage the organisers' webhooks, which notify other programs of events
     Webhook {
         #[command(subcommand)]
         action: WebhookAction,
     },
-    /// List, ban and readmit those who play on other machines
+    /// List, ban and readmit remote workers
     Worker {
         #[command(subcommand)]
         action: workers::WorkerAction,
     },
-    /// Tell everybody
+    /// Publish an announcement
     Announce {
         /// One line
         title: String,
         /// Plain text
         text: String,
     },
-    /// List what teams have asked
+    /// List the teams' questions
     Questions,
     /// Answer a question
     Answer {
@@ -105,18 +105,18 @@ enum Action {
         question: QuestionId,
         /// Plain text
         text: String,
-        /// Let everybody read question and answer; who asked stays with the organisers
+        /// Publish question and answer, without the name of the team
         #[arg(long)]
         public: bool,
     },
-    /// Publish other terms of taking part
+    /// Publish a new version of the terms of participation
     PublishTerms {
         /// A text file
         file: PathBuf,
     },
-    /// Start a stage's day: what each team has active now plays it. A day starts once
+    /// Start an evaluation day: the active submission of each team is evaluated. A day starts only once
     StartDay {
-        /// The stage's name or id [default: the one that is open]
+        /// The stage's name or id [default: the open stage]
         #[arg(long)]
         stage: Option<String>,
     },
@@ -125,69 +125,69 @@ enum Action {
     #[command(flatten)]
     Storage(storage::StorageAction),
     #[command(flatten)]
-    Played(played::PlayedAction),
-    /// Try a day without counting, or have results evaluated again, and apply or drop that
+    Result(results::ResultAction),
+    /// Run trials, which do not count, and propose, apply or drop re-evaluations
     Proposal {
         #[command(subcommand)]
         action: proposal::ProposalAction,
     },
-    /// Make, change or list the stages: their times, rules and schedules
+    /// Create, change and list stages: their times, rules and schedules
     Stage {
         #[command(subcommand)]
         action: stage::StageAction,
     },
-    /// Open, play and close tournaments: rounds of games between the teams' agents
+    /// Open, run and close tournaments: rounds of games between the teams' agents
     Tournament {
         #[command(subcommand)]
         action: Box<tournament::TournamentAction>,
     },
-    /// Play an evaluation again that was cancelled, voided or failed by the server's fault: same agent, same episodes
+    /// Repeat an evaluation that was cancelled, voided or failed by a platform fault: same agent, same episodes
     Rerun {
         /// The evaluation's id
         evaluation: EvaluationId,
     },
-    /// Stop an evaluation that is not over
+    /// Cancel an unfinished evaluation
     Cancel {
         /// The evaluation's id
         evaluation: EvaluationId,
         /// Shown to the team
         reason: String,
     },
-    /// Take a finished evaluation off the boards; without --confirm, say what that would do
+    /// Void a finished evaluation, which leaves the boards; without --confirm, only list the effects
     Void {
         /// The evaluation's id
         evaluation: EvaluationId,
-        /// Shown to everybody
+        /// Shown publicly
         reason: String,
         /// The team's name
         #[arg(long, value_name = "TEAM")]
         confirm: Option<String>,
     },
-    /// Take a whole day off the boards, and cancel what is under way; without --confirm, say what that would do
+    /// Void an evaluation day and cancel its unfinished evaluations; without --confirm, only list the effects
     VoidDay {
-        /// Its date
+        /// The date of the day
         day: Date,
-        /// Shown to everybody
+        /// Shown publicly
         reason: String,
         /// The stage's name or id
         #[arg(long)]
         stage: String,
-        /// The date again
+        /// The same date, as confirmation
         #[arg(long, value_name = "DATE")]
         confirm: Option<String>,
     },
-    /// Hold the queue: nothing is begun, what is begun is played to its end
+    /// Pause the queue: running jobs finish, no further job starts
     Pause {
-        /// Shown to everybody
+        /// Shown publicly
         reason: String,
     },
-    /// Let a paused queue go on
+    /// Resume a paused queue
     Resume,
-    /// Take the season along as one archive, which `faceoff import` shows read-only on another server
+    /// Download the season as one archive, which `faceoff import` shows read-only on another server
     Export {
-        /// The file to write, e.g. season.tar.zst; one that exists is left as it is
+        /// The file to write, e.g. season.tar.zst; an existing file is not overwritten
         file: PathBuf,
-        /// Only what everybody may know and have: no submissions, no people, nothing that is hidden
+        /// Only public data: no submissions, no users, nothing hidden
         #[arg(long)]
         public: bool,
     },
@@ -196,27 +196,29 @@ enum Action {
         #[command(subcommand)]
         action: SeasonAction,
     },
-    /// List what was changed, when and by whom, the newest first
+    /// List the log of changes with time and actor, the newest first
     Log {
-        /// Who: organiser (the host), person:ID, team:ID, visitor, schedule, worker:NAME or server; person, team, worker: all
+        /// Only by this actor: organiser (the host), person:ID, team:ID, visitor, schedule, worker:NAME or server;
+        /// without an id, person, team and worker match all of that kind
         #[arg(long)]
         actor: Option<String>,
-        /// About what: season, stage:ID, day:STAGE/DATE, team:ID, submission:ID, evaluation:ID, person:ID, proposal:ID …
+        /// Only about this subject: season, stage:ID, day:STAGE/DATE, team:ID, submission:ID, evaluation:ID,
+        /// person:ID, proposal:ID …
         #[arg(long)]
         subject: Option<String>,
-        /// What happened, e.g. day_started
+        /// Only events of this kind, e.g. day_started
         #[arg(long)]
         kind: Option<String>,
-        /// How many, 1 to 1000
+        /// Number of entries, 1 to 1000
         #[arg(long, default_value_t = 100)]
         limit: u32,
-        /// Only changes before the one with this number
+        /// Only entries before the one with this number
         #[arg(long, value_name = "NUMBER")]
         before: Option<i64>,
     },
     /// List the evaluations of a day with their progress
     Evaluations {
-        /// A date in the stages' zones, e.g. 2026-11-21 [default: today]
+        /// A date in the time zone of the stages, e.g. 2026-11-21 [default: today]
         #[arg(long)]
         day: Option<Date>,
     },
@@ -224,18 +226,18 @@ enum Action {
 
 #[derive(Debug, Subcommand)]
 enum SeasonAction {
-    /// Show name, commitment and state
+    /// Show the season's name, commitment and state
     Show,
-    /// Close the season for good: its secret becomes public, nothing more is uploaded or evaluated
+    /// Close the season permanently: its secret is published, uploads and evaluations end
     Close {
-        /// The season's name, since this cannot be undone
+        /// The season's name, as confirmation: this cannot be undone
         #[arg(long, value_name = "NAME")]
         confirm: Option<String>,
     },
 }
 
 impl AdminCommand {
-    /// Does what was asked.
+    /// Runs the chosen action.
     ///
     /// # Errors
     /// If there is no token, or the server cannot be reached or refuses.
@@ -244,7 +246,7 @@ impl AdminCommand {
     }
 
     async fn act(self) -> anyhow::Result<()> {
-        let client = speaker::client(
+        let client = authentication::admin_client(
             self.server.as_deref(),
             self.token.as_deref(),
             self.data_dir.as_deref(),
@@ -253,7 +255,7 @@ impl AdminCommand {
         match self.action {
             Action::Team(action) => teams::act(&client, self.json, action).await,
             Action::Storage(action) => storage::act(&client, self.json, action).await,
-            Action::Played(action) => played::act(&client, self.json, action).await,
+            Action::Result(action) => results::act(&client, self.json, action).await,
             Action::People { action } => people::people(&client, self.json, action).await,
             Action::Registration { action } => {
                 people::registrations(&client, self.json, action).await
@@ -262,15 +264,15 @@ impl AdminCommand {
             Action::Webhook { action } => webhook::act(&client, self.json, action).await,
             Action::Worker { action } => workers::act(&client, self.json, action).await,
             Action::Announce { title, text } => {
-                news::announce(&client, self.json, title, text).await
+                announcements::announce(&client, self.json, title, text).await
             }
-            Action::Questions => news::questions(&client, self.json).await,
+            Action::Questions => announcements::questions(&client, self.json).await,
             Action::Answer {
                 question,
                 text,
                 public,
-            } => news::answer(&client, self.json, question, text, public).await,
-            Action::PublishTerms { file } => news::publish_terms(&client, self.json, &file).await,
+            } => announcements::answer(&client, self.json, question, text, public).await,
+            Action::PublishTerms { file } => announcements::publish_terms(&client, self.json, &file).await,
             Action::Day(action) => day::act(&client, self.json, action).await,
             Action::Proposal { action } => proposal::act(&client, self.json, action).await,
             Action::Stage { action } => stage::act(&client, self.json, action).await,
@@ -282,27 +284,27 @@ impl AdminCommand {
                 };
                 let day = client.start_day(stage).await?;
                 print(self.json, &day, || {
-                    let mut lines = vec![format!("{}: {} started", day.day, day.created.len())];
-                    lines.extend(day.created.iter().map(line));
+                    let mut lines = vec![format!("{}: {} evaluations started", day.day, day.created.len())];
+                    lines.extend(day.created.iter().map(evaluation_line));
                     lines.extend(
                         day.without_submission
                             .iter()
                             .map(|team| format!("{:<40} no valid submission", team.name)),
                     );
-                    let not_taken = day.not_taken.iter();
+                    let exclusions = day.not_taken.iter();
                     lines.extend(
-                        not_taken.map(|one| format!("{:<40} {}", one.team_name, one.reason)),
+                        exclusions.map(|one| format!("{:<40} {}", one.team_name, one.reason)),
                     );
                     lines.join("\n")
                 })
             }
             Action::Rerun { evaluation } => {
                 let rerun = client.rerun(evaluation).await?;
-                print(self.json, &rerun, || line(&rerun))
+                print(self.json, &rerun, || evaluation_line(&rerun))
             }
             Action::Cancel { evaluation, reason } => {
                 let cancelled = client.cancel(evaluation, &reason).await?;
-                print(self.json, &cancelled, || line(&cancelled))
+                print(self.json, &cancelled, || evaluation_line(&cancelled))
             }
             Action::Void {
                 evaluation,
@@ -311,7 +313,7 @@ impl AdminCommand {
             } => {
                 let decision = Decision { reason, confirm };
                 let voided = client.void(evaluation, &decision).await?;
-                print(self.json, &voided, || line(&voided))
+                print(self.json, &voided, || evaluation_line(&voided))
             }
             Action::VoidDay {
                 day,
@@ -320,14 +322,14 @@ impl AdminCommand {
                 confirm,
             } => {
                 let stage = find_stage(&client, &stage).await?.id;
-                let of = StageDay { stage, date: day };
+                let stage_day = StageDay { stage, date: day };
                 let decision = Decision { reason, confirm };
-                let voided = client.void_day(of, &decision).await?;
+                let voided = client.void_day(stage_day, &decision).await?;
                 print(self.json, &voided, || {
                     voided
                         .created
                         .iter()
-                        .map(line)
+                        .map(evaluation_line)
                         .collect::<Vec<_>>()
                         .join("\n")
                 })
@@ -335,12 +337,12 @@ impl AdminCommand {
             Action::Pause { reason } => {
                 client.pause(&reason).await?;
                 let season = client.season().await?;
-                print(self.json, &season, || of_season(&season))
+                print(self.json, &season, || season_text(&season))
             }
             Action::Resume => {
                 client.resume().await?;
                 let season = client.season().await?;
-                print(self.json, &season, || of_season(&season))
+                print(self.json, &season, || season_text(&season))
             }
             Action::Export { file, public } => {
                 export::export(&client, self.json, &file, public).await
@@ -349,7 +351,7 @@ impl AdminCommand {
                 action: SeasonAction::Show,
             } => {
                 let season = client.season().await?;
-                print(self.json, &season, || of_season(&season))
+                print(self.json, &season, || season_text(&season))
             }
             Action::Season {
                 action: SeasonAction::Close { confirm },
@@ -357,14 +359,14 @@ impl AdminCommand {
                 let Some(confirm) = confirm else {
                     let season = client.season().await?;
                     bail!(
-                        "closing {:?} publishes its secret and ends uploads and evaluations; it cannot \
-                         be undone. To do it: faceoff admin season close --confirm {:?}",
+                        "closing {:?} publishes its secret and ends uploads and evaluations; this cannot \
+                        be undone. To close it, run: faceoff admin season close --confirm {:?}",
                         season.name,
                         season.name
                     );
                 };
                 let season = client.close_season(&confirm).await?;
-                print(self.json, &season, || of_season(&season))
+                print(self.json, &season, || season_text(&season))
             }
             Action::Log {
                 actor,
@@ -373,7 +375,7 @@ impl AdminCommand {
                 limit,
                 before,
             } => {
-                let wanted: Vec<(&str, String)> = [
+                let parameters: Vec<(&str, String)> = [
                     ("limit", Some(limit.to_string())),
                     ("actor", actor),
                     ("subject", subject),
@@ -383,28 +385,28 @@ impl AdminCommand {
                 .into_iter()
                 .filter_map(|(name, value)| Some((name, value?)))
                 .collect();
-                let found = client.events(&wanted).await?;
+                let found = client.events(&parameters).await?;
                 print(self.json, &found, || {
                     let mut lines: Vec<String> = found.events.iter().map(event_line).collect();
                     lines.extend(
                         found
                             .next_before
-                            .map(|number| format!("older ones: --before {number}")),
+                            .map(|number| format!("older entries: --before {number}")),
                     );
-                    or_none(lines, "nothing of that kind happened")
+                    lines_or(lines, "no matching entry")
                 })
             }
             Action::Evaluations { day } => {
                 let mut evaluations = client.evaluations(day).await?;
                 for evaluation in &mut evaluations {
-                    // a list leaves out the faults
+                    // Lists leave out the faults.
                     if let EvaluationStatus::AgentFailed { .. } = evaluation.status {
                         *evaluation = client.evaluation(evaluation.id).await?;
                     }
                 }
                 print(self.json, &evaluations, || {
-                    or_none(
-                        evaluations.iter().map(line).collect(),
+                    lines_or(
+                        evaluations.iter().map(evaluation_line).collect(),
                         "no evaluation on that day",
                     )
                 })
@@ -413,7 +415,7 @@ impl AdminCommand {
     }
 }
 
-/// Number, time, who, what, about what, and what else is known.
+/// Number, time, actor, kind, subject and details of a log entry.
 fn event_line(event: &EventView) -> String {
     let details: Vec<String> = event
         .details

@@ -1,4 +1,4 @@
-//! `faceoff backup`: a copy of a server's data folder, whole and checked, while the server goes on.
+//! `faceoff backup`: a complete, checked copy of a server's data folder, made while the server runs.
 
 pub mod files;
 pub mod manifest;
@@ -6,14 +6,14 @@ pub mod manifest;
 use super::{
     output::print,
     serve::ADMIN_TOKEN_FILE,
-    staging::{self, Kind, Staging},
+    atomic_folder::{self, AtomicFolder, FolderKind},
     storage::bytes,
 };
 use crate::config::Config;
 use anyhow::{Context, bail};
 use clap::Args;
-use faceoff_store::{Needed, Store, StoreError};
-use files::{Copied, copy_tree, copy_whole};
+use faceoff_store::{RequiredArtifact, Store, StoreError};
+use files::{CopiedFile, copy_file, copy_tree};
 use jiff::Timestamp;
 use manifest::{ARTIFACTS, DATABASE, MANIFEST, Manifest, Missing, Part};
 use std::{
@@ -22,42 +22,43 @@ use std::{
     path::{Path, PathBuf},
 };
 
-/// Copies everything that a server knows into a folder: the database with the season's secret, the artifacts, and the
-/// host's token. The server goes on meanwhile. The copy is there whole or not at all, for its owner alone, and checked:
-/// the database, and that what it names is there and has the hash that it should. Keep it as secret as the server.
+/// Copies all data of a server into a folder: the database with the season's secret, the artifacts and the host's
+/// token. The server keeps running. The copy is complete or absent, readable by its owner only, and checked: the
+/// database is intact, and every file it refers to exists with the recorded hash. Keep the copy as secret as the
+/// server itself.
 #[derive(Debug, Args)]
 pub struct BackupCommand {
-    /// The folder to make; one that exists must be empty
+    /// The folder to create; an existing folder must be empty
     folder: PathBuf,
-    /// Configuration file [default: faceoff.toml in the working folder, if there is one]
+    /// Configuration file [default: faceoff.toml in the working folder, if it exists]
     #[arg(long, value_name = "FILE", env = "FACEOFF_CONFIG")]
     config: Option<PathBuf>,
-    /// The server's data folder; replaces server.data_dir of the configuration
+    /// The server's data folder; overrides server.data_dir of the configuration
     #[arg(long, value_name = "FOLDER")]
     data_dir: Option<PathBuf>,
-    /// Print what was done as JSON
+    /// Print a summary as JSON
     #[arg(long)]
     json: bool,
 }
 
-const BACKUP: Kind = Kind {
+const BACKUP: FolderKind = FolderKind {
     name: "backup",
     suffix: "backing-up",
 };
 
 impl BackupCommand {
-    /// Makes the backup, and says what is in it.
+    /// Makes the backup and prints its summary.
     ///
     /// # Errors
-    /// If something cannot be read or written: then there is none. If the data folder lacks something that its database
-    /// names: then there is a backup of what there is.
+    /// If something cannot be read or written; no backup is made. If the data folder lacks files that the database
+    /// refers to; the backup then has all other files.
     pub fn run(self) -> anyhow::Result<()> {
         let data_dir = match self.data_dir {
             Some(folder) => folder,
             None => Config::load(self.config.as_deref())?.server.data_dir,
         };
         let manifest = back_up(&data_dir, &self.folder, Timestamp::now())?;
-        print(self.json, &manifest.told(&self.folder), || {
+        print(self.json, &manifest.summary(&self.folder), || {
             let mut text = format!(
                 "backed up {:?} to {}: {} files, {}",
                 manifest.season,
@@ -67,8 +68,8 @@ impl BackupCommand {
             );
             if manifest.missing.is_empty() {
                 text.push_str(&format!(
-                    "\nchecked: the database is whole, and all that it names is there as it was stored\n\
-                     to go back: faceoff restore {} --data FOLDER",
+                    "\nchecked: the database is intact, and all files it refers to are unchanged\n\
+                    to restore it: faceoff restore {} --data FOLDER",
                     self.folder.display()
                 ));
             }
@@ -81,61 +82,62 @@ impl BackupCommand {
             eprintln!("{missing}");
         }
         bail!(
-            "the backup is made, but {} of what the database names is not in {} as it was stored; what the backup holds \
-             can be restored",
+            "the backup is made, but {} files that the database refers to are missing or damaged in {}; all other files \
+            can be restored",
             manifest.missing.len(),
             data_dir.display()
         )
     }
 }
 
-/// Makes it: all of it or nothing.
+/// Makes a complete backup or none.
 fn back_up(data_dir: &Path, target: &Path, now: Timestamp) -> anyhow::Result<Manifest> {
-    staging::check_empty(
+    atomic_folder::check_empty(
         target,
-        "each backup has a folder of its own: name one that is empty or not there yet",
+        "each backup needs its own folder: name an empty or a new one",
     )?;
     let absolute = |path: &Path| {
         std::path::absolute(path).with_context(|| format!("looking for {}", path.display()))
     };
     if absolute(target)?.starts_with(absolute(data_dir)?) {
         bail!(
-            "{} is inside the data folder: a backup belongs elsewhere, best on another disk",
+            "{} is inside the data folder: choose another place for the backup, preferably another disk",
             target.display()
         );
     }
-    let staging = Staging::make(target, &BACKUP)?;
-    let folder = staging.content();
-    staging::private(&folder)?;
+    let new_folder = AtomicFolder::create(target, &BACKUP)?;
+    let folder = new_folder.content();
+    atomic_folder::create_private(&folder)?;
     let database = folder.join(DATABASE);
-    // First: what it names is written before it is named, and stays for a day after it is no longer needed.
+    // The database comes first: the server writes a file before the database refers to it, and keeps it for a day
+    // after.
     let checked = super::block_on(async {
         match Store::copy_database(data_dir, &database).await {
             Err(StoreError::NotFound(_)) => bail!(
-                "{} is no data folder of a server: there is no {DATABASE} in it; name it with --data-dir",
+                "{} is not the data folder of a server: it has no {DATABASE}; name the folder with --data-dir",
                 data_dir.display()
             ),
             copied => {
                 copied.with_context(|| format!("copying the database of {}", data_dir.display()))?
             }
         }
-        Store::check_database(&database, staging.scratch())
+        Store::check_database(&database, new_folder.scratch())
             .await
             .context("the copy of the database")
     })?;
-    let mut copied = BTreeMap::new();
-    copied.insert(DATABASE.to_owned(), files::settle(&database)?);
+    let mut files = BTreeMap::new();
+    files.insert(DATABASE.to_owned(), files::make_private(&database)?);
     let artifacts = folder.join(ARTIFACTS);
     copy_tree(
         &data_dir.join(ARTIFACTS),
         &artifacts,
         ARTIFACTS,
-        &mut copied,
+        &mut files,
     )?;
     let token = data_dir.join(ADMIN_TOKEN_FILE);
     if token.exists() {
-        let file = copy_whole(&token, &folder.join(ADMIN_TOKEN_FILE))?;
-        copied.insert(ADMIN_TOKEN_FILE.to_owned(), file);
+        let file = copy_file(&token, &folder.join(ADMIN_TOKEN_FILE))?;
+        files.insert(ADMIN_TOKEN_FILE.to_owned(), file);
     }
     let manifest = Manifest {
         format: manifest::FORMAT,
@@ -143,8 +145,8 @@ fn back_up(data_dir: &Path, target: &Path, now: Timestamp) -> anyhow::Result<Man
         schema: checked.schema,
         season: checked.season,
         made_at: now,
-        missing: missing(&checked.needed, &copied),
-        files: copied
+        missing: missing_files(&checked.needed, &files),
+        files: files
             .into_iter()
             .map(|(path, file)| Part {
                 path,
@@ -155,17 +157,17 @@ fn back_up(data_dir: &Path, target: &Path, now: Timestamp) -> anyhow::Result<Man
     };
     let json = serde_json::to_vec_pretty(&manifest).context("writing the manifest")?;
     files::write(&folder.join(MANIFEST), &json)?;
-    staging.settle(target, &[])?;
+    new_folder.commit(target, &[])?;
     Ok(manifest)
 }
 
-/// What the database names and the data folder does not have, or has otherwise.
-fn missing(needed: &[Needed], copied: &BTreeMap<String, Copied>) -> Vec<Missing> {
+/// Files that the database refers to and that are missing or damaged in the data folder.
+fn missing_files(needed: &[RequiredArtifact], copied: &BTreeMap<String, CopiedFile>) -> Vec<Missing> {
     let path = |key: &str| format!("{ARTIFACTS}/{key}");
     let mut missing = Vec::new();
-    for one in needed {
-        match one {
-            Needed::File { key, blake3 } => match (copied.get(&path(key)), blake3) {
+    for item in needed {
+        match item {
+            RequiredArtifact::File { key, blake3 } => match (copied.get(&path(key)), blake3) {
                 (None, _) => missing.push(Missing::Gone { path: path(key) }),
                 (Some(found), Some(blake3)) if found.blake3 != *blake3 => {
                     missing.push(Missing::Changed {
@@ -176,7 +178,7 @@ fn missing(needed: &[Needed], copied: &BTreeMap<String, Copied>) -> Vec<Missing>
                 }
                 (Some(_), _) => {}
             },
-            Needed::Folder { key } => {
+            RequiredArtifact::Folder { key } => {
                 let prefix = format!("{}/", path(key));
                 let first = copied.range(prefix.clone()..).next();
                 if !first.is_some_and(|(name, _)| name.starts_with(&prefix)) {
@@ -188,15 +190,15 @@ fn missing(needed: &[Needed], copied: &BTreeMap<String, Copied>) -> Vec<Missing>
     missing
 }
 
-/// The folder of a backup, as its manifest tells.
+/// Reads the manifest of a backup.
 ///
 /// # Errors
-/// If it is none, or of a later version.
+/// If the folder is no backup, or a backup of a later version.
 pub fn open(folder: &Path) -> anyhow::Result<Manifest> {
     let file = folder.join(MANIFEST);
     let text = fs::read(&file).with_context(|| {
         format!(
-            "{} is no backup that `faceoff backup` has made: reading {MANIFEST} in it",
+            "{} is not a backup made by `faceoff backup`: reading its {MANIFEST}",
             folder.display()
         )
     })?;

@@ -1,44 +1,44 @@
-//! `faceoff board`: who stands where.
+//! `faceoff board`: prints a board.
 
 pub(super) mod table;
 
-use super::{find_stage::find_stage, output::print, server::ServerArgs};
+use super::{stage_lookup::find_stage, output::print, server::ServerArgs};
 use clap::{Args, ValueEnum};
 use faceoff_api::requests::{BoardBy, BoardQuery};
 use faceoff_types::{DivisionName, Task};
 use jiff::civil::Date;
 
-/// Shows a board: the overall one, or that of one task.
+/// Shows a board: overall, or of one task.
 #[derive(Debug, Args)]
 pub struct BoardCommand {
-    /// hit, defend or prepare [default: all of them together]
+    /// hit, defend or prepare [default: overall]
     task: Option<Task>,
-    /// The stage's name or id [default: the one that is open, or the nearest]
+    /// The stage's name or id [default: the open stage, or the nearest]
     #[arg(long)]
     stage: Option<String>,
-    /// The teams of this division alone, ranked among themselves
+    /// Only the teams of this division, ranked among themselves
     #[arg(long)]
     division: Option<DivisionName>,
-    /// By which of the stage's rules [default: the newest with results]
+    /// Revision of the stage's rules [default: the newest with results]
     #[arg(long, value_name = "N")]
     revision: Option<u32>,
-    /// As it stood by the results of the days up to this one, as 2026-03-01
+    /// The board after this evaluation day, e.g. 2026-03-01
     #[arg(long, value_name = "DAY")]
     day: Option<Date>,
-    /// By each team's best result, or by its latest, whatever the stage counts in the end
+    /// Rank by each team's best or latest result instead of the stage's own rule
     #[arg(long)]
     by: Option<By>,
-    /// As an organiser: of a frozen board what it would show
+    /// For organisers: show the live results of a frozen board
     #[arg(long)]
     live: bool,
-    /// Print it as CSV, with a line of names: rates are fractions, the score is in percent
+    /// Print CSV with a header line; rates are fractions, the score is in percent
     #[arg(long, conflicts_with = "json")]
     csv: bool,
     #[command(flatten)]
     server: ServerArgs,
 }
 
-/// Which result of a team its row is.
+/// The result that ranks a team.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum By {
     Best,
@@ -46,7 +46,7 @@ enum By {
 }
 
 impl By {
-    const fn asked(self) -> BoardBy {
+    const fn to_api(self) -> BoardBy {
         match self {
             Self::Best => BoardBy::Best,
             Self::Latest => BoardBy::Latest,
@@ -55,32 +55,32 @@ impl By {
 }
 
 impl BoardCommand {
-    /// Asks the server.
+    /// Requests the board and prints it.
     ///
     /// # Errors
-    /// If it cannot be reached, or there is no such stage or division.
+    /// If the server cannot be reached, or has no such stage or division.
     pub fn run(self) -> anyhow::Result<()> {
         super::block_on(async {
-            let client = self.server.anybody()?;
+            let client = self.server.client_or_visitor()?;
             let stage = match &self.stage {
                 Some(stage) => Some(find_stage(&client, stage).await?.id),
                 None => None,
             };
-            let wanted = BoardQuery {
+            let query = BoardQuery {
                 stage,
                 revision: self.revision,
                 division: self.division,
                 day: self.day,
-                by: self.by.map(By::asked),
+                by: self.by.map(By::to_api),
                 live: self.live,
                 format: None,
             };
             if self.csv {
-                print!("{}", client.board_csv(self.task, &wanted).await?);
+                print!("{}", client.board_csv(self.task, &query).await?);
                 return Ok(());
             }
-            let board = client.board(self.task, &wanted).await?;
-            print(self.server.json, &board, || table::whole(&board))
+            let board = client.board(self.task, &query).await?;
+            print(self.server.json, &board, || table::board_text(&board))
         })
     }
 }

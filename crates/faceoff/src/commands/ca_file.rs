@@ -1,11 +1,11 @@
 use clap::Args;
 use std::path::{Path, PathBuf};
 
-/// Whom to believe that they are the server.
+/// The option for an additional certificate authority.
 #[derive(Debug, Args)]
 pub struct CaFile {
-    /// Also believe the certificate authorities of this file (PEM): for a server behind TLS whose certificate is its
-    /// organisers' own
+    /// Also trust the certificate authorities of this file (PEM), for a server whose certificate is signed by the
+    /// organisers' own authority
     #[arg(long, global = true, value_name = "FILE", env = "FACEOFF_CA_FILE")]
     ca_file: Option<PathBuf>,
 }

@@ -1,34 +1,34 @@
-//! `faceoff compare`: two evaluations on the same episodes, with the tests that say whether their
-//! difference is more than luck.
+//! `faceoff compare`: compares two evaluations on the same episodes and tests whether their difference is
+//! statistically significant.
 
 mod table;
 
-use super::{ca_file::CaFile, server::Found};
+use super::{ca_file::CaFile, server::Connection};
 use anyhow::Context;
 use clap::Args;
 use faceoff_api::requests::ComparisonQuery;
 use faceoff_dataset::Dataset;
-use faceoff_scoring::{Comparison, EpisodeSummary, Played, WhoSolved};
+use faceoff_scoring::{Comparison, EpisodeSummary, ComparedEvaluation, SolvedEpisodes};
 use faceoff_types::{EpisodeOutcome, EvaluationId, Profile, Task};
 use faceoff_wire::dataset::DatasetManifest;
 use serde::Serialize;
 use std::{collections::BTreeMap, path::Path};
 
-/// Compares two evaluations that played the same episodes: which of them each solved, McNemar's exact
-/// test, and the difference with its 95 % interval, by task and overall.
+/// Compares two evaluations on the same episodes: solved episodes, McNemar's exact test, and the difference
+/// with its 95 % interval, by task and overall.
 #[derive(Debug, Args)]
 pub struct CompareCommand {
-    /// A dataset.zip, an unpacked dataset, or the folder of `faceoff eval --out`; with --server the id
+    /// A dataset.zip, an unpacked dataset, or the folder of `faceoff eval --out`; with --server, the id
     /// of an evaluation
     a: String,
-    /// The same, of the other evaluation
+    /// The other evaluation, given in the same way
     b: String,
     /// Compare two evaluations of this server, by their ids
     #[arg(long, value_name = "URL")]
     server: Option<String>,
     #[command(flatten)]
     ca: CaFile,
-    /// Also list by task which episodes only A, only B, both and neither solved
+    /// Also list the episodes that only A, only B, both or neither solved, by task
     #[arg(long)]
     episodes: bool,
     /// Print JSON
@@ -46,7 +46,7 @@ struct LocalView<'a> {
     #[serde(flatten)]
     comparison: &'a Comparison,
     #[serde(skip_serializing_if = "Option::is_none")]
-    episodes: Option<BTreeMap<Task, WhoSolved>>,
+    episodes: Option<BTreeMap<Task, SolvedEpisodes>>,
 }
 
 #[derive(Serialize)]
@@ -59,23 +59,21 @@ impl CompareCommand {
     /// Compares and prints.
     ///
     /// # Errors
-    /// If an evaluation cannot be read, or the two did not play the same episodes; the error names the
-    /// field that differs.
+    /// If an evaluation cannot be read, or their episodes differ; the error names the field that differs.
     pub fn run(self) -> anyhow::Result<()> {
         match &self.server {
-            Some(server) => super::block_on(self.on_server(server)),
-            None => self.locally(),
+            Some(server) => super::block_on(self.compare_on_server(server)),
+            None => self.compare_files(),
         }
     }
 
-    fn locally(&self) -> anyhow::Result<()> {
+    fn compare_files(&self) -> anyhow::Result<()> {
         let (a, b) = (open(&self.a)?, open(&self.b)?);
-        let comparison = played(&a).compare(&played(&b)).context(
-            "the two did not play the same episodes; give both evaluations the same --seed, \
-             --mismatch-seed, --profile, --task and --episodes",
+        let comparison = comparison_input(&a).compare(&comparison_input(&b)).context(
+            "the two evaluations have different episodes; run both with the same --seed, --mismatch-seed, --profile, --task and --episodes",
         )?;
         let episodes = match self.episodes {
-            true => Some(played(&a).who_solved(&played(&b))?),
+            true => Some(comparison_input(&a).solved_episodes(&comparison_input(&b))?),
             false => None,
         };
         if self.json {
@@ -96,25 +94,25 @@ impl CompareCommand {
         }
         println!("A: {} ({})", a.manifest.agent, self.a);
         println!("B: {} ({})", b.manifest.agent, self.b);
-        print!("{}", table::of(&comparison));
+        print!("{}", table::comparison_table(&comparison));
         if let Some(episodes) = &episodes {
-            print!("{}", table::by_whom(episodes));
+            print!("{}", table::episode_lists(episodes));
         }
         Ok(())
     }
 
-    async fn on_server(&self, server: &str) -> anyhow::Result<()> {
+    async fn compare_on_server(&self, server: &str) -> anyhow::Result<()> {
         let id = |text: &str| -> anyhow::Result<EvaluationId> {
             text.parse().with_context(|| {
                 format!("{text:?}: expected the id of an evaluation, as with --server")
             })
         };
-        // Who has signed in there may compare what is not everybody's yet.
-        let client = Found::of(Some(server), None, self.ca.path())?.client()?;
-        let wanted = ComparisonQuery {
+        // With a login, results that are not public yet can be compared, too.
+        let client = Connection::resolve(Some(server), None, self.ca.path())?.client()?;
+        let query = ComparisonQuery {
             episodes: self.episodes,
         };
-        let view = client.compare(id(&self.a)?, id(&self.b)?, wanted).await?;
+        let view = client.compare(id(&self.a)?, id(&self.b)?, query).await?;
         if self.json {
             return print_json(&view);
         }
@@ -124,15 +122,15 @@ impl CompareCommand {
             tasks: view.tasks,
             overall: view.overall,
         };
-        print!("{}", table::of(&comparison));
+        print!("{}", table::comparison_table(&comparison));
         if let Some(episodes) = &view.episodes {
-            print!("{}", table::by_whom(episodes));
+            print!("{}", table::episode_lists(episodes));
         }
         Ok(())
     }
 }
 
-/// What a comparison needs of a dataset.
+/// The parts of a dataset that a comparison needs.
 struct Evaluation {
     manifest: DatasetManifest,
     summary: EpisodeSummary,
@@ -144,15 +142,15 @@ fn open(path: &str) -> anyhow::Result<Evaluation> {
         let episodes = dataset.episodes()?.into_iter();
         let outcomes: Vec<EpisodeOutcome> = episodes.map(|record| record.outcome).collect();
         Ok(Evaluation {
-            summary: EpisodeSummary::of(&outcomes, &dataset.manifest().variation.tier_bounds)?,
+            summary: EpisodeSummary::from_outcomes(&outcomes, &dataset.manifest().variation.tier_bounds)?,
             manifest: dataset.manifest().clone(),
         })
     };
     read().with_context(|| format!("reading the evaluation {path}"))
 }
 
-fn played(Evaluation { manifest, summary }: &Evaluation) -> Played<'_> {
-    Played {
+fn comparison_input(Evaluation { manifest, summary }: &Evaluation) -> ComparedEvaluation<'_> {
+    ComparedEvaluation {
         ruleset: &manifest.ruleset,
         profile: manifest.profile,
         variation: &manifest.variation,

@@ -1,11 +1,11 @@
-//! `faceoff completions`: what a shell needs to complete the commands.
+//! `faceoff completions`: prints completion scripts for shells.
 
 use anyhow::Context;
 use clap::{Args, Command};
 use clap_complete::Shell;
 use std::io::Write;
 
-/// Prints a script by which a shell completes commands and options. For bash: faceoff completions bash >
+/// Prints a script that completes commands and options in a shell. For bash: faceoff completions bash >
 /// ~/.local/share/bash-completion/completions/faceoff
 #[derive(Debug, Args)]
 pub struct CompletionsCommand {

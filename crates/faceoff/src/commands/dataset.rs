@@ -1,4 +1,4 @@
-//! `faceoff dataset`: looks into a dataset and cuts pieces out of it.
+//! `faceoff dataset`: downloads datasets and prints their content.
 
 pub(super) mod download;
 mod list;
@@ -7,7 +7,7 @@ mod slice;
 
 use clap::{Args, Subcommand};
 
-/// Looks into a dataset.
+/// Downloads datasets and prints their content.
 #[derive(Debug, Args)]
 pub struct DatasetCommand {
     #[command(subcommand)]
@@ -16,11 +16,11 @@ pub struct DatasetCommand {
 
 #[derive(Debug, Subcommand)]
 enum Action {
-    /// The episodes: how each ended and what it cost
+    /// List the episodes with their ends and penalty points
     List(list::ListArgs),
-    /// One episode's control steps as CSV or JSON lines
+    /// Print the control steps of an episode as CSV or JSON lines
     Slice(slice::SliceArgs),
-    /// Download the dataset of an evaluation; one that broke off goes on where it was
+    /// Download the dataset of an evaluation; an interrupted download is resumed
     Download(download::DownloadArgs),
     /// Moved to the Python package: python -m faceoff.dataset export
     #[command(hide = true)]
@@ -28,10 +28,10 @@ enum Action {
 }
 
 impl DatasetCommand {
-    /// Reads what it needs of the dataset: files that are read as a whole are compared with their hashes.
+    /// Runs the chosen action. Files that are read completely are compared with their hashes.
     ///
     /// # Errors
-    /// If it cannot be read, is damaged, or does not hold what was asked for.
+    /// If the dataset cannot be read, is damaged, or lacks the requested episode or column.
     pub fn run(self) -> anyhow::Result<()> {
         match self.action {
             Action::List(args) => args.run(),

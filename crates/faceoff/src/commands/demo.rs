@@ -1,7 +1,7 @@
-//! `faceoff demo`: a competition day from an empty folder to the board, through the public API.
+//! `faceoff demo`: runs an evaluation day from an empty folder to the board, through the public API.
 
 use crate::{
-    client::{Client, Downloaded},
+    client::{Client, DownloadedFile},
     commands::{board::table, output::print, verify},
 };
 use anyhow::{Context, bail, ensure};
@@ -28,55 +28,55 @@ use tokio::{
     process::{Child, Command},
 };
 
-/// How often the demo asks the server for news.
+/// Interval between requests for progress.
 const POLL: Duration = Duration::from_millis(200);
-/// How long the server may take to start. Its end is seen at once, so this is for one that hangs, and
-/// long enough for a busy machine.
+/// Time limit for the server's start. A server that ends is noticed at once, so the limit is only for one that hangs,
+/// and is long enough for a busy machine.
 const START_LIMIT: Duration = Duration::from_secs(600);
 
-/// Starts a server on an empty folder, creates a team per bundle, uploads the bundles, runs the day's
-/// evaluation, prints the board and downloads a dataset.
+/// Starts a server on an empty folder, creates a team per bundle, uploads the bundles, runs an evaluation
+/// day, prints the board and downloads a dataset.
 #[derive(Debug, Args)]
 pub struct DemoCommand {
-    /// Bundle to upload, a folder or an archive; one team each
+    /// A bundle to upload, a folder or an archive; each gets its own team
     #[arg(long = "bundle", required = true, value_name = "BUNDLE")]
     bundles: Vec<PathBuf>,
-    /// Episodes of each task
+    /// Episodes per task
     #[arg(long, default_value_t = 50, value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_EPISODES_PER_TASK)))]
     episodes: u32,
-    /// Address of the server; port 0 is any free one
+    /// Address of the server; port 0 chooses a free port
     #[arg(long, default_value = "127.0.0.1:8080")]
     listen: SocketAddr,
-    /// Folder for the demo's database and artifacts; the one of an earlier demo is replaced
+    /// Folder for the demo's database and artifacts; the folder of an earlier demo is replaced
     #[arg(long, default_value = "demo-data")]
     data_dir: PathBuf,
     /// Stop after the board instead of serving it until Ctrl-C
     #[arg(long)]
     no_serve: bool,
-    /// Print the board and what was downloaded as JSON, and the steps to standard error
+    /// Print the board and the download as JSON, and progress to standard error
     #[arg(long)]
     json: bool,
 }
 
-/// What is printed with `--json`.
+/// Output of `--json`.
 #[derive(Debug, Serialize)]
-struct Played<'a> {
-    /// Where the board is served, unless with `--no-serve`.
+struct DemoView<'a> {
+    /// URL of the board, which is not served with `--no-serve`.
     server: &'a str,
     data_dir: &'a Path,
     board: &'a BoardView,
-    dataset: &'a Downloaded,
+    dataset: &'a DownloadedFile,
 }
 
-/// Where the steps of the day are told.
+/// Prints the steps of the demo.
 #[derive(Debug, Clone, Copy)]
-struct Told {
-    beside_json: bool,
+struct Progress {
+    to_stderr: bool,
 }
 
-impl Told {
+impl Progress {
     fn step(self, line: fmt::Arguments<'_>) {
-        if self.beside_json {
+        if self.to_stderr {
             eprintln!("{line}");
         } else {
             println!("{line}");
@@ -85,32 +85,32 @@ impl Told {
 }
 
 impl DemoCommand {
-    /// Plays the day.
+    /// Runs the demo.
     ///
     /// # Errors
-    /// If any step of the day does not end as it should.
+    /// If a step fails.
     pub fn run(self) -> anyhow::Result<()> {
         tokio::runtime::Builder::new_multi_thread()
             .enable_all()
             .build()
             .context("starting the async runtime")?
-            .block_on(self.play())
+            .block_on(self.run_day())
     }
 
-    async fn play(self) -> anyhow::Result<()> {
-        // Before anything is removed: another server's port would make the demo talk to that server.
+    async fn run_day(self) -> anyhow::Result<()> {
+        // Checked before anything is removed: on another server's port, the demo would talk to that server.
         TcpListener::bind(self.listen).with_context(|| {
             format!(
                 "{} is in use; choose another with LISTEN=127.0.0.1:PORT",
                 self.listen
             )
         })?;
-        fresh_folder(&self.data_dir)?;
-        let told = Told {
-            beside_json: self.json,
+        prepare_folder(&self.data_dir)?;
+        let progress = Progress {
+            to_stderr: self.json,
         };
 
-        told.step(format_args!(
+        progress.step(format_args!(
             "1. starting the server on {}",
             self.data_dir.display()
         ));
@@ -124,7 +124,7 @@ impl DemoCommand {
             )
         })?;
 
-        told.step(format_args!(
+        progress.step(format_args!(
             "2. creating {} teams and uploading their agents",
             self.bundles.len()
         ));
@@ -137,11 +137,11 @@ impl DemoCommand {
             teams.push((name, client, submission));
         }
         for (name, client, submission) in &teams {
-            let verdict = validated(client, submission).await?;
-            told.step(format_args!("   {name}: {verdict}"));
+            let verdict = wait_for_validation(client, submission).await?;
+            progress.step(format_args!("   {name}: {verdict}"));
         }
 
-        told.step(format_args!(
+        progress.step(format_args!(
             "3. evaluating: hit, defend, prepare × {} episodes",
             self.episodes
         ));
@@ -152,9 +152,9 @@ impl DemoCommand {
             day.created.len(),
             teams.len()
         );
-        let evaluations = follow(&organiser, &day.created).await?;
+        let evaluations = wait_for_evaluations(&organiser, &day.created).await?;
 
-        told.step(format_args!("4. the board\n"));
+        progress.step(format_args!("4. the board\n"));
         let board = organiser.board(None, &BoardQuery::default()).await?;
         ensure!(
             board.rows.len() == evaluations.len(),
@@ -162,7 +162,7 @@ impl DemoCommand {
             evaluations.len(),
             board.rows.len()
         );
-        told.step(format_args!("{}", table::render(&board)));
+        progress.step(format_args!("{}", table::board_table(&board)));
 
         let (name, client, _) = &teams[0];
         let own = evaluations
@@ -170,45 +170,45 @@ impl DemoCommand {
             .find(|evaluation| evaluation.team_name.as_str() == name)
             .context("the first team has no evaluation")?;
         let dataset = self.data_dir.join(format!("{name}-dataset.zip"));
-        let nobody = ProgressBar::hidden();
+        let hidden_bar = ProgressBar::hidden();
         let done = client
-            .download_dataset(own.id, &dataset, None, &nobody)
+            .download_dataset(own.id, &dataset, None, &hidden_bar)
             .await?;
         let bytes = done.bytes;
         ensure!(bytes > 0, "the dataset of {name} is empty");
-        told.step(format_args!(
+        progress.step(format_args!(
             "5. dataset of {name}: {} ({:.1} MB)",
             dataset.display(),
             bytes as f64 / 1e6
         ));
 
-        let verifying = tokio::task::spawn_blocking(move || verify::verified_line(&dataset));
-        let verified = verifying.await.context("verifying the dataset")?;
-        told.step(format_args!(
+        let verification = tokio::task::spawn_blocking(move || verify::verified_line(&dataset));
+        let verified = verification.await.context("verifying the dataset")?;
+        progress.step(format_args!(
             "   {}",
-            verified.context("the dataset is not verified")?
+            verified.context("verifying the dataset")?
         ));
 
         if self.json {
-            let played = Played {
+            let view = DemoView {
                 server: &server.url,
                 data_dir: &self.data_dir,
                 board: &board,
                 dataset: &done,
             };
-            print(true, &played, String::new)?;
+            print(true, &view, String::new)?;
         }
         if self.no_serve {
             return server.stop().await;
         }
-        told.step(format_args!(
-            "\nThe same board: {}/   (Ctrl-C ends the server)",
+        progress.step(format_args!(
+            "\nThe same board: {}/   (Ctrl-C stops the server)",
             server.url
         ));
         tokio::select! {
             stopped = tokio::signal::ctrl_c() => stopped.context("waiting for Ctrl-C")?,
             ended = server.child.wait() => bail!(
-                "the server ended by itself ({}); its log is {}",
+                "the server ended unexpectedly ({}); its log is {}",
                 ended.context("waiting for the server")?,
                 log.display()
             ),
@@ -217,7 +217,7 @@ impl DemoCommand {
     }
 }
 
-/// The last lines of a log, as a beginner needs them.
+/// The last lines of a log.
 fn tail(log: &Path) -> String {
     const LINES: usize = 12;
     let text = std::fs::read_to_string(log).unwrap_or_default();
@@ -225,9 +225,9 @@ fn tail(log: &Path) -> String {
     lines[lines.len().saturating_sub(LINES)..].join("\n")
 }
 
-/// Empties the folder of an earlier demo; refuses one that holds something else.
-fn fresh_folder(folder: &Path) -> anyhow::Result<()> {
-    /// Marks a folder as one that a demo may replace.
+/// Creates the folder, or empties that of an earlier demo; refuses a folder with other content.
+fn prepare_folder(folder: &Path) -> anyhow::Result<()> {
+    /// Marks a folder that a demo may replace.
     const MARK: &str = ".faceoff-demo";
     if folder.exists() {
         let empty = folder
@@ -243,12 +243,12 @@ fn fresh_folder(folder: &Path) -> anyhow::Result<()> {
         std::fs::remove_dir_all(folder)
             .with_context(|| format!("removing {}", folder.display()))?;
     }
-    std::fs::create_dir_all(folder).with_context(|| format!("making {}", folder.display()))?;
+    std::fs::create_dir_all(folder).with_context(|| format!("creating {}", folder.display()))?;
     std::fs::write(folder.join(MARK), "")
         .with_context(|| format!("writing to {}", folder.display()))
 }
 
-/// The bundle's folder or file name without its ending.
+/// The bundle's folder or file name without its extension.
 fn team_name(bundle: &Path) -> anyhow::Result<String> {
     let name = bundle
         .canonicalize()
@@ -257,16 +257,16 @@ fn team_name(bundle: &Path) -> anyhow::Result<String> {
     Ok(name.split('.').next().unwrap_or_default().to_owned())
 }
 
-/// The server as a process of its own, as an organiser would run it.
+/// The server as a separate process, as an organiser would run it.
 struct Server {
     child: Child,
-    /// Known once it is [`ready`](Self::ready).
+    /// Empty until [`ready`](Self::ready) returns.
     url: String,
     data_dir: PathBuf,
 }
 
 impl Server {
-    /// By a configuration of its own, which says nothing but how many episodes a day has.
+    /// Starts the server with a configuration that only sets the number of episodes.
     fn start(
         listen: SocketAddr,
         data_dir: &Path,
@@ -278,7 +278,7 @@ impl Server {
         std::fs::write(&config, text).with_context(|| format!("writing {}", config.display()))?;
         let program = std::env::current_exe().context("finding this program")?;
         let log =
-            std::fs::File::create(log).with_context(|| format!("making {}", log.display()))?;
+            std::fs::File::create(log).with_context(|| format!("creating {}", log.display()))?;
         let mut command = Command::new(program);
         command
             .arg("serve")
@@ -291,7 +291,7 @@ impl Server {
             .stdin(Stdio::null())
             .stdout(Stdio::piped())
             .stderr(log)
-            // A demo that fails half way leaves no server behind.
+            // A failed demo leaves no server behind.
             .kill_on_drop(true);
         let child = command.spawn().context("starting the server")?;
         Ok(Self {
@@ -301,17 +301,17 @@ impl Server {
         })
     }
 
-    /// Waits until the server tells its address; returns the organiser's client.
+    /// Waits until the server prints its address; returns the organiser's client.
     async fn ready(&mut self) -> anyhow::Result<Client> {
         let stdout = self
             .child
             .stdout
             .take()
             .context("its output is not piped")?;
-        let mut told = BufReader::new(stdout).lines();
-        let url = tokio::time::timeout(START_LIMIT, told.next_line())
+        let mut output = BufReader::new(stdout).lines();
+        let url = tokio::time::timeout(START_LIMIT, output.next_line())
             .await
-            .with_context(|| format!("no word from it in {START_LIMIT:?}"))?
+            .with_context(|| format!("it did not start within {START_LIMIT:?}"))?
             .context("reading its address")?;
         let Some(url) = url else {
             bail!(
@@ -327,12 +327,12 @@ impl Server {
         Ok(visitor.with_token(token.trim()))
     }
 
-    /// Asks the server to end and waits for it.
+    /// Terminates the server and waits for its end.
     async fn stop(mut self) -> anyhow::Result<()> {
         if let Some(id) = self.child.id().and_then(|id| i32::try_from(id).ok())
             && let Some(id) = rustix::process::Pid::from_raw(id)
         {
-            // Gone already is fine: it is reaped below either way.
+            // If the process has already ended, it is still reaped below.
             let _ = rustix::process::kill_process(id, rustix::process::Signal::TERM);
         }
         let status = self
@@ -345,15 +345,15 @@ impl Server {
     }
 }
 
-/// Waits for the verdict of an upload; an error if the agent is not valid.
-async fn validated(client: &Client, submission: &SubmissionView) -> anyhow::Result<String> {
+/// Waits for the validation of a submission; an error if the agent is not valid.
+async fn wait_for_validation(client: &Client, submission: &SubmissionView) -> anyhow::Result<String> {
     loop {
         let current = client.submission(submission.id).await?;
         match current.status {
             SubmissionStatus::Validating => tokio::time::sleep(POLL).await,
             SubmissionStatus::Valid { .. } => {
                 let agent = current.agent_name.unwrap_or_default();
-                return Ok(format!("agent “{agent}” starts, answers and keeps time"));
+                return Ok(format!("agent “{agent}” starts, responds and meets the time limits"));
             }
             SubmissionStatus::Invalid { reason, log } => {
                 let log = log.unwrap_or_default();
@@ -367,7 +367,7 @@ async fn validated(client: &Client, submission: &SubmissionView) -> anyhow::Resu
 }
 
 /// Shows progress until all evaluations have ended; an error if one did not finish.
-async fn follow(
+async fn wait_for_evaluations(
     organiser: &Client,
     created: &[EvaluationView],
 ) -> anyhow::Result<Vec<EvaluationView>> {
@@ -404,12 +404,12 @@ async fn follow(
         }
         tokio::time::sleep(POLL).await;
     }
-    // The last one's end released the day: all of it is told now.
+    // The end of the last evaluation has released the day.
     ensure!(
         ended
             .iter()
             .any(|evaluation| evaluation.released_at.is_some()),
-        "every evaluation has ended, and the day is not released"
+        "every evaluation has ended, but the day is not released"
     );
     Ok(ended)
 }

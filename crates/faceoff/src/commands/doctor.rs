@@ -1,37 +1,37 @@
-//! `faceoff doctor`: what this host offers to agents and their sandbox, what is missing, and the cure.
+//! `faceoff doctor`: checks what a host offers to agents and their sandbox, and how to fix what is missing.
 
-mod checked;
-mod elsewhere;
+mod check;
+mod worker_admission;
 mod permissions;
-mod printed;
-mod times;
+mod report;
+mod clock;
 
 use crate::{
     config::{Config, RuntimeConfig},
     descriptors::Descriptors,
 };
 use anyhow::{Context as _, bail};
-use checked::Checked;
+use check::Check;
 use clap::Args;
-use faceoff_runner::inventory;
+use faceoff_runner::take_inventory;
 use faceoff_sandbox::{
-    HostFeature, Isolation, Layer, MEMORY, MemoryImage, NoImage, Runtime, probe_host,
+    HostFeature, Isolation, Layer, MEMORY, MemoryImage, MemoryImageError, Runtime, probe_host,
 };
-use faceoff_store::Room;
+use faceoff_store::FreeSpace;
 use faceoff_types::{RuntimeContent, RuntimeInventory};
 use serde::Serialize;
 use std::{io::Write as _, path::PathBuf};
 
-/// Checks what this host offers and what is missing.
+/// Checks whether this host can run agents, and how to fix what is missing.
 #[derive(Debug, Args)]
 pub struct DoctorCommand {
-    /// Configuration file [default: faceoff.toml in the working folder, if there is one]
+    /// Configuration file [default: faceoff.toml in the working folder, if it exists]
     #[arg(long, value_name = "FILE", env = "FACEOFF_CONFIG")]
     config: Option<PathBuf>,
-    /// Where NATS is, to ask whether a worker of this host would get work; replaces nats.url of the configuration
+    /// NATS server, to check whether a worker on this host would get jobs; overrides nats.url of the configuration
     #[arg(long, value_name = "URL")]
     nats: Option<String>,
-    /// What that worker would be called [default: the host's name]
+    /// Name of that worker [default: the host's name]
     #[arg(long)]
     name: Option<String>,
     /// Print one JSON object instead of a table
@@ -39,56 +39,55 @@ pub struct DoctorCommand {
     json: bool,
 }
 
-/// Packages that are worth a word.
+/// Packages whose versions are shown.
 const KNOWN_PACKAGES: [&str; 4] = ["numpy", "scipy", "onnxruntime", "torch"];
 
-/// Everything that was found.
 #[derive(Debug, Serialize)]
 struct Findings {
-    /// Can agents run here, with what the configuration gives up given up?
+    /// Agents can run on this host: every layer is available or given up by the configuration.
     ok: bool,
-    features: Vec<Feature>,
-    runtimes: Vec<RuntimeFound>,
-    in_memory: InMemory,
-    cpus: Cpus,
-    descriptors: DescriptorsFound,
-    disks: Vec<DiskFound>,
-    host: Vec<Checked>,
-    /// Would a worker of this host get work? Empty where no NATS is named.
+    features: Vec<LayerReport>,
+    runtimes: Vec<RuntimeReport>,
+    in_memory: MemoryReport,
+    cpus: CpuReport,
+    descriptors: DescriptorReport,
+    disks: Vec<DiskReport>,
+    host: Vec<Check>,
+    /// Whether a worker on this host would get jobs; empty if no NATS server is configured.
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    nats: Vec<Checked>,
+    nats: Vec<Check>,
 }
 
 /// The disk of a folder that `serve` writes to.
 #[derive(Debug, Serialize)]
-struct DiskFound {
-    /// As configured; it need not exist yet.
+struct DiskReport {
+    /// As configured; it may not exist yet.
     folder: PathBuf,
-    /// `None`: the disk cannot be asked.
+    /// `None`: the disk cannot be queried.
     free_bytes: Option<u64>,
     found: String,
     cure: Option<String>,
 }
 
-/// How `serve` would divide the descriptors that it gets from this shell.
+/// How `serve` would divide the file descriptors of this shell.
 #[derive(Debug, Serialize)]
-struct DescriptorsFound {
-    /// `None`: too few.
+struct DescriptorReport {
+    /// `None`: there are too few.
     divided: Option<Descriptors>,
     found: String,
     cure: Option<String>,
 }
 
-/// Will the runtimes' files be kept in memory, where they tell no agent what another has read?
+/// Whether the runtimes' files are held in memory, where their timing does not reveal what other agents have read.
 #[derive(Debug, Serialize)]
-struct InMemory {
+struct MemoryReport {
     available: bool,
     found: String,
     cure: Option<String>,
 }
 
 #[derive(Debug, Serialize)]
-struct Feature {
+struct LayerReport {
     #[serde(flatten)]
     host: HostFeature,
     /// Named in `[sandbox] given_up`.
@@ -96,7 +95,7 @@ struct Feature {
 }
 
 #[derive(Debug, Serialize)]
-struct RuntimeFound {
+struct RuntimeReport {
     name: String,
     available: bool,
     found: String,
@@ -104,28 +103,28 @@ struct RuntimeFound {
 }
 
 #[derive(Debug, Serialize)]
-struct Cpus {
+struct CpuReport {
     /// CPUs this process may use.
     usable: usize,
-    /// Worker slots, as configured or by the number of CPUs.
+    /// Worker slots, configured or derived from the number of CPUs.
     slots: usize,
-    /// CPUs that agents are bound to; empty = all.
+    /// CPUs that agents are bound to; empty: all.
     agent_cpus: Vec<usize>,
-    /// What keeps computation times from being fair, if anything.
+    /// A reason why computation times may be unfair.
     advice: Option<String>,
 }
 
 impl DoctorCommand {
-    /// Probes the host and prints what was found.
+    /// Probes the host and prints the findings.
     ///
     /// # Errors
-    /// If a layer of the sandbox is missing that the configuration does not give up; if the
-    /// configuration cannot be read.
+    /// If a layer of the sandbox is missing that the configuration does not give up, or the configuration cannot be
+    /// read.
     pub fn run(self) -> anyhow::Result<()> {
         let mut config = Config::load(self.config.as_deref())?;
-        config.reach_nats(self.nats)?;
+        config.override_nats_url(self.nats)?;
         let mut findings = Findings::gather(&config);
-        findings.nats = elsewhere::ask(&config, self.name)?;
+        findings.nats = worker_admission::check(&config, self.name)?;
         let mut out = std::io::stdout().lock();
         if self.json {
             serde_json::to_writer_pretty(&mut out, &findings).context("standard output")?;
@@ -136,8 +135,8 @@ impl DoctorCommand {
         let missing: Vec<_> = missing(&findings.features).map(Layer::as_str).collect();
         if !missing.is_empty() {
             bail!(
-                "agents cannot run here: {} missing; see the cures above, or name what you do without \
-                 in the configuration: [sandbox] given_up = {missing:?}",
+                "agents cannot run on this host: {} missing; apply the fixes above, or give the layers up \
+                in the configuration: [sandbox] given_up = {missing:?}",
                 missing.join(", ")
             );
         }
@@ -150,7 +149,7 @@ impl Findings {
         let given_up = &config.sandbox.given_up;
         let features: Vec<_> = probe_host()
             .into_iter()
-            .map(|host| Feature {
+            .map(|host| LayerReport {
                 given_up: given_up.contains(&host.layer),
                 host,
             })
@@ -170,64 +169,64 @@ impl Findings {
     }
 }
 
-/// Layers that are neither there nor given up.
-fn missing(features: &[Feature]) -> impl Iterator<Item = Layer> {
+/// Layers that are neither available nor given up.
+fn missing(features: &[LayerReport]) -> impl Iterator<Item = Layer> {
     features
         .iter()
         .filter(|feature| !feature.host.available && !feature.given_up)
         .map(|feature| feature.host.layer)
 }
 
-/// Each is asked inside the sandbox, as far as this host has one.
-fn runtimes(config: &Config, features: &[Feature]) -> Vec<RuntimeFound> {
+/// Inspects each runtime inside the sandbox, with the layers that this host has.
+fn runtimes(config: &Config, features: &[LayerReport]) -> Vec<RuntimeReport> {
     let mut env = config.agent_environment();
     let lacking = features.iter().filter(|feature| !feature.host.available);
     env.isolation = Isolation::Sandboxed {
         given_up: lacking.map(|feature| feature.host.layer).collect(),
     };
-    let mut found: Vec<_> = inventory(&env)
+    let mut found: Vec<_> = take_inventory(&env)
         .into_iter()
-        .map(|RuntimeInventory { name, content }| RuntimeFound {
-            available: !matches!(content, RuntimeContent::Broken { .. }),
+        .map(|RuntimeInventory { name, content }| RuntimeReport {
+            available: !matches!(content, RuntimeContent::Failed { .. }),
             found: describe(&content, env.runtimes.get(&name)),
             cure: cure(config, &name, &content),
             name,
         })
         .collect();
     if !env.runtimes.contains_key("python3") {
-        found.push(RuntimeFound {
+        found.push(RuntimeReport {
             name: "python3".into(),
             available: false,
-            found: "no python3 in the usual places".into(),
+            found: "python3 was not found in the usual places".into(),
             cure: Some("apt-get install python3".into()),
         });
     }
     found
 }
 
-fn in_memory(config: &Config) -> InMemory {
+fn in_memory(config: &Config) -> MemoryReport {
     let runtimes = config.agent_environment().runtimes;
     match MemoryImage::size(&runtimes, config.sandbox.resident_bytes) {
-        Ok(bytes) => InMemory {
+        Ok(bytes) => MemoryReport {
             available: true,
             found: format!(
-                "{} MiB of files are kept in memory while serving",
+                "{} MiB of runtime files are held in memory while serving",
                 bytes >> 20
             ),
             cure: None,
         },
-        Err(why) => InMemory {
+        Err(why) => MemoryReport {
             available: false,
-            found: format!("{why}: an agent may learn what others have read of them"),
+            found: format!("{why}: without that, an agent can infer which files others have read"),
             cure: Some(match why {
-                NoImage::NoRoom { bytes, .. } => {
+                MemoryImageError::NotEnoughMemory { bytes, .. } => {
                     let mib = (bytes >> 20).next_multiple_of(100) + 100;
                     format!(
-                        "offer smaller runtimes, or have a larger {MEMORY}: mount -o remount,size={mib}m {MEMORY}; \
+                        "offer smaller runtimes, or enlarge {MEMORY}: mount -o remount,size={mib}m {MEMORY}; \
                          in Docker: docker run --shm-size {mib}m"
                     )
                 }
-                NoImage::TooLarge { .. } | NoImage::Failed(_) => {
+                MemoryImageError::TooLarge { .. } | MemoryImageError::Failed(_) => {
                     "offer smaller runtimes, or raise sandbox.resident_bytes".to_owned()
                 }
             }),
@@ -239,11 +238,11 @@ fn describe(content: &RuntimeContent, runtime: Option<&Runtime>) -> String {
     match content {
         RuntimeContent::Python(python) => {
             let interpreter = runtime.and_then(Runtime::interpreter);
-            let place = interpreter.map(|path| format!(" at {}", path.display()));
-            let named = |name: &&str| python.packages.contains_key(*name);
+            let location = interpreter.map(|path| format!(" at {}", path.display()));
+            let is_installed = |name: &&str| python.packages.contains_key(*name);
             let known: Vec<_> = KNOWN_PACKAGES
                 .iter()
-                .filter(|name| named(name))
+                .filter(|name| is_installed(name))
                 .map(|name| format!("{name} {}", python.packages[*name]))
                 .collect();
             let more = python.packages.len() - known.len();
@@ -251,53 +250,53 @@ fn describe(content: &RuntimeContent, runtime: Option<&Runtime>) -> String {
                 "{} {}{}; {}{more} other packages",
                 python.implementation,
                 python.version,
-                place.unwrap_or_default(),
+                location.unwrap_or_default(),
                 known
                     .iter()
-                    .map(|one| format!("{one}, "))
+                    .map(|package| format!("{package}, "))
                     .collect::<String>(),
             )
         }
         RuntimeContent::Native { libc } => format!(
             "{} host paths, read-only; C library {}",
             runtime.map_or(0, |runtime| runtime.read_only_paths.len()),
-            libc.as_deref().unwrap_or("of no known version")
+            libc.as_deref().unwrap_or("of unknown version")
         ),
-        RuntimeContent::Image => "container images, which bring their own files".to_owned(),
-        RuntimeContent::Broken { why } => why.clone(),
+        RuntimeContent::Image => "container images, which contain their own files".to_owned(),
+        RuntimeContent::Failed { reason } => reason.clone(),
     }
 }
 
 fn cure(config: &Config, name: &str, content: &RuntimeContent) -> Option<String> {
-    let RuntimeContent::Broken { .. } = content else {
+    let RuntimeContent::Failed { .. } = content else {
         return None;
     };
     Some(match config.runtimes.get(name) {
         Some(RuntimeConfig::Folder(folder)) => {
-            format!("make it again: docker/runtime.sh {}", folder.display())
+            format!("rebuild it: docker/runtime.sh {}", folder.display())
         }
         Some(RuntimeConfig::Paths { .. }) => {
             format!("correct read_only_paths of [runtimes.{name}] in the configuration")
         }
-        None => "see what is missing of the sandbox above".to_owned(),
+        None => "see the missing sandbox layers above".to_owned(),
     })
 }
 
-fn cpus(config: &Config) -> Cpus {
+fn cpus(config: &Config) -> CpuReport {
     let usable = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
     let slots = config.slots();
     let fitting = Config::slots_on(usable);
-    // An agent and the simulator that waits for it take turns, but two agents on one CPU disturb each
-    // other's computation times, and requests disturb a simulator's.
+    // An agent and its simulator alternate on a CPU. Two agents on one CPU disturb each other's computation
+    // times, and HTTP requests disturb those of a simulator.
     let advice = (slots > fitting).then(|| {
-        let what = if slots * 2 > usable {
+        let effect = if slots * 2 > usable {
             "disturb each other's computation times"
         } else {
-            "leave none to the server's own work, which then gives way on the simulators'"
+            "leave no CPU for the server's own work, which then runs on the simulators' CPUs"
         };
-        format!("{slots} slots on {usable} CPUs {what}; set workers.slots = {fitting}")
+        format!("{slots} slots on {usable} CPUs {effect}; set workers.slots = {fitting}")
     });
-    Cpus {
+    CpuReport {
         usable,
         slots,
         agent_cpus: config.workers.agent_cpus.clone(),
@@ -305,9 +304,9 @@ fn cpus(config: &Config) -> Cpus {
     }
 }
 
-fn descriptors(config: &Config) -> DescriptorsFound {
-    let wanted = config.connections.limits();
-    match Descriptors::divide(Descriptors::available(), config.slots(), &wanted) {
+fn descriptors(config: &Config) -> DescriptorReport {
+    let limits = config.connections.limits();
+    match Descriptors::divide(Descriptors::available(), config.slots(), &limits) {
         Ok(divided) => {
             let Descriptors {
                 limit,
@@ -315,22 +314,22 @@ fn descriptors(config: &Config) -> DescriptorsFound {
                 connections,
                 per_address,
             } = divided;
-            let cure = (connections < wanted.open).then(|| {
+            let cure = (connections < limits.open).then(|| {
                 format!(
-                    "for all {} of connections.most raise the limit: ulimit -n, or LimitNOFILE= of systemd",
-                    wanted.open
+                    "to allow all {} connections of connections.most, raise the limit: ulimit -n, or LimitNOFILE= of systemd",
+                    limits.open
                 )
             });
-            DescriptorsFound {
+            DescriptorReport {
                 divided: Some(divided),
                 found: format!(
-                    "{limit} at most, {reserved} of them for evaluations: {connections} connections, \
-                     {per_address} of one address"
+                    "at most {limit}, of which {reserved} for evaluations: {connections} connections, \
+                    {per_address} per address"
                 ),
                 cure,
             }
         }
-        Err(error) => DescriptorsFound {
+        Err(error) => DescriptorReport {
             divided: None,
             found: error.to_string(),
             cure: None,
@@ -338,16 +337,16 @@ fn descriptors(config: &Config) -> DescriptorsFound {
     }
 }
 
-fn host(config: &Config) -> Vec<Checked> {
+fn host(config: &Config) -> Vec<Check> {
     let (data_dir, now) = (&config.server.data_dir, jiff::Timestamp::now());
     vec![
-        times::clock(data_dir, now),
-        times::zone(&config.evaluation.zone, now),
+        clock::clock(data_dir, now),
+        clock::zone(&config.evaluation.zone, now),
         permissions::permissions(data_dir),
     ]
 }
 
-fn disks(config: &Config) -> Vec<DiskFound> {
+fn disks(config: &Config) -> Vec<DiskReport> {
     let mut folders = vec![config.server.data_dir.clone(), config.scratch_dir()];
     folders.dedup_by(|second, first| second.starts_with(first));
     folders
@@ -356,29 +355,29 @@ fn disks(config: &Config) -> Vec<DiskFound> {
         .collect()
 }
 
-fn disk(folder: PathBuf, min_free_bytes: u64) -> DiskFound {
+fn disk(folder: PathBuf, min_free_bytes: u64) -> DiskReport {
     let absolute = std::path::absolute(&folder).unwrap_or_else(|_| folder.clone());
     let existing = absolute.ancestors().find(|folder| folder.exists());
-    let asked = existing.map(|folder| (folder, rustix::fs::statvfs(folder)));
-    let Some((existing, Ok(disk))) = asked else {
-        return DiskFound {
+    let queried = existing.map(|folder| (folder, rustix::fs::statvfs(folder)));
+    let Some((existing, Ok(disk))) = queried else {
+        return DiskReport {
             folder,
             free_bytes: None,
-            found: "its disk cannot be asked".into(),
+            found: "its disk cannot be queried".into(),
             cure: Some("correct data_dir and scratch_dir of the configuration".into()),
         };
     };
     let free_bytes = disk.f_bavail.saturating_mul(disk.f_frsize);
-    let room = Room::new(vec![existing.to_owned()], min_free_bytes);
+    let room = FreeSpace::new(vec![existing.to_owned()], min_free_bytes);
     let cure = room.is_short().then(|| {
-        "the queue would pause and uploads be refused: make room, or lower server.min_free_bytes"
+        "the queue would pause and uploads would be refused: free disk space, or lower server.min_free_bytes"
             .to_owned()
     });
-    DiskFound {
+    DiskReport {
         folder,
         free_bytes: Some(free_bytes),
         found: format!(
-            "{} MiB free, {} MiB of them to stay so",
+            "{} MiB free, {} MiB required",
             free_bytes >> 20,
             min_free_bytes >> 20
         ),
@@ -394,12 +393,12 @@ mod tests {
         let host = HostFeature {
             layer: Layer::CgroupMemory,
             available,
-            found: "what was seen".into(),
-            cure: (!available).then(|| "what to type".into()),
+            found: "no memory controller".into(),
+            cure: (!available).then(|| "enable it".into()),
         };
         Findings {
             ok: available || given_up,
-            features: vec![Feature { host, given_up }],
+            features: vec![LayerReport { host, given_up }],
             runtimes: Vec::new(),
             in_memory: in_memory(&Config::default()),
             cpus: cpus(&Config::default()),
@@ -411,7 +410,7 @@ mod tests {
     }
 
     #[test]
-    fn a_disk_with_less_than_is_to_be_kept_free_is_shown_with_its_cure() {
+    fn full_disk_is_reported_with_its_cure() {
         let folder = std::env::temp_dir().join("not/yet/made");
         let roomy = disk(folder.clone(), 1);
         assert!(
@@ -429,7 +428,7 @@ mod tests {
     }
 
     #[test]
-    fn a_missing_layer_is_shown_with_its_cure_and_a_given_up_one_is_not_missing() {
+    fn missing_layer_is_reported_unless_given_up() {
         let found = findings(false, false);
         assert_eq!(
             missing(&found.features).collect::<Vec<_>>(),
@@ -439,18 +438,18 @@ mod tests {
         found.print(&mut text).unwrap();
         let text = String::from_utf8(text).unwrap();
         assert!(
-            text.contains("MISSING   cgroup-memory  what was seen"),
+            text.contains("MISSING   cgroup-memory  no memory controller"),
             "{text}"
         );
-        assert!(text.contains("-> what to type"), "{text}");
-        // What helps against several stands once.
+        assert!(text.contains("-> enable it"), "{text}");
+        // A cure of several layers is printed once.
         let mut several = findings(false, false);
         several.features.extend(found.features);
         let mut text = Vec::new();
         several.print(&mut text).unwrap();
         let text = String::from_utf8(text).unwrap();
         assert_eq!(text.matches("MISSING").count(), 2, "{text}");
-        assert_eq!(text.matches("-> what to type").count(), 1, "{text}");
+        assert_eq!(text.matches("-> enable it").count(), 1, "{text}");
         assert_eq!(missing(&findings(false, true).features).count(), 0);
         assert_eq!(missing(&findings(true, false).features).count(), 0);
     }

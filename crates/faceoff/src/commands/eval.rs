@@ -1,13 +1,13 @@
-//! `faceoff eval`: the server's evaluator, run locally.
+//! `faceoff eval`: runs the server's evaluator locally.
 
 mod ablation;
 mod differences;
 mod files;
-mod like_server;
+mod server_stage;
 mod logs;
 mod pool;
 mod profile_run;
-mod said;
+mod notes;
 mod table;
 
 use super::{ca_file::CaFile, local_bundle, output::print};
@@ -22,71 +22,71 @@ use faceoff_types::{
 };
 use faceoff_worker::CpuLayout;
 use files::RESULTS;
-use like_server::LikeServer;
+use notes::Notes;
 use profile_run::EvalSetup;
-use said::Said;
 use serde::Serialize;
+use server_stage::ServerStage;
 use std::{fs, path::PathBuf};
 
-/// Plays a bundle through the very evaluator that the server runs, prints the result and writes
-/// `results.json` and `dataset.zip` to a folder. Exit status 0 only if there is a result, and the agent had no fault.
+/// Evaluates a bundle locally with the server's own evaluator, prints the result and writes `results.json` and
+/// `dataset.zip` to a folder. The exit status is 0 only if there is a result and the agent had no fault.
 #[derive(Debug, Args)]
 pub struct EvalCommand {
-    /// The agent: a folder with agent.toml, a .tar.gz, .tar.zst or .zip, or a container image as docker save writes it
+    /// The agent: a folder with agent.toml, a .tar.gz, .tar.zst or .zip, or a container image written by docker save
     bundle: PathBuf,
-    /// Tasks to play [default: hit,defend,prepare, or the stage's with --like-server]
+    /// Tasks to evaluate [default: hit,defend,prepare, or the stage's with --like-server]
     #[arg(long = "task", value_name = "TASKS", value_delimiter = ',')]
     tasks: Vec<Task>,
-    /// Episodes of each task
+    /// Episodes per task
     #[arg(long, value_name = "N", default_value_t = 100, value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_EPISODES_PER_TASK)))]
     episodes: u32,
     /// Perturbations: ideal, one factor's name, or evaluation [default: evaluation, or the stage's with --like-server]
     #[arg(long)]
     profile: Option<Profile>,
-    /// Play the same episodes in every profile (ideal, each factor alone, all together) and compare
-    /// them: ablation.json, and a folder for each profile
+    /// Run the same episodes in every profile (ideal, each factor alone, all together) and compare
+    /// them; writes ablation.json and a folder for each profile
     #[arg(long, conflicts_with = "profile")]
     ablation: bool,
     /// A number, or 64 hexadecimal digits; the same seed gives the same episodes everywhere
     #[arg(long, default_value = "0")]
     seed: Seed,
-    /// Seed of the season's model mismatch; derived from the seed if left out
+    /// Seed of the season's model mismatch [default: derived from the seed]
     #[arg(long, value_name = "HEX")]
     mismatch_seed: Option<Seed>,
-    /// Agents that play at the same time; results do not depend on it, computation times may
+    /// Number of agents that run in parallel; results do not depend on it, but computation times may
     #[arg(long, value_name = "W", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=256))]
     workers: u16,
-    /// Folder for results.json and dataset.zip; those of an earlier run are replaced
+    /// Folder for results.json and dataset.zip; files of an earlier run are replaced
     #[arg(long, value_name = "DIR", default_value = "faceoff-eval")]
     out: PathBuf,
-    /// Run your own agent without isolation, with your own environment
+    /// Run the agent without a sandbox, with your own environment
     #[arg(long)]
     no_sandbox: bool,
-    /// End with status 0 also if the agent had faults, as long as there is a result
+    /// Exit with status 0 even if the agent had faults, as long as there is a result
     #[arg(long)]
     allow_faults: bool,
-    /// Print one JSON object, and words to standard error
+    /// Print one JSON object, and notes to standard error
     #[arg(long)]
     json: bool,
-    /// Limits, runtimes and given-up layers, and of [evaluation] weights, tier bounds, magnitudes of perturbations and
-    /// faults, as a server's configuration states them
+    /// A server's configuration, for limits, runtimes and given-up layers, and for the weights, tier bounds,
+    /// perturbations and allowed faults of [evaluation]
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
-    /// Play by the rules and limits of this server's stage, and say what this machine has otherwise
+    /// Use the rules and limits of this server's stage, and report how this machine differs from the server
     #[arg(long, value_name = "URL")]
     like_server: Option<String>,
     #[command(flatten)]
     ca: CaFile,
-    /// The stage of that server, by its name or id; may be left out where one is open
+    /// Name or id of that server's stage [default: the open stage]
     #[arg(long, value_name = "STAGE", requires = "like_server")]
     stage: Option<String>,
 }
 
-/// What is printed with `--json`.
+/// Output of `--json`.
 #[derive(Debug, Serialize)]
-struct Told<'a> {
+struct EvalView<'a> {
     agent: &'a str,
-    /// The file of the result.
+    /// Path of `results.json`.
     results: PathBuf,
     dataset: PathBuf,
     dataset_blake3: &'a str,
@@ -96,25 +96,24 @@ struct Told<'a> {
 }
 
 impl EvalCommand {
-    const fn said(&self) -> Said {
-        if self.json { Said::Apart } else { Said::Beside }
+    const fn notes(&self) -> Notes {
+        if self.json { Notes::Stderr } else { Notes::Stdout }
     }
 
-    /// Plays, scores, prints and writes.
+    /// Evaluates the bundle, prints the result and writes the files.
     ///
     /// # Errors
-    /// If the bundle is refused, the agent fails too often, or the platform fails; the error says
-    /// which.
+    /// If the bundle is refused, or the agent or the platform fails; the error says which.
     pub fn run(mut self) -> anyhow::Result<()> {
         let mut config = Config::load(self.config.as_deref())?;
-        let like = self.like_server.as_deref();
-        let like = like
-            .map(|url| LikeServer::ask(url, self.ca.path(), self.stage.as_deref()))
+        let url = self.like_server.as_deref();
+        let server_stage = url
+            .map(|url| ServerStage::fetch(url, self.ca.path(), self.stage.as_deref()))
             .transpose()?;
-        let rules = match &like {
-            Some(like) => {
-                like.apply(&mut config);
-                like.stage().rules.rules.clone()
+        let rules = match &server_stage {
+            Some(server_stage) => {
+                server_stage.apply(&mut config);
+                server_stage.stage().rules.rules.clone()
             }
             None => StageRules {
                 profile: Profile::Evaluation,
@@ -142,12 +141,12 @@ impl EvalCommand {
             config.check_runtime(runtime)?;
         }
         let envs = self.environments(&config, runtime)?;
-        if let Some(like) = &like {
-            like.check_runtime(runtime, &envs[0])?;
-            for line in like.told(runtime, &envs[0], &self.given_up(&config)) {
-                self.said().line(format_args!("{line}"));
+        if let Some(server_stage) = &server_stage {
+            server_stage.check_runtime(runtime, &envs[0])?;
+            for line in server_stage.report(runtime, &envs[0], &self.given_up(&config)) {
+                self.notes().print(format_args!("{line}"));
             }
-            self.said().line(format_args!(""));
+            self.notes().print(format_args!(""));
         }
 
         let mismatch_seed = self
@@ -163,47 +162,47 @@ impl EvalCommand {
             mismatch_seed,
             max_faults: config.evaluation.max_faults,
             variation: config.rules().variation,
-            said: self.said(),
+            notes: self.notes(),
             scratch: scratch.path().to_owned(),
             bundle,
             envs,
         };
         if self.ablation {
             let faults = ablation::run(&setup, &self.out, self.json)?;
-            return self.allow(faults);
+            return self.check_faults(faults);
         }
-        let played = profile_run::play(&setup, self.profile.unwrap_or(rules.profile), &self.out)?;
-        let told = Told {
+        let outcome = profile_run::run_profile(&setup, self.profile.unwrap_or(rules.profile), &self.out)?;
+        let view = EvalView {
             agent: &setup.bundle.manifest.name,
             results: self.out.join(RESULTS),
             dataset: self.out.join(ARCHIVE_FILE),
-            dataset_blake3: &played.archive_blake3,
-            faults: &played.faults,
-            result: &played.result,
+            dataset_blake3: &outcome.archive_blake3,
+            faults: &outcome.faults,
+            result: &outcome.result,
         };
-        print(self.json, &told, || {
+        print(self.json, &view, || {
             format!(
                 "{}\n{}\n{}, BLAKE3 {}",
-                table::of(told.agent, told.result),
-                told.results.display(),
-                told.dataset.display(),
-                told.dataset_blake3
+                table::result_table(view.agent, view.result),
+                view.results.display(),
+                view.dataset.display(),
+                view.dataset_blake3
             )
         })?;
-        self.allow(played.faults.len())
+        self.check_faults(outcome.faults.len())
     }
 
-    /// Is that so many faults as there may be? What was played counts either way.
-    fn allow(&self, faults: usize) -> anyhow::Result<()> {
+    /// Fails if the agent had faults, unless `--allow-faults` is given. The result is valid in both cases.
+    fn check_faults(&self, faults: usize) -> anyhow::Result<()> {
         ensure!(
             faults == 0 || self.allow_faults,
-            "the agent had {faults} fault{}, told above; the result stands, and --allow-faults ends with status 0",
+            "the agent had {faults} fault{}, listed above; the result is valid, and with --allow-faults the exit status is 0",
             if faults == 1 { "" } else { "s" }
         );
         Ok(())
     }
 
-    /// Layers of the sandbox that this machine does without.
+    /// Layers of the sandbox that are not used on this machine.
     fn given_up(&self, config: &Config) -> Vec<String> {
         if self.no_sandbox {
             return vec!["the sandbox (--no-sandbox)".to_owned()];
@@ -212,7 +211,7 @@ impl EvalCommand {
         layers.map(|layer| layer.as_str().to_owned()).collect()
     }
 
-    /// One environment per worker: the server's limits, on CPUs of its own where there are enough.
+    /// One environment per worker, with the server's limits and, if there are enough, separate CPUs.
     fn environments(
         &self,
         config: &Config,
@@ -220,13 +219,13 @@ impl EvalCommand {
     ) -> anyhow::Result<Vec<AgentEnvironment>> {
         let env = local_bundle::environment(config, runtime, self.no_sandbox);
         let workers = usize::from(self.workers);
-        // Those that this process may use: not always the machine's, nor numbered from 0.
-        let cpus = affinity::allowed().context("asking for the CPUs of this process")?;
+        // The process may be restricted to some of the machine's CPUs.
+        let cpus = affinity::allowed().context("reading the CPU affinity of this process")?;
         let layout = CpuLayout::divide(&cpus, workers, 1);
         if layout.shared && workers > 1 {
-            self.said().line(format_args!(
-                "note: {workers} workers share {} CPUs; results are the same, computation \
-                 times may be longer",
+            self.notes().print(format_args!(
+                "note: {workers} workers share {} CPUs; results do not change, but computation \
+                times may be longer",
                 cpus.len()
             ));
         }
@@ -234,7 +233,7 @@ impl EvalCommand {
             .slots
             .into_iter()
             .map(|cpus| AgentEnvironment {
-                agent_cpus: cpus.of_agent(0).to_vec(),
+                agent_cpus: cpus.agent_cpus(0).to_vec(),
                 ..env.clone()
             })
             .collect())

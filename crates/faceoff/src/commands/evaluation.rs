@@ -1,7 +1,7 @@
-//! `faceoff evaluation`: one evaluation, and where it broke constraints.
+//! `faceoff evaluation`: prints an evaluation or its constraint violations.
 
 use super::{
-    evaluation_text::{state, tasks},
+    evaluation_text::{status_text, task_table},
     output::print,
     server::ServerArgs,
 };
@@ -13,55 +13,54 @@ use faceoff_api::views::{
 };
 use faceoff_types::EvaluationId;
 
-/// Shows an evaluation: how far it is, or what came of it, by task.
+/// Shows an evaluation: its progress, or its result by task.
 #[derive(Debug, Args)]
 pub struct EvaluationCommand {
     #[command(flatten)]
-    which: Which,
+    args: EvaluationArgs,
     #[command(flatten)]
     server: ServerArgs,
 }
 
-/// What of which.
 #[derive(Debug, Args)]
-pub(super) struct Which {
+pub(super) struct EvaluationArgs {
     /// The evaluation's id
     evaluation: EvaluationId,
-    /// In place of that the episodes in which it broke a constraint or answered slowly
+    /// Show the episodes with constraint violations or slow answers instead
     #[arg(long)]
     violations: bool,
 }
 
 impl EvaluationCommand {
-    /// Asks the server.
+    /// Requests the evaluation and prints it.
     ///
     /// # Errors
-    /// If it cannot be reached or refuses.
+    /// If the server cannot be reached or refuses.
     pub fn run(self) -> anyhow::Result<()> {
-        // What is public is everybody's.
+        // Public evaluations need no token.
         super::block_on(async {
-            show(&self.server.anybody()?, self.server.json, &self.which).await
+            show(&self.server.client_or_visitor()?, self.server.json, &self.args).await
         })
     }
 }
 
-/// Shows it, to whoever the client is.
-pub(super) async fn show(client: &Client, json: bool, which: &Which) -> anyhow::Result<()> {
-    if which.violations {
-        let violations = client.violations(which.evaluation).await?;
-        return print(json, &violations, || broken(&violations));
+/// Prints an evaluation, requested with the client's token.
+pub(super) async fn show(client: &Client, json: bool, args: &EvaluationArgs) -> anyhow::Result<()> {
+    if args.violations {
+        let violations = client.violations(args.evaluation).await?;
+        return print(json, &violations, || violations_text(&violations));
     }
-    let evaluation = client.evaluation(which.evaluation).await?;
-    print(json, &evaluation, || whole(&evaluation))
+    let evaluation = client.evaluation(args.evaluation).await?;
+    print(json, &evaluation, || evaluation_text(&evaluation))
 }
 
-fn whole(evaluation: &EvaluationView) -> String {
+fn evaluation_text(evaluation: &EvaluationView) -> String {
     let mut lines = vec![
         format!(
             "{}, {}: {}",
             evaluation.team_name,
             evaluation.day,
-            state(evaluation)
+            status_text(evaluation)
         ),
         format!("submission {}", evaluation.submission),
     ];
@@ -71,7 +70,7 @@ fn whole(evaluation: &EvaluationView) -> String {
             dataset_blake3,
             ..
         } => {
-            lines.extend(result.as_ref().map(|result| tasks(&result.tasks)));
+            lines.extend(result.as_ref().map(|result| task_table(&result.tasks)));
             lines.extend(
                 dataset_blake3
                     .as_ref()
@@ -90,27 +89,27 @@ fn whole(evaluation: &EvaluationView) -> String {
     lines.join("\n")
 }
 
-fn broken(violations: &ViolationsView) -> String {
+fn violations_text(violations: &ViolationsView) -> String {
     let mut lines = Vec::new();
-    for (task, of) in &violations.tasks {
+    for (task, by_constraint) in &violations.tasks {
         for (name, list) in [
-            ("ee", &of.ee),
-            ("link", &of.link),
-            ("joint_pos", &of.joint_pos),
-            ("joint_vel", &of.joint_vel),
+            ("ee", &by_constraint.ee),
+            ("link", &by_constraint.link),
+            ("joint_pos", &by_constraint.joint_pos),
+            ("joint_vel", &by_constraint.joint_vel),
         ] {
-            lines.extend(list.iter().map(|one| {
+            lines.extend(list.iter().map(|violation| {
                 format!(
-                    "{task:<8} episode {:>5}  {name:<10} first at step {}, at {} steps, {:.4} beyond at most",
-                    one.episode, one.first_step, one.steps, one.max
+                    "{task:<8} episode {:>5}  {name:<10} first at step {}, in {} steps, by at most {:.4}",
+                    violation.episode, violation.first_step, violation.steps, violation.max
                 )
             }));
         }
         lines.extend(
-            of.computation_time
+            by_constraint.computation_time
                 .iter()
                 .map(|slow| format!("{task:<8} episode {:>5}  slow answers", slow.episode)),
         );
     }
-    super::output::or_none(lines, "no episode broke anything")
+    super::output::lines_or(lines, "no violations")
 }

@@ -1,4 +1,4 @@
-use super::queue::in_queue;
+use super::queue::queue_text;
 use faceoff_api::views::{
     evaluation::{EvaluationStatus, EvaluationView},
     task::TaskView,
@@ -6,21 +6,21 @@ use faceoff_api::views::{
 use faceoff_types::Task;
 use std::collections::BTreeMap;
 
-/// What has become of an evaluation, in words.
-pub(super) fn state(evaluation: &EvaluationView) -> String {
+/// Status of an evaluation in a few words.
+pub(super) fn status_text(evaluation: &EvaluationView) -> String {
     if let Some(ruling) = &evaluation.voided {
         return format!("voided: {}", ruling.reason);
     }
     let progress = evaluation.progress;
-    let place = match &evaluation.queue {
-        Some(queue) => format!(", {}", in_queue(queue)),
+    let position = match &evaluation.queue {
+        Some(queue) => format!(", {}", queue_text(queue)),
         None => String::new(),
     };
     match &evaluation.status {
-        EvaluationStatus::Queued => format!("queued{place}"),
+        EvaluationStatus::Queued => format!("queued{position}"),
         EvaluationStatus::Running => {
             format!(
-                "running, {} of {} episodes{place}",
+                "running, {} of {} episodes{position}",
                 progress.episodes_done, progress.episodes_total
             )
         }
@@ -36,27 +36,27 @@ pub(super) fn state(evaluation: &EvaluationView) -> String {
             result.tier.title().to_lowercase()
         ),
         EvaluationStatus::AgentFailed { .. } => "the agent failed".to_owned(),
-        EvaluationStatus::PlatformFailed { reason, .. } => format!("our fault: {reason}"),
-        EvaluationStatus::NotPlayed { reason, .. } => format!("not played: {reason}"),
+        EvaluationStatus::PlatformFailed { reason, .. } => format!("platform fault: {reason}"),
+        EvaluationStatus::NotPlayed { reason, .. } => format!("not evaluated: {reason}"),
         EvaluationStatus::Cancelled { reason, .. } => format!("cancelled: {reason}"),
     }
 }
 
-/// The results by task.
-pub(super) fn tasks(tasks: &BTreeMap<Task, TaskView>) -> String {
+/// Table of the results by task.
+pub(super) fn task_table(tasks: &BTreeMap<Task, TaskView>) -> String {
     let mut lines = vec![format!(
         "{:<8} {:>8} {:>9} {:>19} {:>8}  tier",
         "task", "episodes", "success", "95 % interval", "penalty"
     )];
-    lines.extend(tasks.iter().map(|(task, of)| {
-        let [low, high] = of.success_ci95.map(|bound| 100.0 * bound);
+    lines.extend(tasks.iter().map(|(task, result)| {
+        let [low, high] = result.success_ci95.map(|bound| 100.0 * bound);
         format!(
             "{task:<8} {:>8} {:>7.1} % {:>19} {:>8.1}  {}",
-            of.episodes,
-            100.0 * of.success_rate,
+            result.episodes,
+            100.0 * result.success_rate,
             format!("{low:.1} to {high:.1} %"),
-            of.penalty_points,
-            of.tier.title()
+            result.penalty_points,
+            result.tier.title()
         )
     }));
     lines.join("\n")

@@ -1,40 +1,39 @@
-//! What fetches and stores bundles and recordings on other machines.
+//! HTTP clients that transfer bundles and recordings between workers, server and bucket.
 
 use crate::client;
 use anyhow::Context as _;
 use std::{path::Path, time::Duration};
 
-/// How long connecting to the server may take.
-const CONNECTS_WITHIN: Duration = Duration::from_secs(10);
-/// How long nothing may come of what the server asks a bucket for.
-const READS_WITHIN: Duration = Duration::from_secs(60);
+const CONNECT_TIMEOUT: Duration = Duration::from_secs(10);
+/// Longest silence of a bucket that the server reads from.
+const READ_TIMEOUT: Duration = Duration::from_secs(60);
 
-/// What a worker fetches and stores with. It trusts this host's authorities, and those of the file.
+/// The client of a worker. It trusts the certificate authorities of this host and of `ca_file`.
 ///
-/// How long nothing may move the worker watches: a limit of the client's for reading would run while a file is sent, too.
+/// It has no read timeout, which would also expire while a file is being sent; the worker detects stalled transfers.
 ///
 /// # Errors
-/// If the file holds none.
+/// If `ca_file` has no certificate.
 pub fn files_client(ca_file: Option<&Path>) -> anyhow::Result<reqwest::Client> {
-    built(builder(ca_file)?)
+    build_client(builder(ca_file)?)
 }
 
-/// Likewise, by which the server reaches a bucket: it stores in small pieces, and is answered soon.
+/// The server's client of a bucket. It has a read timeout, because the server uploads in small parts.
 ///
 /// # Errors
-/// If the file holds none.
+/// If `ca_file` has no certificate.
 pub fn bucket_client(ca_file: Option<&Path>) -> anyhow::Result<reqwest::Client> {
-    built(builder(ca_file)?.read_timeout(READS_WITHIN))
+    build_client(builder(ca_file)?.read_timeout(READ_TIMEOUT))
 }
 
 fn builder(ca_file: Option<&Path>) -> anyhow::Result<reqwest::ClientBuilder> {
     Ok(reqwest::Client::builder()
-        .tls_backend_preconfigured(client::trusting_tls(ca_file)?)
-        .connect_timeout(CONNECTS_WITHIN))
+        .tls_backend_preconfigured(client::tls_client_config(ca_file)?)
+        .connect_timeout(CONNECT_TIMEOUT))
 }
 
-fn built(builder: reqwest::ClientBuilder) -> anyhow::Result<reqwest::Client> {
+fn build_client(builder: reqwest::ClientBuilder) -> anyhow::Result<reqwest::Client> {
     builder
         .build()
-        .context("setting up the client that fetches files")
+        .context("setting up the HTTP client for files")
 }

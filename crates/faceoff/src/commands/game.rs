@@ -1,11 +1,11 @@
-//! `faceoff game`: games on the server, single ones, and those that a team asks for.
+//! `faceoff game`: single games, and the friendly and test games of a team.
 
 mod watch;
 
 use super::{
-    output::{download_bar, downloaded, print},
+    output::{download_bar, download_text, print},
     server::ServerArgs,
-    tournament::{find::find_or_newest, games},
+    tournament::{lookup::find_tournament_or_newest, games},
 };
 use crate::client::Client;
 use anyhow::{Context, bail};
@@ -14,7 +14,7 @@ use faceoff_api::views::game::GameView;
 use faceoff_types::{GameId, Side, TeamName};
 use std::path::PathBuf;
 
-/// Asks for games that do not count, shows and watches games, downloads what a team may have of them.
+/// Requests friendly and test games, and shows, watches and downloads games.
 #[derive(Debug, Args)]
 pub struct GameCommand {
     #[command(flatten)]
@@ -25,55 +25,56 @@ pub struct GameCommand {
 
 #[derive(Debug, Subcommand)]
 enum Action {
-    /// Have your active submission play the organisers' baseline, before or between rounds; it does not count
+    /// Request a test game of your active submission against the baseline, before or between rounds; it does not count
     Test {
         /// The tournament's name or id [default: the newest]
         tournament: Option<String>,
     },
-    /// Have your active submission play another team's, before or between rounds; it does not count
+    /// Request a friendly game of your active submission against another team's, before or between rounds; it does
+    /// not count
     Friendly {
         /// The other team's name
         opponent: TeamName,
         /// The tournament's name or id [default: the newest]
         tournament: Option<String>,
     },
-    /// List your games that do not count, the newest first (faceoff tournament games lists those that do)
+    /// List your friendly and test games, the newest first (for games that count: faceoff tournament games)
     List {
         /// The tournament's name or id [default: the newest]
         tournament: Option<String>,
     },
-    /// Show one: what it is for, how it stands, what it came to
+    /// Show a game with its state and result
     Show {
         /// The game's id
         game: GameId,
     },
-    /// Follow one as it is played: goals, fouls, faults, as they happen, until it is over
+    /// Watch a game live: goals, fouls and faults, until it is over
     Watch {
         /// The game's id
         game: GameId,
     },
-    /// Download your side's own file, at once after the game
+    /// Download your side's dataset of a finished game
     Download {
         /// The game's id
         game: GameId,
-        /// Where to
+        /// The file to write; an existing file is replaced
         file: PathBuf,
-        /// Another side's file, where it is public: 1 (home) or 2 (away)
+        /// The dataset of this side, if it is public: 1 (home) or 2 (away)
         #[arg(long, value_parser = side, conflicts_with = "both")]
         side: Option<Side>,
-        /// The recording of both sides with the game's seed, which faceoff verify plays again, where it is public
+        /// The recording of both sides with the game's seed, for faceoff verify, if it is public
         #[arg(long)]
         both: bool,
     },
-    /// Print the end of what your agent wrote to its standard error, with its faults
+    /// Print the end of your agent's log, with its faults
     Log {
         /// The game's id
         game: GameId,
-        /// As an organiser: of which side, 1 (home) or 2 (away)
+        /// For organisers: the side, 1 (home) or 2 (away)
         #[arg(long, value_parser = side)]
         side: Option<Side>,
     },
-    /// Call off a game that does not count and is not over, which your team has asked for
+    /// Cancel an unfinished friendly or test game that your team has requested
     Cancel {
         /// The game's id
         game: GameId,
@@ -81,14 +82,14 @@ enum Action {
 }
 
 pub(super) fn side(text: &str) -> Result<Side, String> {
-    let wanted = Side::BOTH
+    let side = Side::BOTH
         .into_iter()
         .find(|side| side.number().to_string() == text);
-    wanted.ok_or_else(|| format!("expected 1 (home) or 2 (away), got {text:?}"))
+    side.ok_or_else(|| format!("expected 1 (home) or 2 (away), got {text:?}"))
 }
 
 impl GameCommand {
-    /// Does what was asked.
+    /// Runs the chosen action.
     ///
     /// # Errors
     /// If the server cannot be reached or refuses.
@@ -97,31 +98,31 @@ impl GameCommand {
     }
 
     async fn act(self) -> anyhow::Result<()> {
-        let client = self.server.anybody()?;
+        let client = self.server.client_or_visitor()?;
         match self.action {
             Action::Test { tournament } => {
-                let id = find_or_newest(&client, tournament.as_deref()).await?;
-                let ordered = client.order_test_games(id, None).await?;
-                print(self.server.json, &ordered, || games::ordered(&ordered))
+                let id = find_tournament_or_newest(&client, tournament.as_deref()).await?;
+                let requested = client.request_test_games(id, None).await?;
+                print(self.server.json, &requested, || games::requested_text(&requested))
             }
             Action::Friendly {
                 opponent,
                 tournament,
             } => {
-                let id = find_or_newest(&client, tournament.as_deref()).await?;
-                let game = client.order_friendly_game(id, opponent).await?;
-                print(self.server.json, &game, || games::whole(&game))
+                let id = find_tournament_or_newest(&client, tournament.as_deref()).await?;
+                let game = client.request_friendly_game(id, opponent).await?;
+                print(self.server.json, &game, || games::game_text(&game))
             }
             Action::List { tournament } => {
-                let id = find_or_newest(&client, tournament.as_deref()).await?;
-                let free = client.free_games(id).await?;
-                print(self.server.json, &free, || games::table(&free))
+                let id = find_tournament_or_newest(&client, tournament.as_deref()).await?;
+                let games = client.uncounted_games(id).await?;
+                print(self.server.json, &games, || games::games_table(&games))
             }
             Action::Show { game } => {
                 let game = client.game(game).await?;
-                print(self.server.json, &game, || games::whole(&game))
+                print(self.server.json, &game, || games::game_text(&game))
             }
-            Action::Watch { game } => watch::follow(&client, self.server.json, game).await,
+            Action::Watch { game } => watch::watch(&client, self.server.json, game).await,
             Action::Download {
                 game,
                 file,
@@ -136,7 +137,7 @@ impl GameCommand {
                     client.download_side(game, side, &file, &bar).await?
                 };
                 bar.finish_and_clear();
-                print(self.server.json, &done, || downloaded(&done))
+                print(self.server.json, &done, || download_text(&done))
             }
             Action::Log { game, side } => {
                 let side = own_side(&client, &client.game(game).await?, side).await?;
@@ -145,27 +146,27 @@ impl GameCommand {
             }
             Action::Cancel { game } => {
                 let game = client.cancel_game(game).await?;
-                print(self.server.json, &game, || games::whole(&game))
+                print(self.server.json, &game, || games::game_text(&game))
             }
         }
     }
 }
 
-/// The side that was asked for, or that of the team whose token it is.
+/// The given side, or else the side of the token's team.
 pub(super) async fn own_side(
     client: &Client,
     game: &GameView,
-    wanted: Option<Side>,
+    side: Option<Side>,
 ) -> anyhow::Result<Side> {
-    if let Some(side) = wanted {
+    if let Some(side) = side {
         return Ok(side);
     }
     let who = client
         .whoami()
         .await
-        .context("whose side? name it with --side, or give the team's token")?;
+        .context("the side is unknown: name it with --side, or give the team's token")?;
     let Some(team) = who.team else {
-        bail!("the token is no team's: name the side with --side 1 (home) or --side 2 (away)");
+        bail!("the token does not belong to a team: name the side with --side 1 (home) or --side 2 (away)");
     };
     let own = Side::BOTH
         .into_iter()

@@ -1,4 +1,4 @@
-//! `faceoff health`: is a server fit for work?
+//! `faceoff health`: checks whether a server is healthy.
 
 use super::{output::print, server::ServerArgs};
 use crate::client::ApiError;
@@ -7,7 +7,7 @@ use clap::Args;
 use faceoff_api::views::health::HealthView;
 use reqwest::StatusCode;
 
-/// Says whether the server is fit for work: its database can be written, its queue moves, its disk has room.
+/// Checks whether the server is healthy: its database is writable, its queue progresses, its disk has free space.
 #[derive(Debug, Args)]
 pub struct HealthCommand {
     #[command(flatten)]
@@ -15,40 +15,40 @@ pub struct HealthCommand {
 }
 
 impl HealthCommand {
-    /// Asks the server.
+    /// Requests the server's health and prints it.
     ///
     /// # Errors
-    /// If it cannot be reached, or something is missing: what.
+    /// If the server cannot be reached or is unhealthy; the error names the reason.
     pub fn run(self) -> anyhow::Result<()> {
         super::block_on(async {
-            let health = self.server.anybody()?.health().await.map_err(missing)?;
-            print(self.server.json, &health, || text(&health))
+            let health = self.server.client_or_visitor()?.health().await.map_err(as_unhealthy)?;
+            print(self.server.json, &health, || health_text(&health))
         })
     }
 }
 
-/// A server that says what it lacks was reached, and is not well.
-fn missing(error: anyhow::Error) -> anyhow::Error {
+/// Turns the answer of an unhealthy server into a failure, because the server was reached.
+fn as_unhealthy(error: anyhow::Error) -> anyhow::Error {
     match error.downcast_ref::<ApiError>() {
-        Some(told) if told.status == StatusCode::SERVICE_UNAVAILABLE => {
-            anyhow!("the server is not fit for work: {}", told.detail)
+        Some(problem) if problem.status == StatusCode::SERVICE_UNAVAILABLE => {
+            anyhow!("the server is unhealthy: {}", problem.detail)
         }
         _ => error,
     }
 }
 
-fn text(health: &HealthView) -> String {
-    let held = health.paused.as_ref().map(|ruling| {
+fn health_text(health: &HealthView) -> String {
+    let pause = health.paused.as_ref().map(|ruling| {
         let since = ruling.at.strftime("%Y-%m-%d %H:%M UTC");
-        format!("\nthe queue is held since {since}: {}", ruling.reason)
+        format!("\nthe queue is paused since {since}: {}", ruling.reason)
     });
     format!(
-        "{}, version {}; units of work: {} under way, {} waiting{}",
+        "{}, version {}; jobs: {} running, {} pending{}",
         health.status,
         health.version,
         health.running,
         health.waiting,
-        held.unwrap_or_default()
+        pause.unwrap_or_default()
     )
 }
 
@@ -58,20 +58,20 @@ mod tests {
     use crate::exit::Exit;
 
     #[test]
-    fn what_a_server_lacks_is_no_failure_to_reach_it() {
+    fn unhealthy_server_is_a_failure_but_not_unreachable() {
         let refused = |status| ApiError {
             status,
             title: "Not ready".into(),
             detail: "the database cannot be written".into(),
         };
-        let lacks = missing(refused(StatusCode::SERVICE_UNAVAILABLE).into());
-        assert_eq!(Exit::of(&lacks), Exit::Failed);
+        let unhealthy = as_unhealthy(refused(StatusCode::SERVICE_UNAVAILABLE).into());
+        assert_eq!(Exit::of(&unhealthy), Exit::Failed);
         assert!(
-            lacks
-                .to_string()
+            unhealthy
+            .to_string()
                 .ends_with("the database cannot be written")
         );
-        let broken = missing(refused(StatusCode::INTERNAL_SERVER_ERROR).into());
+        let broken = as_unhealthy(refused(StatusCode::INTERNAL_SERVER_ERROR).into());
         assert_eq!(Exit::of(&broken), Exit::Unreachable);
     }
 }

@@ -1,8 +1,8 @@
-//! `faceoff import`: takes the archive of a season in, for `faceoff serve` to show it.
+//! `faceoff import`: unpacks the archive of a season into a data folder that `faceoff serve` shows.
 
 use super::{
     output::print,
-    staging::{self, Kind, Staging, private},
+    atomic_folder::{self, AtomicFolder, FolderKind, create_private},
 };
 use anyhow::{Context, bail};
 use clap::Args;
@@ -16,41 +16,41 @@ use std::{
     path::{Path, PathBuf},
 };
 
-/// The database's file in an archive, and in a data folder.
+/// File name of the database in an archive and in a data folder.
 const DATABASE: (&str, &str) = ("database.sqlite3", "faceoff.sqlite3");
-/// The artifacts, in both.
+/// Name of the artifact folder, in both.
 const ARTIFACTS: &str = "artifacts";
-/// Where everything else of the archive stays.
+/// Folder for all other files of the archive.
 const REST: &str = "archive";
 
-const IMPORT: Kind = Kind {
+const IMPORT: FolderKind = FolderKind {
     name: "import",
     suffix: "importing",
 };
 
-/// Unpacks the archive of a season into a new data folder, from which `faceoff serve --data-dir FOLDER` shows it
-/// read-only. Nothing of the archive is trusted: it is held against its manifest, and its database is checked, before
-/// the folder is there.
+/// Unpacks the archive of a season into a new data folder, which `faceoff serve --data-dir FOLDER` shows
+/// read-only. The archive is not trusted: its files are compared with its manifest and its database is checked
+/// before the folder is created.
 #[derive(Debug, Args)]
 pub struct ImportCommand {
-    /// What `faceoff admin export` wrote
+    /// The archive, written by `faceoff admin export`
     archive: PathBuf,
-    /// The data folder to make; one that exists must be empty
+    /// The data folder to create; an existing folder must be empty
     #[arg(long, visible_alias = "data-dir", value_name = "FOLDER")]
     data: PathBuf,
-    /// Print what was done as JSON
+    /// Print a summary as JSON
     #[arg(long)]
     json: bool,
 }
 
 impl ImportCommand {
-    /// Imports it.
+    /// Imports the archive.
     ///
     /// # Errors
-    /// If the folder holds something, or the archive is refused; nothing is left of it then.
+    /// If the folder is not empty, or the archive is refused. Nothing is left in either case.
     pub fn run(self) -> anyhow::Result<()> {
         let manifest = import(&self.archive, &self.data, Timestamp::now())?;
-        let told = json!({
+        let summary = json!({
             "folder": self.data,
             "season": manifest.season,
             "edition": manifest.edition.to_string(),
@@ -59,9 +59,9 @@ impl ImportCommand {
             "bytes": manifest.total_bytes(),
             "left_out": manifest.left_out,
         });
-        print(self.json, &told, || {
+        print(self.json, &summary, || {
             let mut lines = vec![format!(
-                "imported the {} archive of {:?} as it was at {}: {} files of {} bytes",
+                "imported the {} archive of {:?} of {}: {} files of {} bytes",
                 manifest.edition,
                 manifest.season,
                 manifest.made_at.strftime("%Y-%m-%d %H:%M:%S UTC"),
@@ -69,9 +69,9 @@ impl ImportCommand {
                 manifest.total_bytes()
             )];
             let left_out = manifest.left_out.iter();
-            lines.extend(left_out.map(|what| format!("the archive was made without {what}")));
+            lines.extend(left_out.map(|part| format!("the archive was made without {part}")));
             lines.push(format!(
-                "next: `faceoff serve --data-dir {}` shows it, read-only",
+                "next: `faceoff serve --data-dir {}` shows it read-only",
                 self.data.display()
             ));
             lines.join("\n")
@@ -79,54 +79,54 @@ impl ImportCommand {
     }
 }
 
-/// Makes the data folder `data` of an archive: all of it or nothing.
+/// Creates the complete data folder `data` of an archive, or nothing.
 ///
 /// # Errors
 /// As [`ImportCommand::run`].
 pub fn import(archive: &Path, data: &Path, now: Timestamp) -> anyhow::Result<Manifest> {
-    staging::check_empty(
+    atomic_folder::check_empty(
         data,
-        "an archive is imported into a folder of its own: name one that is empty or not there yet",
+        "an archive is imported into its own folder: name an empty or a new one",
     )?;
-    let staging = Staging::make(data, &IMPORT)?;
-    let folder = staging.content();
+    let new_folder = AtomicFolder::create(data, &IMPORT)?;
+    let folder = new_folder.content();
     let rest = folder.join(REST);
     for folder in [&folder, &rest] {
-        private(folder)?;
+        create_private(folder)?;
     }
-    let refused = || format!("{} is not imported", archive.display());
-    let manifest = unpack(archive, &rest).with_context(refused)?;
+    let context = || format!("{} is not imported", archive.display());
+    let manifest = unpack(archive, &rest).with_context(context)?;
     let (from, to) = (rest.join(DATABASE.0), folder.join(DATABASE.1));
     match fs::rename(&from, &to) {
         Err(error) if error.kind() == ErrorKind::NotFound => {
-            bail!("{}: there is no {} in it", refused(), DATABASE.0)
+            bail!("{}: it contains no {}", context(), DATABASE.0)
         }
-        moved => moved.with_context(|| format!("naming {}", to.display()))?,
+        result => result.with_context(|| format!("naming {}", to.display()))?,
     }
     let (from, to) = (rest.join(ARTIFACTS), folder.join(ARTIFACTS));
     match fs::rename(&from, &to) {
-        // a season without datasets
-        Err(error) if error.kind() == ErrorKind::NotFound => private(&to)?,
-        moved => moved.with_context(|| format!("naming {}", to.display()))?,
+        // The season has no datasets.
+        Err(error) if error.kind() == ErrorKind::NotFound => create_private(&to)?,
+        result => result.with_context(|| format!("naming {}", to.display()))?,
     }
     let archived =
-        super::block_on(async { Store::import(&folder, now).await.with_context(refused) })?;
+        super::block_on(async { Store::import(&folder, now).await.with_context(context) })?;
     if archived.edition.to_string() != manifest.edition.to_string()
         || archived.made_at.as_millisecond() != manifest.made_at.as_millisecond()
     {
         bail!(
-            "{}: its manifest tells of the {} edition of {}, its database of the {} one of {}",
-            refused(),
+            "{}: its manifest is of the {} edition of {}, its database of the {} edition of {}",
+            context(),
             manifest.edition,
             manifest.made_at,
             archived.edition,
             archived.made_at
         );
     }
-    // For whoever asks later what was taken in.
+    // The manifest remains as a record of what was imported.
     let json = serde_json::to_vec_pretty(&manifest).context("writing the manifest")?;
-    let kept = rest.join(MANIFEST_NAME);
-    fs::write(&kept, json).with_context(|| format!("writing {}", kept.display()))?;
-    staging.settle(data, &[REST, ARTIFACTS])?;
+    let path = rest.join(MANIFEST_NAME);
+    fs::write(&path, json).with_context(|| format!("writing {}", path.display()))?;
+    new_folder.commit(data, &[REST, ARTIFACTS])?;
     Ok(manifest)
 }

@@ -1,4 +1,4 @@
-//! `faceoff init`: a configuration to begin with.
+//! `faceoff init`: writes a default configuration.
 
 use super::output::print;
 use crate::config::{COMMENTED, DEFAULT_FILE};
@@ -11,13 +11,13 @@ use std::{
     path::PathBuf,
 };
 
-/// Writes a configuration in which every value stands with its default, unit and meaning.
+/// Writes a configuration file that lists every value with its default, unit and meaning.
 #[derive(Debug, Args)]
 pub struct InitCommand {
-    /// The file to write; one that exists is left as it is
+    /// The file to write; an existing file is not overwritten
     #[arg(default_value = DEFAULT_FILE)]
     file: PathBuf,
-    /// Print what was written as JSON
+    /// Print the file's path as JSON
     #[arg(long)]
     json: bool,
 }
@@ -26,13 +26,13 @@ impl InitCommand {
     /// Writes the file.
     ///
     /// # Errors
-    /// If it exists or cannot be written.
+    /// If the file exists or cannot be written.
     pub fn run(self) -> anyhow::Result<()> {
         let shown = self.file.display();
         let mut file = match File::create_new(&self.file) {
             Ok(file) => file,
             Err(error) if error.kind() == ErrorKind::AlreadyExists => {
-                bail!("{shown} exists and was left as it is; name another file, or remove it first")
+                bail!("{shown} already exists and was not changed; name another file, or remove it first")
             }
             Err(error) => return Err(error).with_context(|| format!("creating {shown}")),
         };
@@ -40,8 +40,8 @@ impl InitCommand {
             .with_context(|| format!("writing {shown}"))?;
         print(self.json, &json!({ "file": self.file }), || {
             format!(
-                "wrote {shown}\nnext: change what you like, then `faceoff doctor --config {shown}` and \
-                 `faceoff serve --config {shown}`"
+                "wrote {shown}\nnext: edit it, then run `faceoff doctor --config {shown}` and \
+                `faceoff serve --config {shown}`"
             )
         })
     }

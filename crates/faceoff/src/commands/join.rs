@@ -1,6 +1,6 @@
-//! `faceoff join`: follows an invitation.
+//! `faceoff join`: accepts an invitation.
 
-use super::{ca_file::CaFile, output::print, password, server::HERE, whoami};
+use super::{ca_file::CaFile, output::print, password, server::DEFAULT_SERVER, whoami};
 use crate::{
     client::Client,
     credentials::{self, Credentials, Login},
@@ -8,54 +8,56 @@ use crate::{
 use anyhow::{Context, bail};
 use clap::Args;
 use faceoff_api::{
-    requests::{FoundedTeam, Join},
-    views::person::WhoView,
+    requests::{FoundedTeam, JoinRequest},
+    views::user::CallerView,
 };
-use faceoff_types::{DivisionName, PersonName, TeamName};
+use faceoff_types::{DivisionName, UserName, TeamName};
 use serde::Serialize;
 use std::fs;
 
-/// Follows an invitation and prints the token that comes of it, this once; with --sign-in keeps it, as faceoff login does.
+/// Accepts an invitation and prints the new token, which is shown only once; with --sign-in, stores the token like
+/// faceoff login.
 #[derive(Debug, Args)]
 pub struct JoinCommand {
-    /// The link that you were given, or the code at its end
+    /// The invitation link, or the code at its end
     link: String,
-    /// The server [default: that of the link, or http://127.0.0.1:8080]
+    /// The server [default: the link's, or http://127.0.0.1:8080]
     #[arg(long, value_name = "URL", env = "FACEOFF_SERVER")]
     server: Option<String>,
     #[command(flatten)]
     ca: CaFile,
-    /// By which you are known and sign in: 1 to 40 letters, digits, spaces and . _ -; not of who comes back
+    /// Your name, for signing in and for lists: 1 to 40 letters, digits, spaces and . _ -; not with a link that
+    /// restores an account
     #[arg(long)]
-    name: Option<PersonName>,
-    /// Read a password of 12 or more characters from standard input; without it you call by tokens only
+    name: Option<UserName>,
+    /// Read a password of 12 or more characters from standard input; without a password, you sign in with tokens only
     #[arg(long)]
     password_stdin: bool,
-    /// The version of the terms that you accept, if there are terms
+    /// The version of the terms that you accept, if the season has terms
     #[arg(long, value_name = "VERSION")]
     accept_terms: Option<u32>,
-    /// The team that you found, if the link is a founder's
+    /// The name of your new team, if the link is for a new team
     #[arg(long, value_name = "NAME")]
     team: Option<TeamName>,
-    /// Where that team is from
+    /// The team's affiliation
     #[arg(long, requires = "team")]
     affiliation: Option<String>,
-    /// Its page
+    /// The team's web page
     #[arg(long, requires = "team", value_name = "URL")]
     team_link: Option<String>,
-    /// The division that it is in
+    /// The team's division
     #[arg(long, requires = "team")]
     division: Option<DivisionName>,
-    /// Sign in: keep the token as faceoff login does, for the commands to come, and do not print it
+    /// Sign in: store the token for later commands, like faceoff login, instead of printing it
     #[arg(long)]
     sign_in: bool,
-    /// Print the server's answer as JSON
+    /// Print the server's response as JSON
     #[arg(long)]
     json: bool,
 }
 
-/// Server and code of a link, or the code alone.
-fn parts(link: &str) -> anyhow::Result<(Option<&str>, &str)> {
+/// Splits a link into server and code; accepts a code alone, too.
+fn parse_link(link: &str) -> anyhow::Result<(Option<&str>, &str)> {
     let (server, code) = match link.split_once("/join/") {
         Some(("", code)) => (None, code),
         Some((server, code)) => (Some(server), code),
@@ -64,35 +66,35 @@ fn parts(link: &str) -> anyhow::Result<(Option<&str>, &str)> {
     let code = code.trim().trim_end_matches('/');
     if !code.starts_with("fo_invite_") {
         bail!(
-            "expected a link like https://…/join/fo_invite_…, or what stands at its end, got {link:?}"
+            "expected a link like https://…/join/fo_invite_…, or the code at its end, got {link:?}"
         );
     }
     Ok((server, code))
 }
 
-/// What is printed of who has signed in: all but the token.
+/// Output of `--sign-in --json`: everything but the token.
 #[derive(Debug, Serialize)]
 struct SignedIn<'a> {
     #[serde(flatten)]
-    who: &'a WhoView,
+    who: &'a CallerView,
 }
 
 impl JoinCommand {
-    /// Joins.
+    /// Accepts the invitation.
     ///
     /// # Errors
     /// If the server cannot be reached or refuses.
     pub fn run(self) -> anyhow::Result<()> {
-        let (of_link, code) = parts(&self.link)?;
-        // A link goes to the server that it names, whatever others commands go to.
-        let server = of_link.or(self.server.as_deref());
-        let server = server.unwrap_or(HERE);
+        let (link_server, code) = parse_link(&self.link)?;
+        // The server in the link has priority over --server and FACEOFF_SERVER.
+        let server = link_server.or(self.server.as_deref());
+        let server = server.unwrap_or(DEFAULT_SERVER);
         let client = Client::new(server, None, self.ca.path())?;
         let password = match self.password_stdin {
-            true => Some(password::from_input()?),
+            true => Some(password::read_stdin()?),
             false => None,
         };
-        let join = Join {
+        let join = JoinRequest {
             code: code.to_owned(),
             name: self.name,
             password,
@@ -104,8 +106,8 @@ impl JoinCommand {
             }),
             accepted_terms: self.accept_terms,
         };
-        // An invitation is good once: what cannot keep the token is found out before.
-        let kept = match self.sign_in {
+        // An invitation can be used once, so unreadable credentials must be noticed before.
+        let credentials = match self.sign_in {
             true => {
                 let file = credentials::path()?;
                 Some((Credentials::load(&file)?, file))
@@ -116,10 +118,10 @@ impl JoinCommand {
         let ca_file = ca_file.context("looking for the file of --ca-file")?;
         super::block_on(async {
             let joined = client.join(&join).await?;
-            if let Some((_, file)) = kept {
-                // Looked at again: another command may have written it meanwhile.
-                let mut kept = Credentials::load(&file).inspect_err(|_| {
-                    // It comes this once.
+            if let Some((_, file)) = credentials {
+                // Loaded again, because another command may have changed the file meanwhile.
+                let mut credentials = Credentials::load(&file).inspect_err(|_| {
+                    // The server does not show the token again.
                     println!("token {}", joined.secret);
                 })?;
                 let login = Login {
@@ -127,22 +129,22 @@ impl JoinCommand {
                     made_here: true,
                     ca_file,
                 };
-                kept.keep(server, login, true);
-                if let Err(error) = kept.save(&file) {
-                    // It comes this once.
+                credentials.add(server, login, true);
+                if let Err(error) = credentials.save(&file) {
+                    // The server does not show the token again.
                     println!("token {}", joined.secret);
                     return Err(error);
                 }
-                let told = SignedIn { who: &joined.who };
-                return print(self.json, &told, || {
-                    let who = whoami::text(&joined.who);
-                    format!("{who}\nsigned in to {server}, kept in {}", file.display())
+                let view = SignedIn { who: &joined.caller };
+                return print(self.json, &view, || {
+                    let who = whoami::whoami_text(&joined.caller);
+                    format!("{who}\nsigned in to {server}, token stored in {}", file.display())
                 });
             }
             print(self.json, &joined, || {
                 format!(
-                    "{}\ntoken {}\nIt is not shown again. Commands take it from FACEOFF_TOKEN.",
-                    whoami::text(&joined.who),
+                    "{}\ntoken {}\nThe token is not shown again. Commands read it from FACEOFF_TOKEN.",
+                    whoami::whoami_text(&joined.caller),
                     joined.secret
                 )
             })
@@ -155,14 +157,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_link_and_its_code_are_both_taken() {
+    fn link_and_code_are_both_accepted() {
         let code = "fo_invite_abc";
-        assert_eq!(parts(code).unwrap(), (None, code));
-        assert_eq!(parts("/join/fo_invite_abc").unwrap(), (None, code));
-        let whole = parts("https://faceoff.example.org/join/fo_invite_abc\n").unwrap();
+        assert_eq!(parse_link(code).unwrap(), (None, code));
+        assert_eq!(parse_link("/join/fo_invite_abc").unwrap(), (None, code));
+        let whole = parse_link("https://faceoff.example.org/join/fo_invite_abc\n").unwrap();
         assert_eq!(whole, (Some("https://faceoff.example.org"), code));
         for wrong in ["", "https://faceoff.example.org/", "fo_team_abc"] {
-            assert!(parts(wrong).is_err(), "{wrong}");
+            assert!(parse_link(wrong).is_err(), "{wrong}");
         }
     }
 }

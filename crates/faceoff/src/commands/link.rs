@@ -1,74 +1,74 @@
-//! `faceoff link`: a link by which somebody without a token downloads a file.
+//! `faceoff link`: creates a link that downloads a file without a token.
 
 use super::{game::own_side, output::print, server::ServerArgs};
-use crate::client::Linked;
+use crate::client::LinkTarget;
 use clap::{Args, Subcommand};
 use faceoff_api::requests::NewLink;
 use faceoff_types::{EvaluationId, GameId, Side, SubmissionId};
 
-/// Makes a link by which whoever has it downloads a file, without a token, until it expires or your token does.
+/// Creates a link that downloads a file without a token, until the link expires or your token becomes invalid.
 #[derive(Debug, Args)]
 pub struct LinkCommand {
-    /// For how many hours it is good, up to 168
+    /// Validity in hours, at most 168
     #[arg(long, global = true, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=168))]
     hours: u32,
     #[command(flatten)]
     server: ServerArgs,
     #[command(subcommand)]
-    to: To,
+    target: Target,
 }
 
 #[derive(Debug, Subcommand)]
-enum To {
+enum Target {
     /// The dataset of an evaluation
     Dataset {
         /// The evaluation's id
         evaluation: EvaluationId,
     },
-    /// The archive of a submission
+    /// The bundle of a submission
     Submission {
         /// The submission's id
         submission: SubmissionId,
     },
-    /// Your side's own file of a game
+    /// Your side's dataset of a game
     Game {
         /// The game's id
         game: GameId,
-        /// As an organiser: of which side, 1 (home) or 2 (away)
+        /// For organisers: the side, 1 (home) or 2 (away)
         #[arg(long, value_parser = super::game::side, conflicts_with = "both")]
         side: Option<Side>,
-        /// The recording of both sides, if you may have it
+        /// The recording of both sides, if you may download it
         #[arg(long)]
         both: bool,
     },
 }
 
 impl LinkCommand {
-    /// Makes it.
+    /// Creates the link.
     ///
     /// # Errors
     /// If the server cannot be reached or refuses.
     pub fn run(self) -> anyhow::Result<()> {
         super::block_on(async {
             let client = self.server.client()?;
-            let to = match self.to {
-                To::Dataset { evaluation } => Linked::Dataset(evaluation),
-                To::Submission { submission } => Linked::Submission(submission),
-                To::Game { game, both, .. } if both => Linked::Recording(game),
-                To::Game { game, side, .. } => {
+            let target = match self.target {
+                Target::Dataset { evaluation } => LinkTarget::Dataset(evaluation),
+                Target::Submission { submission } => LinkTarget::Submission(submission),
+                Target::Game { game, both, .. } if both => LinkTarget::Recording(game),
+                Target::Game { game, side, .. } => {
                     let found = client.game(game).await?;
-                    Linked::Side(game, own_side(&client, &found, side).await?)
+                    LinkTarget::Side(game, own_side(&client, &found, side).await?)
                 }
             };
-            let wanted = NewLink {
+            let new = NewLink {
                 expires_in_s: Some(self.hours * 3600),
             };
-            let made = client.link(to, wanted).await?;
-            print(self.server.json, &made, || {
+            let link = client.link(target, new).await?;
+            print(self.server.json, &link, || {
                 format!(
-                    "{}\nIt is good until {}, for whoever has it; it is not shown again.",
-                    made.url,
-                    made.expires_at.strftime("%Y-%m-%d %H:%M UTC")
+                    "{}\nThe link is valid until {} for everyone who has it. It is not shown again.",
+                    link.url,
+                    link.expires_at.strftime("%Y-%m-%d %H:%M UTC")
                 )
             })
         })

@@ -1,4 +1,4 @@
-//! A developer's own bundles, as `eval` and `play` run them.
+//! Bundles that `eval` and `play` run on a developer's machine.
 
 use crate::{config::Config, packing::Selection};
 use anyhow::Context;
@@ -13,18 +13,18 @@ use std::{
 };
 use tempfile::TempDir;
 
-/// A folder for bundles and recordings under way, beside the results and not in /tmp: a recording may be
-/// larger than a memory file system. An agent of another user can pass through.
+/// A folder for unpacked bundles and unfinished recordings. It is beside the results and not in /tmp, because a
+/// recording may be larger than a memory file system. An agent that runs as another user can traverse it.
 pub(super) fn scratch_in(out: &Path) -> anyhow::Result<TempDir> {
     tempfile::Builder::new()
         .prefix(".eval-")
         .permissions(std::os::unix::fs::PermissionsExt::from_mode(0o755))
         .tempdir_in(out)
-        .with_context(|| format!("making a folder in {}", out.display()))
+        .with_context(|| format!("creating a folder in {}", out.display()))
 }
 
-/// A folder is packed as `faceoff submit` packs it and unpacked as the server does, so that here is what will be there,
-/// and what the server would refuse is refused; without a sandbox it is used in place.
+/// Opens a bundle. A folder is packed like `faceoff submit` and unpacked like the server, so that the same files are
+/// evaluated and the same bundles refused. Without a sandbox, the folder is used in place.
 pub(super) fn open(
     path: &Path,
     scratch: &Path,
@@ -35,19 +35,19 @@ pub(super) fn open(
         return Ok(bundle::open(path, scratch, limits)?);
     }
     let archive = scratch.join("bundle.tar.gz");
-    let file = File::create(&archive).with_context(|| format!("making {}", archive.display()))?;
-    Selection::of(path)?.pack(file)?;
+    let file = File::create(&archive).with_context(|| format!("creating {}", archive.display()))?;
+    Selection::read(path)?.pack(file)?;
     let bundle = bundle::open(&archive, scratch, limits)?;
     fs::remove_file(&archive).with_context(|| format!("removing {}", archive.display()))?;
     Ok(bundle)
 }
 
-/// The server's limits, and what separates the agent from the host, if anything does.
+/// The server's limits and isolation, or none without a sandbox.
 pub(super) fn environment(config: &Config, runtime: &str, no_sandbox: bool) -> AgentEnvironment {
     let mut env = config.agent_environment();
     if no_sandbox {
         env.isolation = Isolation::None;
-        // The developer's own machine offers whatever the developer's PATH finds.
+        // Without a sandbox, the developer's own PATH applies.
         let path = std::env::var("PATH").unwrap_or_default();
         env.runtimes.insert(
             runtime.to_owned(),

@@ -1,4 +1,4 @@
-//! `faceoff log`: what an agent wrote, and what it did wrong.
+//! `faceoff log`: prints the log and the faults of an agent.
 
 use super::{game::own_side, output::print, server::ServerArgs};
 use crate::client::{ApiError, Client};
@@ -12,44 +12,44 @@ use faceoff_types::{EvaluationId, GameId, Side, SubmissionId};
 use reqwest::StatusCode;
 use serde::Serialize;
 
-/// Prints what an agent wrote to its standard error, with its faults: in the smoke run of a submission, in an evaluation
-/// that it failed, or in a game.
+/// Prints the log of an agent (its standard error) and its faults: of a submission's validation run, of an evaluation
+/// that the agent failed, or of a game.
 #[derive(Debug, Args)]
 pub struct LogCommand {
     /// The id of a submission, an evaluation or a game
     id: String,
-    /// Of a game, as an organiser: of which side, 1 (home) or 2 (away)
+    /// For organisers, with a game: the side, 1 (home) or 2 (away)
     #[arg(long, value_parser = super::game::side)]
     side: Option<Side>,
     #[command(flatten)]
     server: ServerArgs,
 }
 
-/// What is printed with `--json`.
+/// Output of `--json`.
 #[derive(Debug, Serialize)]
 struct Log {
-    /// Of what: `submission`, `evaluation` or `game`.
+    /// `submission`, `evaluation` or `game`.
     of: &'static str,
     id: String,
-    /// Of submissions and evaluations, in a word.
+    /// State of a submission or evaluation; absent for a game.
     #[serde(skip_serializing_if = "Option::is_none")]
     state: Option<String>,
-    /// Why there is nothing more.
+    /// Reason of an end without a result.
     #[serde(skip_serializing_if = "Option::is_none")]
     reason: Option<String>,
     faults: Vec<FaultView>,
-    /// `null`: it wrote nothing, or that is not shown (yet).
+    /// `null`: the log is empty, or not shown (yet).
     log: Option<String>,
-    /// What happens next; absent of games.
+    /// What happens next; absent for a game.
     #[serde(skip_serializing_if = "Option::is_none")]
     next: Option<String>,
 }
 
 impl LogCommand {
-    /// Asks the server of what it is the id, and prints its log.
+    /// Finds the submission, evaluation or game with the id and prints its log.
     ///
     /// # Errors
-    /// If it is of nothing that the server shows to us.
+    /// If the id is unknown, or the caller may not see it.
     pub fn run(self) -> anyhow::Result<()> {
         super::block_on(async {
             let client = self.server.client()?;
@@ -59,24 +59,24 @@ impl LogCommand {
     }
 
     async fn find(&self, client: &Client) -> anyhow::Result<Log> {
-        // All of them are ids of the same kind.
+        // Ids of submissions, evaluations and games have the same form.
         let submission: SubmissionId = self.id.parse().with_context(|| {
             format!(
                 "{:?}: expected the id of a submission, an evaluation or a game",
                 self.id
             )
         })?;
-        if let Some(found) = there(client.submission(submission).await)? {
-            return of_submission(&self.id, &found.status, found.next.clone());
+        if let Some(found) = none_if_missing(client.submission(submission).await)? {
+            return submission_log(&self.id, &found.status, found.next.clone());
         }
         let evaluation: EvaluationId = self.id.parse()?;
-        if let Some(found) = there(client.evaluation(evaluation).await)? {
-            return of_evaluation(&self.id, found.status, found.next);
+        if let Some(found) = none_if_missing(client.evaluation(evaluation).await)? {
+            return evaluation_log(&self.id, found.status, found.next);
         }
         let game: GameId = self.id.parse()?;
-        let Some(found) = there(client.game(game).await)? else {
+        let Some(found) = none_if_missing(client.game(game).await)? else {
             bail!(
-                "no submission, evaluation or game of yours has the id {}",
+                "you have no submission, evaluation or game with the id {}",
                 self.id
             );
         };
@@ -93,8 +93,8 @@ impl LogCommand {
     }
 }
 
-/// What was found; nothing, if there is none of that id.
-fn there<T>(found: anyhow::Result<T>) -> anyhow::Result<Option<T>> {
+/// Turns the error of an unknown id into `None`.
+fn none_if_missing<T>(found: anyhow::Result<T>) -> anyhow::Result<Option<T>> {
     match found {
         Ok(found) => Ok(Some(found)),
         Err(error) => match error.downcast_ref::<ApiError>() {
@@ -104,13 +104,13 @@ fn there<T>(found: anyhow::Result<T>) -> anyhow::Result<Option<T>> {
     }
 }
 
-/// The word by which the API knows a state.
-fn word(status: &impl Serialize) -> anyhow::Result<Option<String>> {
+/// The API's name of a state.
+fn state_name(status: &impl Serialize) -> anyhow::Result<Option<String>> {
     let value = serde_json::to_value(status).context("writing JSON")?;
     Ok(value["state"].as_str().map(str::to_owned))
 }
 
-fn of_submission(id: &str, status: &SubmissionStatus, next: String) -> anyhow::Result<Log> {
+fn submission_log(id: &str, status: &SubmissionStatus, next: String) -> anyhow::Result<Log> {
     let (reason, log) = match status {
         SubmissionStatus::Validating => (None, None),
         SubmissionStatus::Valid { log } => (None, log.clone()),
@@ -120,7 +120,7 @@ fn of_submission(id: &str, status: &SubmissionStatus, next: String) -> anyhow::R
     Ok(Log {
         of: "submission",
         id: id.to_owned(),
-        state: word(status)?,
+        state: state_name(status)?,
         reason,
         faults: Vec::new(),
         log,
@@ -128,8 +128,8 @@ fn of_submission(id: &str, status: &SubmissionStatus, next: String) -> anyhow::R
     })
 }
 
-fn of_evaluation(id: &str, status: EvaluationStatus, next: String) -> anyhow::Result<Log> {
-    let state = word(&status)?;
+fn evaluation_log(id: &str, status: EvaluationStatus, next: String) -> anyhow::Result<Log> {
+    let state = state_name(&status)?;
     let (reason, faults, log) = match status {
         EvaluationStatus::AgentFailed { faults, log, .. } => {
             (None, faults.unwrap_or_default(), log)
@@ -177,7 +177,7 @@ impl Log {
             .filter(|log| !log.is_empty())
         {
             Some(log) => lines.push(log.to_owned()),
-            None => lines.push("it has no log, or none that is shown".to_owned()),
+            None => lines.push("there is no log, or it is not shown".to_owned()),
         }
         lines.extend(self.next.as_ref().map(|next| format!("next: {next}")));
         lines.join("\n")

@@ -1,103 +1,104 @@
-//! `faceoff login`: keeps a token for the commands to come.
+//! `faceoff login`: stores a token for later commands.
 
-use super::{ca_file::CaFile, output::print, password, server::HERE, whoami};
+use super::{ca_file::CaFile, output::print, password, server::DEFAULT_SERVER, whoami};
 use crate::{
     client::Client,
     credentials::{self, Credentials, Login},
 };
 use anyhow::{Context, ensure};
 use clap::Args;
-use faceoff_api::{requests::NewToken, views::person::WhoView};
+use faceoff_api::{requests::NewToken, views::user::CallerView};
 use serde::Serialize;
 use std::{
     fs,
     path::{Path, PathBuf},
 };
 
-/// Signs in to a server, so that later commands need neither --server nor --token: by a token that you have, or by name
-/// and password, for which a token of this machine's is made. It is kept in `$XDG_CONFIG_HOME/faceoff/credentials.toml`
-/// (`~/.config/faceoff/credentials.toml`), which you alone can read, and never shown.
+/// Signs in to a server, so that later commands need neither --server nor --token: with an existing token, or with
+/// name and password, which creates a token for this machine. The token is stored in
+/// `$XDG_CONFIG_HOME/faceoff/credentials.toml` (`~/.config/faceoff/credentials.toml`), which only you can read, and
+/// is never shown.
 #[derive(Debug, Args)]
 pub struct LoginCommand {
-    /// The server [default: FACEOFF_SERVER, the one of the last login, or http://127.0.0.1:8080]
+    /// The server [default: FACEOFF_SERVER, the server of the last login, or http://127.0.0.1:8080]
     server: Option<String>,
-    /// Your name: sign in by it and your password, and not by a token
+    /// Your name, to sign in with name and password instead of a token
     #[arg(long)]
     name: Option<String>,
-    /// Read the password from standard input, and do not ask for it
+    /// Read the password from standard input instead of prompting
     #[arg(long, requires = "name")]
     password_stdin: bool,
-    /// Read the token from standard input, and do not ask for it
+    /// Read the token from standard input instead of prompting
     #[arg(long, conflicts_with = "name")]
     token_stdin: bool,
-    /// Do not make it the server of commands that name none, if another one is
+    /// Do not make this the default server, if there is another one
     #[arg(long)]
     not_default: bool,
     #[command(flatten)]
     ca: CaFile,
-    /// Print who you are as JSON
+    /// Print your account as JSON
     #[arg(long)]
     json: bool,
 }
 
-/// What is printed with `--json`.
+/// Output of `--json`.
 #[derive(Debug, Serialize)]
 struct LoggedIn<'a> {
     server: &'a str,
-    /// Do commands go there that name none?
+    /// This is the server of commands without `--server`.
     default: bool,
     file: &'a Path,
     #[serde(flatten)]
-    who: &'a WhoView,
+    who: &'a CallerView,
 }
 
 impl LoginCommand {
-    /// Signs in and keeps the token.
+    /// Signs in and stores the token.
     ///
     /// # Errors
-    /// If the server cannot be reached or does not know who that is; nothing is kept then.
+    /// If the server cannot be reached or refuses the token or password. Nothing is stored then.
     pub fn run(self) -> anyhow::Result<()> {
         super::block_on(self.sign_in())
     }
 
     async fn sign_in(self) -> anyhow::Result<()> {
         let file = credentials::path()?;
-        let kept = Credentials::load(&file)?;
+        let credentials = Credentials::load(&file)?;
         let named = self.server.or_else(|| std::env::var("FACEOFF_SERVER").ok());
-        let server = named.as_deref().or(kept.default_server()).unwrap_or(HERE);
-        // It is used from any folder later on.
+        let server = named.as_deref().or(credentials.default_server()).unwrap_or(DEFAULT_SERVER);
+        // Later commands may run in other folders.
         let ca_file: Option<PathBuf> = match self.ca.path() {
             Some(path) => Some(
                 fs::canonicalize(path)
                     .with_context(|| format!("looking for {}", path.display()))?,
             ),
-            None => kept.of(server).and_then(|login| login.ca_file.clone()),
+            None => credentials.login(server).and_then(|login| login.ca_file.clone()),
         };
         let client = Client::new(server, None, ca_file.as_deref())?;
         let made_here = self.name.is_some();
         let token = match self.name {
             Some(name) => {
                 let password = if self.password_stdin {
-                    password::from_input()?
+                    password::read_stdin()?
                 } else {
-                    password::ask(
+                    password::prompt(
                         "password: ",
-                        "give --password-stdin and the password as its input",
+                        "use --password-stdin and pass the password as standard input",
                     )?
                 };
-                by_password(&client, &name, &password).await?
+                create_token(&client, &name, &password).await?
             }
-            None if self.token_stdin => password::from_input()?.trim().to_owned(),
-            None => password::ask(
-                "token (or sign in by --name NAME): ",
-                "give --token-stdin and the token as its input, or --name NAME --password-stdin",
+            None if self.token_stdin => password::read_stdin()?.trim().to_owned(),
+            None => password::prompt(
+                "token (or sign in with --name NAME): ",
+                "use --token-stdin and pass the token as standard input, or --name NAME --password-stdin",
             )?
             .trim()
             .to_owned(),
         };
         ensure!(
             !token.is_empty(),
-            "expected a token, which begins with fo_; who has none joins by an invitation (faceoff join LINK), or gives --name"
+            "expected a token, which begins with fo_; without one, accept an invitation (faceoff join LINK), or sign in with --name"
         );
         let who = client.with_token(&token).whoami().await?;
         let login = Login {
@@ -105,10 +106,10 @@ impl LoginCommand {
             made_here,
             ca_file,
         };
-        // Looked at again: it may have taken a while to type.
-        let mut kept = Credentials::load(&file)?;
-        let replaced = kept.of(server).filter(|old| old.made_here).cloned();
-        // The same token given again is still the one that was made here.
+        // Loaded again, because another command may have changed the file while the user was typing.
+        let mut credentials = Credentials::load(&file)?;
+        let replaced = credentials.login(server).filter(|old| old.made_here).cloned();
+        // A stored token that is entered again was still created here.
         let is_same = replaced
             .as_ref()
             .is_some_and(|old| old.token == login.token);
@@ -116,35 +117,35 @@ impl LoginCommand {
             made_here: login.made_here || is_same,
             ..login
         };
-        kept.keep(server, login, !self.not_default);
-        kept.save(&file)?;
+        credentials.add(server, login, !self.not_default);
+        credentials.save(&file)?;
         if let Some(old) = replaced.filter(|_| !is_same) {
-            // Nobody else has it. One that is worth nothing already is as good as revoked.
-            let _ = client.with_token(&old.token).end_token().await;
+            // No one else has the old token. If it is already invalid, revoking it may fail.
+            let _ = client.with_token(&old.token).revoke_own_token().await;
         }
-        let told = LoggedIn {
+        let view = LoggedIn {
             server,
-            default: kept.is_default(server),
+            default: credentials.is_default(server),
             file: &file,
             who: &who,
         };
-        print(self.json, &told, || {
+        print(self.json, &view, || {
             let mut text = format!(
-                "{}\nsigned in to {server}, kept in {}",
-                whoami::text(&who),
+                "{}\nsigned in to {server}, token stored in {}",
+                whoami::whoami_text(&who),
                 file.display()
             );
-            if !told.default {
-                text.push_str(&format!("; commands go there by --server {server}"));
+            if !view.default {
+                text.push_str(&format!("; it is not the default server, use --server {server}"));
             }
             text
         })
     }
 }
 
-/// A token of this machine's, made by a session that ends with it.
-async fn by_password(client: &Client, name: &str, password: &str) -> anyhow::Result<String> {
-    // So that it can be told from others in a list of tokens; Linux has the file.
+/// Creates a token for this machine in a session that ends afterwards.
+async fn create_token(client: &Client, name: &str, password: &str) -> anyhow::Result<String> {
+    // The host's name identifies the token in lists; the file exists on Linux.
     let host = fs::read_to_string("/proc/sys/kernel/hostname").unwrap_or_default();
     let host: String = host.trim().chars().take(20).collect();
     let new = NewToken {

@@ -15,12 +15,12 @@ pub mod eval;
 pub mod evaluation;
 mod evaluation_text;
 mod files_client;
-mod find_stage;
+mod stage_lookup;
 pub mod game;
 pub mod health;
 pub mod import;
 pub mod init;
-mod introduction;
+mod capabilities;
 pub mod join;
 pub mod link;
 mod local_bundle;
@@ -28,7 +28,7 @@ pub mod log;
 pub mod login;
 pub mod logout;
 pub mod new;
-mod next_cut;
+mod next_cutoff;
 mod output;
 mod password;
 pub mod password_change;
@@ -45,7 +45,7 @@ pub mod season;
 pub mod serve;
 mod server;
 pub mod sim;
-mod staging;
+mod atomic_folder;
 pub mod status;
 mod storage;
 pub mod submissions;
@@ -61,11 +61,11 @@ pub mod worker;
 
 use anyhow::Context;
 
-/// Runs what talks to a server.
-fn block_on<T>(work: impl Future<Output = anyhow::Result<T>>) -> anyhow::Result<T> {
+/// Runs a future that talks to a server.
+fn block_on<T>(future: impl Future<Output = anyhow::Result<T>>) -> anyhow::Result<T> {
     tokio::runtime::Builder::new_current_thread()
         .enable_all()
         .build()
         .context("starting the async runtime")?
-        .block_on(work)
+        .block_on(future)
 }

@@ -1,4 +1,4 @@
-//! `faceoff new`: an agent of one's own, as a folder that runs as it is.
+//! `faceoff new`: creates a folder with a working agent.
 
 mod example;
 mod templates;
@@ -13,43 +13,43 @@ use std::{
     path::{Path, PathBuf},
 };
 
-/// Makes a folder with an agent that plays, its tests, and a README with the loop: edit, evaluate, look.
+/// Creates a folder with a working agent, its tests and a README that explains how to edit, evaluate and inspect it.
 #[derive(Debug, Args)]
 pub struct NewCommand {
-    /// The folder to make; its last part is the agent's name
+    /// The folder to create; its last part is the agent's name
     folder: PathBuf,
-    /// What the agent is written in
+    /// Programming language of the agent
     #[arg(long, value_enum, default_value_t = Language::Python)]
     lang: Language,
-    /// What it can do from the start
+    /// Behaviour that the agent starts with
     #[arg(long, value_enum, default_value_t = Example::Defender)]
     example: Example,
-    /// Print what was made as JSON
+    /// Print a summary as JSON
     #[arg(long)]
     json: bool,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Language {
-    /// Standard library only; runs wherever the evaluator does
+    /// Python with the standard library only; runs wherever the evaluator runs
     Python,
-    /// A crate of its own; the bundle is the program
+    /// A Rust crate; the bundle is its compiled program
     Rust,
 }
 
-/// Longest name: that of a crate's program is a file name, and the board has little room.
-const NAME_CHARS: usize = 40;
+/// Longest name; it becomes a file name and has to fit on the board.
+const MAX_NAME_CHARS: usize = 40;
 
 impl NewCommand {
-    /// Writes the folder and says what to do next.
+    /// Writes the folder and prints the next steps.
     ///
     /// # Errors
-    /// If the name is none, something is there already, or the disk refuses.
+    /// If the name is invalid, the folder exists, or it cannot be written.
     pub fn run(self) -> anyhow::Result<()> {
-        let name = name_of(&self.folder)?;
+        let name = agent_name(&self.folder)?;
         ensure!(
             fs::symlink_metadata(&self.folder).is_err(),
-            "{} is there already; choose another name, or remove it first",
+            "{} already exists; choose another name, or remove it first",
             self.folder.display()
         );
         let files = match self.lang {
@@ -60,7 +60,7 @@ impl NewCommand {
         for (path, text) in files {
             let path = self.folder.join(path);
             let parent = path.parent().unwrap_or(&self.folder);
-            fs::create_dir_all(parent).with_context(|| format!("making {}", parent.display()))?;
+            fs::create_dir_all(parent).with_context(|| format!("creating {}", parent.display()))?;
             let text = text
                 .replace("{{name}}", name)
                 .replace("{{task}}", self.example.task())
@@ -69,35 +69,35 @@ impl NewCommand {
             written.push(path);
         }
         let (folder, task) = (self.folder.display(), self.example.task());
-        // A bundle is uploaded with all that lies in it: results lie beside it.
-        let (tested, bundle, beside) = match self.lang {
+        // A bundle is uploaded with all its files, so results are written beside it.
+        let (test_command, bundle, out_prefix) = match self.lang {
             Language::Python => ("python3 -m unittest", ".", "../"),
             Language::Rust => ("cargo test && sh pack.sh", "bundle", ""),
         };
-        let made = json!({ "folder": self.folder, "name": name, "task": task, "files": written });
-        print(self.json, &made, || {
+        let summary = json!({ "folder": self.folder, "name": name, "task": task, "files": written });
+        print(self.json, &summary, || {
             format!(
-                "{folder}: an agent that plays {task}; README.md says what is what. Now:\n\n  cd {folder}\n  {tested}\n  \
-                 faceoff eval {bundle} --task {task} --episodes 20 --out {beside}result\n  \
-                 faceoff replay {beside}result --task {task} --episode 0 --out {beside}look.html"
+                "{folder}: an agent for the task {task}; README.md explains its files. Next:\n\n  cd {folder}\n  {test_command}\n  \
+                faceoff eval {bundle} --task {task} --episodes 20 --out {out_prefix}result\n  \
+                faceoff replay {out_prefix}result --task {task} --episode 0 --out {out_prefix}look.html"
             )
         })
     }
 }
 
-/// The folder's own name, which both languages and the board take.
-fn name_of(folder: &Path) -> anyhow::Result<&str> {
+/// The last part of the path, if it is a valid name in both languages and on the board.
+fn agent_name(folder: &Path) -> anyhow::Result<&str> {
     let name = folder.file_name().and_then(|name| name.to_str());
-    let fits = |name: &&str| {
-        name.len() <= NAME_CHARS
+    let is_valid = |name: &&str| {
+        name.len() <= MAX_NAME_CHARS
             && name.starts_with(|c: char| c.is_ascii_lowercase())
             && name
                 .bytes()
                 .all(|b| b.is_ascii_lowercase() || b.is_ascii_digit() || matches!(b, b'-' | b'_'))
     };
-    name.filter(fits).with_context(|| {
+    name.filter(is_valid).with_context(|| {
         format!(
-            "expected a name of at most {NAME_CHARS} lower-case letters, digits, - and _ that begins with a letter, \
+            "expected a name of at most {MAX_NAME_CHARS} lower-case letters, digits, - and _ that begins with a letter, \
              such as my-agent, got {}",
             folder.display()
         )

@@ -1,17 +1,17 @@
-use crate::client::Downloaded;
+use crate::client::DownloadedFile;
 use anyhow::Context;
 use indicatif::{ProgressBar, ProgressStyle};
 
-/// The lines, or what stands in their place.
-pub(super) fn or_none(lines: Vec<String>, none: &str) -> String {
+/// Joins the lines; `fallback` replaces an empty list.
+pub(super) fn lines_or(lines: Vec<String>, fallback: &str) -> String {
     if lines.is_empty() {
-        none.to_owned()
+        fallback.to_owned()
     } else {
         lines.join("\n")
     }
 }
 
-/// Prints what the server answered: as it came, or as text.
+/// Prints a value as JSON, or as text.
 pub(super) fn print<T: serde::Serialize>(
     json: bool,
     value: &T,
@@ -28,21 +28,21 @@ pub(super) fn print<T: serde::Serialize>(
     Ok(())
 }
 
-/// Shows how far a download is, if standard error is a terminal.
+/// The progress bar of a download, shown if standard error is a terminal.
 pub(super) fn download_bar() -> anyhow::Result<ProgressBar> {
     let style = "downloading {bar:40} {bytes}/{total_bytes}, {bytes_per_sec}, {eta} left";
     let style = ProgressStyle::with_template(style).context("the progress bar's template")?;
     Ok(ProgressBar::new(0).with_style(style))
 }
 
-/// What was downloaded, in words.
-pub(super) fn downloaded(done: &Downloaded) -> String {
+/// One line about a finished download.
+pub(super) fn download_text(done: &DownloadedFile) -> String {
     let resumed = match done.resumed_at {
         0 => String::new(),
-        at => format!(", the first {at} of which were there"),
+        at => format!(" (resumed after {at})"),
     };
     let checked = if done.checked {
-        ", as the server has it"
+        " (verified)"
     } else {
         ""
     };

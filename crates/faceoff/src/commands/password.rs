@@ -1,10 +1,10 @@
-//! A password, from whoever sits at the terminal or from standard input; never from the command line, which others see.
+//! Reads secrets from the terminal or from standard input, never from the command line, which other users can see.
 
 use anyhow::{Context, bail};
 use std::io::{IsTerminal, Read};
 
-/// Reads one from standard input, to its end.
-pub(super) fn from_input() -> anyhow::Result<String> {
+/// Reads a secret from standard input, to its end.
+pub(super) fn read_stdin() -> anyhow::Result<String> {
     let mut text = String::new();
     std::io::stdin()
         .read_to_string(&mut text)
@@ -12,14 +12,14 @@ pub(super) fn from_input() -> anyhow::Result<String> {
     Ok(text.trim_end_matches(['\r', '\n']).to_owned())
 }
 
-/// Asks for something secret at the terminal, which does not show it.
+/// Prompts for a secret at the terminal without echoing it.
 ///
 /// # Errors
-/// If there is no terminal; `instead` says what to do then.
-pub(super) fn ask(question: &str, instead: &str) -> anyhow::Result<String> {
+/// If there is no terminal; the error contains the alternative `instead`.
+pub(super) fn prompt(question: &str, instead: &str) -> anyhow::Result<String> {
     if !std::io::stdin().is_terminal() {
-        bail!("there is no terminal to ask at: {instead}");
+        bail!("standard input is not a terminal: {instead}");
     }
-    let answer = rpassword::prompt_password(question).context("asking at the terminal")?;
+    let answer = rpassword::prompt_password(question).context("reading from the terminal")?;
     Ok(answer)
 }

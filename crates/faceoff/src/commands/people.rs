@@ -1,17 +1,17 @@
-//! How commands print people and invitations.
+//! Text of users and invitations.
 
-use super::output::or_none;
+use super::output::lines_or;
 use faceoff_api::{
     requests::InvitedRole,
     views::{
         invitation::{InvitationView, NewInvitationView},
-        person::PersonView,
+        user::UserView,
     },
 };
 
-/// A person in a list.
-pub(super) fn person_line(person: &PersonView) -> String {
-    let of = match person.team {
+/// A user as one line.
+pub(super) fn person_line(person: &UserView) -> String {
+    let role = match person.team {
         Some(team) => format!("member of {team}"),
         None => "organiser".to_owned(),
     };
@@ -19,14 +19,14 @@ pub(super) fn person_line(person: &PersonView) -> String {
         format!("  left {}", at.strftime("%Y-%m-%d %H:%M UTC"))
     });
     format!(
-        "{}  {:<40} {of}  since {}{left}",
+        "{}  {:<40} {role}  since {}{left}",
         person.id,
         person.name,
         person.joined_at.strftime("%Y-%m-%d")
     )
 }
 
-/// An invitation in a list.
+/// An invitation as one line.
 pub(super) fn invitation_line(invitation: &InvitationView) -> String {
     let role = match invitation.role {
         InvitedRole::Organiser => "organiser",
@@ -44,15 +44,15 @@ pub(super) fn invitation_line(invitation: &InvitationView) -> String {
 }
 
 /// A new invitation, with its link.
-pub(super) fn invited(made: &NewInvitationView) -> String {
+pub(super) fn new_invitation_text(new: &NewInvitationView) -> String {
     format!(
-        "{}\n{}\nIt is not shown again; it is good for one person, once.",
-        invitation_line(&made.invitation),
-        made.link
+        "{}\n{}\nThe link is not shown again; it can be used once.",
+        invitation_line(&new.invitation),
+        new.link
     )
 }
 
 pub(super) fn invitation_lines(invitations: &[InvitationView]) -> String {
     let lines = invitations.iter().map(invitation_line).collect();
-    or_none(lines, "nobody was invited yet")
+    lines_or(lines, "no invitations yet")
 }

@@ -1,17 +1,17 @@
-//! `faceoff play`: one game between two bundles, or a series of them.
+//! `faceoff play`: one game or a series of games between two bundles.
 
 mod bar;
-mod broken;
+mod platform_fault;
 mod options;
 mod results;
 mod series;
 mod series_results;
-mod setting;
+mod matchup;
 mod table;
 
 use anyhow::{Context, bail};
 use bar::Bar;
-use broken::explained;
+use platform_fault::with_advice;
 use clap::Args;
 use faceoff_dataset::game::{GAME_FILE, clear_game, side_file};
 use faceoff_runner::GameReport;
@@ -19,15 +19,15 @@ use faceoff_types::Side;
 use options::PlayOptions;
 use results::Results;
 use series_results::Kind;
-use setting::Setting;
+use matchup::Matchup;
 use std::fs;
 
-/// What an evaluation writes, with a score of the same name.
+/// File of an evaluation, whose `results.json` would be overwritten.
 const DATASET: &str = "dataset.zip";
 
-/// Plays one game between two agents, each in a sandbox of its own, prints the result and writes
-/// `results.json`, `game.zip` (which `faceoff verify` simulates again), `side-1.zip` and `side-2.zip` (what each
-/// side may have of it) and `clips` (what replays are drawn from) to a folder. Exit status 0 only if there is a result; a forfeit is one.
+/// Plays one game between two agents, each in its own sandbox, prints the result and writes to a folder:
+/// `results.json`, `game.zip` (for `faceoff verify`), `side-1.zip` and `side-2.zip` (the datasets of the
+/// sides) and `clips` (for replays). The exit status is 0 only if there is a result; a forfeit is a result.
 #[derive(Debug, Args)]
 pub struct PlayCommand {
     #[command(flatten)]
@@ -35,13 +35,13 @@ pub struct PlayCommand {
 }
 
 impl PlayCommand {
-    /// Plays, scores, prints and writes.
+    /// Plays the game or series, prints the result and writes the files.
     ///
     /// # Errors
     /// If a bundle is refused or the platform fails; the error says which.
     pub fn run(self) -> anyhow::Result<()> {
         let options = &self.options;
-        let config = setting::config(options)?;
+        let config = matchup::load_config(options)?;
         let out = &options.out;
         fs::create_dir_all(out).with_context(|| format!("creating {}", out.display()))?;
         let series = match (options.pairs, options.games) {
@@ -51,39 +51,39 @@ impl PlayCommand {
         };
         if out.join(DATASET).exists() {
             bail!(
-                "{} holds the results of an evaluation: name another folder with --out",
+                "{} contains the results of an evaluation: name another folder with --out",
                 out.display()
             );
         }
-        if let Some(earlier) = series::earlier(out) {
+        if let Some(earlier) = series::find_earlier(out) {
             bail!(
-                "{} holds the recordings of an earlier series: name another folder with --out, or remove that one",
+                "{} contains the recordings of an earlier series: name another folder with --out, or remove it",
                 earlier.display()
             );
         }
-        // Whatever comes of this one, an earlier game is not it.
+        // If this game has no result, the files of an earlier game must not be mistaken for it.
         let results = Results::clear_in(out)?;
         clear_game(out).with_context(|| format!("clearing {}", out.display()))?;
-        let setting = Setting::open(options, config)?;
+        let matchup = Matchup::open(options, config)?;
         match series {
-            Some((kind, wanted)) => series::play(options, &setting, kind, wanted, &results),
-            None => one_game(options, &setting, &results),
+            Some((kind, count)) => series::play(options, &matchup, kind, count, &results),
+            None => play_game(options, &matchup, &results),
         }
     }
 }
 
-fn one_game(options: &PlayOptions, setting: &Setting, results: &Results) -> anyhow::Result<()> {
+fn play_game(options: &PlayOptions, matchup: &Matchup, results: &Results) -> anyhow::Result<()> {
     let mut bar = Bar::steps(options.steps)?;
-    let played = setting.play(options.seed, false, &options.out, &mut bar);
+    let played = matchup.play(options.seed, false, &options.out, &mut bar);
     bar.finish();
     let GameReport { archives, logs, .. } =
-        played.map_err(explained).context("there is no result")?;
+        played.map_err(with_advice).context("there is no result")?;
     let json = results.write(&archives.score)?;
     if options.json {
         print!("{json}");
         return Ok(());
     }
-    print!("{}", table::of(&archives.score));
+    print!("{}", table::game_table(&archives.score));
     for (side, outcome) in Side::BOTH.into_iter().zip(&archives.outcome.sides) {
         for fault in &outcome.faults {
             println!("fault: {fault}");

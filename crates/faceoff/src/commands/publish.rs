@@ -1,12 +1,12 @@
-//! `faceoff publish`: makes an evaluation of the team's public before its stage does.
+//! `faceoff publish`: publishes an evaluation of the team before its stage does.
 
 use super::{output::print, server::ServerArgs};
 use clap::Args;
 use faceoff_api::views::evaluation::EvaluationStatus;
 use faceoff_types::EvaluationId;
 
-/// Makes a finished evaluation of the team's public, with its dataset: everybody sees it from then on, without a
-/// token, and that stays so.
+/// Publishes a finished evaluation of the team with its dataset: everyone can see it without a token. This
+/// cannot be undone.
 #[derive(Debug, Args)]
 pub struct PublishCommand {
     /// The evaluation's id
@@ -16,7 +16,7 @@ pub struct PublishCommand {
 }
 
 impl PublishCommand {
-    /// Publishes it.
+    /// Publishes the evaluation.
     ///
     /// # Errors
     /// If the server cannot be reached or refuses.
@@ -27,8 +27,8 @@ impl PublishCommand {
     async fn publish(self) -> anyhow::Result<()> {
         let published = self.server.client()?.publish(self.evaluation).await?;
         print(self.server.json, &published, || {
-            let mut told = format!(
-                "public: the evaluation of {} ({})",
+            let mut text = format!(
+                "published: the evaluation of {} ({})",
                 published.day, published.id
             );
             if let EvaluationStatus::Finished {
@@ -36,9 +36,9 @@ impl PublishCommand {
                 ..
             } = &published.status
             {
-                told.push_str(&format!("\ndataset {path}"));
-            }
-            told
+                text.push_str(&format!("\ndataset {path}"));
+                }
+                text
         })
     }
 }

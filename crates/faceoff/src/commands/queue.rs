@@ -1,13 +1,13 @@
 use faceoff_api::views::queue::QueueView;
 
-/// Where something stands in the queue, in words.
-pub fn in_queue(queue: &QueueView) -> String {
+/// Position in the queue and expected end.
+pub fn queue_text(queue: &QueueView) -> String {
     let expected = match queue.expected_at {
-        Some(at) => format!("expected to be over {}", at.strftime("%Y-%m-%d %H:%M UTC")),
-        None => "nobody can tell yet when it will be over".to_owned(),
+        Some(at) => format!("expected to finish at {}", at.strftime("%Y-%m-%d %H:%M UTC")),
+        None => "finish time unknown".to_owned(),
     };
     format!(
-        "number {} of {} to be over, {expected}",
+        "position {} of {}, {expected}",
         queue.place, queue.of
     )
 }

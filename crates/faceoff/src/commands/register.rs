@@ -1,29 +1,29 @@
-//! `faceoff register`: a team wants to take part.
+//! `faceoff register`: registers a team.
 
 use super::{output::print, server::ServerArgs};
 use clap::Args;
-use faceoff_api::requests::{FoundedTeam, Register};
+use faceoff_api::requests::{FoundedTeam, RegistrationRequest};
 use faceoff_types::{DivisionName, TeamName};
 
-/// Registers a team, where the season takes registrations, and prints the link by which its first member joins once an
-/// organiser has approved it, this once.
+/// Registers a team, if registration is open, and prints the link for its first member, which works after an
+/// organiser's approval and is shown only once.
 #[derive(Debug, Args)]
 pub struct RegisterCommand {
     /// The team's name
     team: TeamName,
-    /// How the organisers reach it; nobody else sees it
+    /// Contact address, shown to organisers only
     #[arg(long)]
     contact: String,
-    /// Where it is from
+    /// The team's affiliation
     #[arg(long)]
     affiliation: Option<String>,
-    /// Its page
+    /// The team's web page
     #[arg(long, value_name = "URL")]
     link: Option<String>,
-    /// The division that it wants to be in
+    /// The team's division
     #[arg(long)]
     division: Option<DivisionName>,
-    /// The version of the terms that it accepts, if there are terms
+    /// The version of the terms that the team accepts, if the season has terms
     #[arg(long, value_name = "VERSION")]
     accept_terms: Option<u32>,
     #[command(flatten)]
@@ -31,12 +31,12 @@ pub struct RegisterCommand {
 }
 
 impl RegisterCommand {
-    /// Registers it.
+    /// Registers the team.
     ///
     /// # Errors
     /// If the server cannot be reached or refuses.
     pub fn run(self) -> anyhow::Result<()> {
-        let wanted = Register {
+        let registration = RegistrationRequest {
             team: FoundedTeam {
                 name: self.team,
                 affiliation: self.affiliation,
@@ -47,12 +47,12 @@ impl RegisterCommand {
             accepted_terms: self.accept_terms,
         };
         super::block_on(async {
-            let made = self.server.anybody()?.register(&wanted).await?;
-            print(self.server.json, &made, || {
+            let created = self.server.client_or_visitor()?.register(&registration).await?;
+            print(self.server.json, &created, || {
                 format!(
-                    "registered; an organiser looks at it\n{}\nThe link is not shown again: it says where the registration stands, \
-                     and once it is approved the first member joins there (faceoff join LINK).",
-                    made.join_link
+                    "registered; waiting for the approval of an organiser\n{}\nThe link is not shown again. It shows the state of the \
+                    registration; after the approval, the first member joins with it (faceoff join LINK).",
+                    created.join_link
                 )
             })
         })

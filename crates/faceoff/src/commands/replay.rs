@@ -1,26 +1,26 @@
-//! `faceoff replay`: an episode as a page to look at.
+//! `faceoff replay`: draws an episode as an HTML page or an SVG picture.
 
 mod page;
 mod plots;
-mod recorded;
+mod recording;
 mod table_view;
 
 use super::output::print;
 use anyhow::{Context, bail};
 use clap::Args;
 use faceoff_types::Task;
-use recorded::Recorded;
+use recording::EpisodeRecording;
 use serde_json::json;
 use std::{
     fs,
     path::{Path, PathBuf},
 };
 
-/// Draws one episode of a dataset: the table from above, what was observed beside what was true, speeds, constraints and
-/// computation times, and why it ended as it did. An .html page can be played; it asks for nothing from the network.
+/// Draws one episode of a dataset: the table from above, true and observed puck, speeds, constraints, computation
+/// times, and the reason of its end. An .html page is animated and needs no network.
 #[derive(Debug, Args)]
 pub struct ReplayCommand {
-    /// dataset.zip, the folder it was unpacked to, or the folder that `faceoff eval` wrote
+    /// dataset.zip, the folder it was unpacked to, or the folder of `faceoff eval --out`
     dataset: PathBuf,
     /// The task
     #[arg(long)]
@@ -28,10 +28,10 @@ pub struct ReplayCommand {
     /// The episode, from 0
     #[arg(long, value_name = "N")]
     episode: u32,
-    /// Where to write it: a page (.html) or a picture (.svg); one that is there is replaced
+    /// The file to write, a page (.html) or a picture (.svg); an existing file is replaced
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
-    /// Print why it ended as JSON
+    /// Print the reason of the episode's end as JSON
     #[arg(long)]
     json: bool,
 }
@@ -56,27 +56,27 @@ impl Format {
 }
 
 impl ReplayCommand {
-    /// Reads the episode, draws it, and prints why it ended.
+    /// Reads the episode, draws it, and prints the reason of its end.
     ///
     /// # Errors
-    /// If the dataset cannot be read or does not hold the episode, or the file cannot be written.
+    /// If the dataset cannot be read or lacks the episode, or the file cannot be written.
     pub fn run(self) -> anyhow::Result<()> {
         let format = Format::of(&self.out)?;
-        let recorded = Recorded::read(&self.dataset, self.task, self.episode)?;
+        let recording = EpisodeRecording::read(&self.dataset, self.task, self.episode)?;
         let text = match format {
-            Format::Html => page::html(&recorded)?,
-            Format::Svg => page::svg(&recorded)?,
+            Format::Html => page::html(&recording)?,
+            Format::Svg => page::svg(&recording)?,
         };
         fs::write(&self.out, text).with_context(|| format!("writing {}", self.out.display()))?;
-        let losses = recorded.losses();
-        let told = json!({
-            "episode": recorded.headline(),
-            "why": recorded.why,
+        let losses = recording.losses();
+        let summary = json!({
+            "episode": recording.headline(),
+            "why": recording.end_reason,
             "losses": losses,
             "file": self.out,
         });
-        print(self.json, &told, || {
-            let head = [recorded.headline(), recorded.why.clone()];
+        print(self.json, &summary, || {
+            let head = [recording.headline(), recording.end_reason.clone()];
             let file = self.out.display().to_string();
             let lines: Vec<String> = head
                 .into_iter()

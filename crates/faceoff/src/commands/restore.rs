@@ -1,4 +1,4 @@
-//! `faceoff restore`: a data folder from a backup.
+//! `faceoff restore`: creates a data folder from a backup.
 
 use super::{
     backup::{
@@ -6,8 +6,8 @@ use super::{
         manifest::{ARTIFACTS, DATABASE, Manifest},
     },
     output::print,
-    serve::claim,
-    staging::{self, Kind, Staging},
+    serve::lock,
+    atomic_folder::{self, AtomicFolder, FolderKind},
     storage::bytes,
 };
 use anyhow::{Context as _, bail, ensure};
@@ -21,14 +21,14 @@ use std::{
     path::{Path, PathBuf},
 };
 
-/// Makes a data folder of what `faceoff backup` has copied, for `faceoff serve` to go on from: work that was under way goes on
-/// from its last committed shard. Every file is held against the backup's list, and the database is checked, before the
-/// folder is there.
+/// Creates a data folder from a backup of `faceoff backup`, with which `faceoff serve` continues: unfinished
+/// evaluations continue after their last committed shard. All files are compared with the backup's list and the
+/// database is checked before the folder is created.
 #[derive(Debug, Args)]
 pub struct RestoreCommand {
-    /// What `faceoff backup` made
+    /// The backup, made by `faceoff backup`
     folder: PathBuf,
-    /// The data folder to make; one that exists must be empty
+    /// The data folder to create; an existing folder must be empty
     #[arg(
         long,
         visible_alias = "data-dir",
@@ -36,43 +36,43 @@ pub struct RestoreCommand {
         required_unless_present = "check"
     )]
     data: Option<PathBuf>,
-    /// Take the place of a data folder that no server uses; what is there stays beside it, under another name
+    /// Replace a data folder that no server uses; the old one is kept beside it under another name
     #[arg(long)]
     replace: bool,
-    /// Only look whether the backup is whole
+    /// Only check whether the backup is intact
     #[arg(long, conflicts_with_all = ["data", "replace"])]
     check: bool,
-    /// Print what was done as JSON
+    /// Print a summary as JSON
     #[arg(long)]
     json: bool,
 }
 
-const RESTORE: Kind = Kind {
+const RESTORE: FolderKind = FolderKind {
     name: "restore",
     suffix: "restoring",
 };
 
 impl RestoreCommand {
-    /// Restores it, or checks it.
+    /// Restores or checks the backup.
     ///
     /// # Errors
-    /// If the backup is not whole, the folder holds something or is a running server's; nothing has changed then.
+    /// If the backup is damaged, or the folder is not empty or in use by a server. Nothing is changed then.
     pub fn run(self) -> anyhow::Result<()> {
         let manifest = backup::open(&self.folder)?;
         let Some(data) = self.data else {
             check(&self.folder, &manifest)?;
             for missing in &manifest.missing {
-                eprintln!("the backup was made without it: {missing}");
+                eprintln!("missing in the backup: {missing}");
             }
             ensure!(
                 manifest.missing.is_empty(),
-                "{} is as it was made, but was made without {} of what its database names",
+                "{} is intact, but lacks {} files that its database refers to",
                 self.folder.display(),
                 manifest.missing.len()
             );
-            return print(self.json, &manifest.told(&self.folder), || {
+            return print(self.json, &manifest.summary(&self.folder), || {
                 format!(
-                    "{} is whole: {:?} as it was at {}, {} files, {}",
+                    "{} is intact: {:?} of {}, {} files, {}",
                     self.folder.display(),
                     manifest.season,
                     manifest.made_at.strftime("%Y-%m-%d %H:%M:%S UTC"),
@@ -82,21 +82,21 @@ impl RestoreCommand {
             });
         };
         let replaced = restore(&self.folder, &manifest, &data, self.replace)?;
-        let mut told = manifest.told(&data);
-        told["replaced"] = json!(replaced);
-        print(self.json, &told, || {
+        let mut summary = manifest.summary(&data);
+        summary["replaced"] = json!(replaced);
+        print(self.json, &summary, || {
             let mut lines = vec![format!(
-                "restored {:?} as it was at {}: {} files, {}",
+                "restored {:?} of {}: {} files, {}",
                 manifest.season,
                 manifest.made_at.strftime("%Y-%m-%d %H:%M:%S UTC"),
                 manifest.files.len(),
                 bytes(manifest.total_bytes())
             )];
             let missing = manifest.missing.iter();
-            lines.extend(missing.map(|one| format!("the backup was made without it: {one}")));
+            lines.extend(missing.map(|file| format!("missing in the backup: {file}")));
             if let Some(replaced) = &replaced {
                 lines.push(format!(
-                    "what was there is {} now; remove it when it is not needed any more",
+                    "the old data folder is now {}; remove it when it is no longer needed",
                     replaced.display()
                 ));
             }
@@ -106,75 +106,75 @@ impl RestoreCommand {
     }
 }
 
-/// Makes the data folder; where what was there has gone.
+/// Creates the data folder. Returns the new path of a replaced one.
 fn restore(
     folder: &Path,
     manifest: &Manifest,
     data: &Path,
     replace: bool,
 ) -> anyhow::Result<Option<PathBuf>> {
-    let is_empty = staging::check_empty(
+    let is_empty = atomic_folder::check_empty(
         data,
-        "a backup is restored into a folder of its own: name one that is empty or not there yet, or have it take this \
-         one's place with --replace",
+        "a backup is restored into its own folder: name an empty or a new one, or replace this one \
+        with --replace",
     );
-    // Held to the end: whoever has it is told before anything is copied.
-    let claimed = match is_empty {
+    // Locked until the end, so that a folder in use is noticed before anything is copied.
+    let lock = match is_empty {
         Ok(()) => None,
-        Err(_) if replace => Some(claim_old(data)?),
-        Err(refused) => return Err(refused),
+        Err(_) if replace => Some(lock_old(data)?),
+        Err(error) => return Err(error),
     };
-    let staging = Staging::make(data, &RESTORE)?;
-    let made = staging.content();
-    staging::private(&made)?;
+    let new_folder = AtomicFolder::create(data, &RESTORE)?;
+    let made = new_folder.content();
+    atomic_folder::create_private(&made)?;
     let mut folders = BTreeSet::from([ARTIFACTS.to_owned()]);
     for file in &manifest.files {
         let (from, to) = (folder.join(&file.path), made.join(&file.path));
         let inside = Path::new(&file.path).ancestors().skip(1);
         folders.extend(inside.filter_map(|folder| Some(folder.to_str()?.to_owned())));
         if let Some(parent) = to.parent() {
-            staging::private(parent)?;
+            atomic_folder::create_private(parent)?;
         }
-        let copied = files::copy_whole(&from, &to)?;
+        let copied = files::copy_file(&from, &to)?;
         ensure!(
             copied.blake3 == file.blake3,
-            "{} is not what was backed up: expected BLAKE3 {}, got {}",
+            "{} has changed since the backup: expected BLAKE3 {}, got {}",
             from.display(),
             file.blake3,
             copied.blake3
         );
     }
-    check_database(&made.join(DATABASE), staging.scratch())?;
+    check_database(&made.join(DATABASE), new_folder.scratch())?;
     super::block_on(async {
         let skipped = Store::skip_event_ids(&made.join(DATABASE)).await;
-        skipped.context("letting the ids of events go on behind those that were given")
+        skipped.context("reserving the event ids that the old server may have used")
     })?;
-    staging::private(&made.join(ARTIFACTS))?;
+    atomic_folder::create_private(&made.join(ARTIFACTS))?;
     let folders: Vec<&str> = folders.iter().map(String::as_str).collect();
-    if claimed.is_none() {
-        staging.settle(data, &folders)?;
+    if lock.is_none() {
+        new_folder.commit(data, &folders)?;
         return Ok(None);
     }
-    let aside = aside(data)?;
-    staging.replace(data, &folders, &aside)?;
-    Ok(Some(aside))
+    let old = replaced_path(data)?;
+    new_folder.replace(data, &folders, &old)?;
+    Ok(Some(old))
 }
 
-/// Claims a data folder that is to be replaced.
-fn claim_old(data: &Path) -> anyhow::Result<File> {
+/// Locks a data folder that is to be replaced.
+fn lock_old(data: &Path) -> anyhow::Result<File> {
     ensure!(
         data.join(DATABASE).exists(),
-        "{} holds no {DATABASE}: --replace takes the place of a data folder, and of nothing else",
+        "{} has no {DATABASE}: --replace only replaces data folders",
         data.display()
     );
-    claim(data)
+    lock(data)
 }
 
-/// What a data folder is named that is replaced. The database goes with its log, so that none of its is left for another
-/// database.
-fn aside(data: &Path) -> anyhow::Result<PathBuf> {
+/// The new path of a data folder that is replaced. The whole folder is moved, so that the new database does not find
+/// the write-ahead log of the old one.
+fn replaced_path(data: &Path) -> anyhow::Result<PathBuf> {
     let Some(name) = data.file_name() else {
-        bail!("{} names no folder that could be moved", data.display());
+        bail!("{} is not a folder that can be moved", data.display());
     };
     let mut name = name.to_owned();
     name.push(
@@ -182,25 +182,25 @@ fn aside(data: &Path) -> anyhow::Result<PathBuf> {
             .strftime(".replaced-%Y%m%dT%H%M%SZ")
             .to_string(),
     );
-    let aside = data.with_file_name(name);
-    ensure!(!aside.exists(), "{} is in the way", aside.display());
-    Ok(aside)
+    let path = data.with_file_name(name);
+    ensure!(!path.exists(), "{} already exists", path.display());
+    Ok(path)
 }
 
-/// Holds every file against the list, and looks into the database.
+/// Compares every file with the list and checks the database.
 fn check(folder: &Path, manifest: &Manifest) -> anyhow::Result<()> {
     for file in &manifest.files {
         let path = folder.join(&file.path);
-        let found = files::hashed(&path)?;
+        let found = files::hash_file(&path)?;
         ensure!(
             found.blake3 == file.blake3,
-            "{} is not what was backed up: expected BLAKE3 {}, got {}",
+            "{} has changed since the backup: expected BLAKE3 {}, got {}",
             path.display(),
             file.blake3,
             found.blake3
         );
     }
-    let scratch = tempfile::tempdir().context("making a folder for a copy of the database")?;
+    let scratch = tempfile::tempdir().context("creating a folder for a copy of the database")?;
     check_database(&folder.join(DATABASE), scratch.path())
 }
 

@@ -1,11 +1,12 @@
-//! `faceoff runtimes`: what agents find on a server.
+//! `faceoff runtimes`: prints the runtimes, packages and limits of agents on a server.
 
 use super::{output::print, server::ServerArgs};
 use clap::Args;
 use faceoff_api::views::runtimes::RuntimesView;
 use faceoff_types::{AgentLimits, RuntimeContent, RuntimeInventory};
 
-/// Shows what agents find on the server: runtimes with their packages, and the limits of each contest.
+/// Shows the environment of agents on the server: runtimes with their packages, and the limits of each stage and
+/// tournament.
 #[derive(Debug, Args)]
 pub struct RuntimesCommand {
     #[command(flatten)]
@@ -13,25 +14,25 @@ pub struct RuntimesCommand {
 }
 
 impl RuntimesCommand {
-    /// Asks the server.
+    /// Requests the runtimes and prints them.
     ///
     /// # Errors
-    /// If it cannot be reached.
+    /// If the server cannot be reached.
     pub fn run(self) -> anyhow::Result<()> {
         super::block_on(async {
-            let offered = self.server.anybody()?.runtimes().await?;
-            print(self.server.json, &offered, || text(&offered))
+            let offered = self.server.client_or_visitor()?.runtimes().await?;
+            print(self.server.json, &offered, || runtimes_text(&offered))
         })
     }
 }
 
-fn text(offered: &RuntimesView) -> String {
-    let mut lines: Vec<String> = offered.runtimes.iter().map(runtime).collect();
+fn runtimes_text(offered: &RuntimesView) -> String {
+    let mut lines: Vec<String> = offered.runtimes.iter().map(runtime_line).collect();
     let machine = &offered.machine;
     lines.push(format!(
-        "agents run on {} ({}), on {} at a time; they have no GPU and no network",
+        "agents run on {} ({}) with {}, without GPU and network",
         machine.architecture,
-        machine.cpu_model.as_deref().unwrap_or("a CPU of no name"),
+        machine.cpu_model.as_deref().unwrap_or("unknown CPU"),
         match machine.cpus_per_agent {
             1 => "1 CPU".to_owned(),
             cpus => format!("{cpus} CPUs"),
@@ -40,27 +41,27 @@ fn text(offered: &RuntimesView) -> String {
     let mut contests: Vec<_> = offered
         .stages
         .iter()
-        .map(|one| (one.name.as_str(), &one.runtimes, &one.limits))
+        .map(|stage| (stage.name.as_str(), &stage.runtimes, &stage.limits))
         .collect();
     let tournaments = offered.tournaments.iter();
-    contests.extend(tournaments.map(|one| (one.name.as_str(), &one.runtimes, &one.limits)));
+    contests.extend(tournaments.map(|contest| (contest.name.as_str(), &contest.runtimes, &contest.limits)));
     if contests.is_empty() {
-        lines.push(format!("limits: {}", limits(&offered.limits)));
+        lines.push(format!("limits: {}", limits_text(&offered.limits)));
     }
-    for (name, runtimes, held_to) in contests {
+    for (name, runtimes, limits) in contests {
         lines.push(format!(
-            "{name} takes {}: {}",
-            super::output::or_none(vec![runtimes.join(", ")], "none"),
-            limits(held_to)
+            "{name} allows {}: {}",
+            super::output::lines_or(vec![runtimes.join(", ")], "none"),
+            limits_text(limits)
         ));
     }
     lines.join("\n")
 }
 
-fn runtime(runtime: &RuntimeInventory) -> String {
+fn runtime_line(runtime: &RuntimeInventory) -> String {
     let libc = |libc: &Option<String>| match libc {
         Some(version) => format!("glibc {version}"),
-        None => "a C library that does not tell its version".to_owned(),
+        None => "a C library of unknown version".to_owned(),
     };
     let found = match &runtime.content {
         RuntimeContent::Python(python) => {
@@ -83,15 +84,15 @@ fn runtime(runtime: &RuntimeInventory) -> String {
         RuntimeContent::Native { libc: version } => {
             format!("programs and shared libraries; {}", libc(version))
         }
-        RuntimeContent::Image => "container images, which bring their own files".to_owned(),
-        RuntimeContent::Broken { why } => why.clone(),
+        RuntimeContent::Image => "container images, which contain their own files".to_owned(),
+        RuntimeContent::Failed { reason } => reason.clone(),
     };
     format!("{:<12} {found}", runtime.name)
 }
 
-fn limits(limits: &AgentLimits) -> String {
+fn limits_text(limits: &AgentLimits) -> String {
     format!(
-        "{} CPU, {} MiB of memory, {} processes; {} s to start, {} s a step; an archive of {} MiB, {} unpacked, in {} files",
+        "{} CPU, {} MiB of memory, {} processes; {} s to start, {} s per step; bundles up to {} MiB, {} MiB unpacked, {} files",
         limits.resources.cpus,
         limits.resources.memory_bytes >> 20,
         limits.resources.pids,

@@ -1,79 +1,78 @@
-//! `faceoff score`: scoring alone, for organisers who score again by hand.
+//! `faceoff score`: computes boards and tournament standings from files.
 
 mod lines;
-mod scored;
+mod scored_tournament;
 pub(super) mod table;
 mod tournament;
 
 use crate::terminal;
 use anyhow::{Context as _, bail, ensure};
 use clap::{Args, Subcommand};
-use faceoff_scoring::{QualifyingSheet, tournament::PlayedGame};
+use faceoff_scoring::{QualifyingScores, tournament::PlayedGame};
 use faceoff_types::{TaskWeights, TierBounds};
 use lines::write_line;
 use serde::de::DeserializeOwned;
 use std::io::{IsTerminal as _, Read, Write};
 use tournament::TournamentArgs;
 
-/// Far more than any competition's results; a limit so that a wrong file cannot fill the memory.
+/// Far more than the results of any competition; the limit keeps a wrong file from filling the memory.
 const INPUT_LIMIT_BYTES: u64 = 64 << 20;
 
-/// Score results by hand: a qualifying board or a tournament.
+/// Scores results from a file: a qualifying board or a tournament.
 #[derive(Debug, Args)]
 pub struct ScoreCommand {
     #[command(subcommand)]
-    stage: Stage,
+    kind: Kind,
 }
 
 #[derive(Debug, Clone, Subcommand)]
-enum Stage {
+enum Kind {
     /// Read tasks.json from standard input and print the board, one JSON object per row, best first
     ///
     /// Input: {"TEAM": {"hit": {"success_rate": 0.549, "penalty_points": 327.5}, "defend": {…},
-    /// "prepare": {…}}, …}. Rates are fractions. "episodes" beside them is 1000 unless given; the tasks
-    /// of a results.json may stand there as they are. Teams that are level keep the order of the file.
+    /// "prepare": {…}}, …}. Rates are fractions. "episodes" is optional, default 1000. The tasks of a
+    /// results.json can be used unchanged. Teams with equal results keep the sequence of the file.
     Qualifying {
-        /// What hit, defend and prepare weigh [default: 0.4,0.4,0.2]
+        /// Weights of hit, defend and prepare [default: 0.4,0.4,0.2]
         #[arg(long, value_name = "WEIGHTS")]
         weights: Option<TaskWeights>,
-        /// Penalty points per episode up to which a team is deployable, and improvable [default: 0.5,1.5]
+        /// Penalty points per episode up to which a team is deployable and improvable [default: 0.5,1.5]
         #[arg(long, value_name = "BOUNDS")]
         tier_bounds: Option<TierBounds>,
     },
-    /// Read games.json from standard input and print winners and why, standings, head-to-head records and
+    /// Read games.json from standard input and print winners with reasons, standings, head-to-head records and
     /// ratings, as one JSON object or as tables
     ///
     /// Input: [{"round": 1, "home": "A", "away": "B", "goals": [10, 0], "fouls": [0, 0],
-    /// "penalty_points": [62.0, 384.0]}, …], or the final "score" in place of "fouls". "windows" is 90
-    /// unless given. "forfeit": [null, "faults"] (or "time") says who forfeited, "submissions": ["v1", "v3"]
-    /// which submissions played, so that ratings tell them apart, "pair": 7 that the game is one half of a mirrored
-    /// pair.
+    /// "penalty_points": [62.0, 384.0]}, …], or the final "score" instead of "fouls". Optional fields:
+    /// "windows", default 90; "forfeit": [null, "faults"] (or "time"), the side that forfeited;
+    /// "submissions": ["v1", "v3"], the submissions, which are rated separately; "pair": 7, the number of the
+    /// mirrored pair that the game belongs to.
     Tournament(TournamentArgs),
 }
 
 impl ScoreCommand {
-    /// Scores what stands on standard input.
+    /// Scores the data on standard input.
     ///
     /// # Errors
-    /// If the input is not what the rules allow, naming the team or game and the field; if reading or
-    /// writing fails.
+    /// If the input violates the rules (the error names team or game and field), or reading or writing fails.
     pub fn run(self) -> anyhow::Result<()> {
         let stdin = std::io::stdin();
         ensure!(
             !stdin.is_terminal(),
             "expected {} on standard input, as in `faceoff score {} < {}`",
-            self.stage.file(),
-            self.stage.name(),
-            self.stage.file()
+            self.kind.file(),
+            self.kind.name(),
+            self.kind.file()
         );
         let mut out = terminal::stdout();
-        self.stage
+        self.kind
             .score(stdin.lock(), &mut out, &mut terminal::stderr())?;
         out.flush().context("standard output")
     }
 }
 
-impl Stage {
+impl Kind {
     const fn name(&self) -> &'static str {
         match self {
             Self::Qualifying { .. } => "qualifying",
@@ -101,8 +100,8 @@ impl Stage {
                 weights,
                 tier_bounds,
             } => {
-                let sheet: QualifyingSheet = parse(&input, file)?;
-                for row in sheet.board_by(
+                let sheet: QualifyingScores = parse(&input, file)?;
+                for row in sheet.board_with(
                     &weights.unwrap_or_default(),
                     &tier_bounds.unwrap_or_default(),
                 ) {
@@ -134,7 +133,7 @@ fn read_all(input: impl Read, file: &str) -> anyhow::Result<Vec<u8>> {
     Ok(bytes)
 }
 
-/// Parses JSON; an error names the place by team or game, field, line and column.
+/// Parses JSON; an error names team or game, field, line and column.
 fn parse<T: DeserializeOwned>(json: &[u8], file: &str) -> anyhow::Result<T> {
     let mut deserializer = serde_json::Deserializer::from_slice(json);
     let value = serde_path_to_error::deserialize(&mut deserializer)
@@ -150,14 +149,14 @@ mod tests {
     use super::*;
     use serde_json::{Value, json};
 
-    const QUALIFYING: Stage = Stage::Qualifying {
+    const QUALIFYING: Kind = Kind::Qualifying {
         weights: None,
         tier_bounds: None,
     };
 
-    const TOURNAMENT: Stage = Stage::Tournament(TournamentArgs::JSON);
+    const TOURNAMENT: Kind = Kind::Tournament(TournamentArgs::JSON);
 
-    fn score(stage: Stage, input: &str) -> (anyhow::Result<()>, Vec<Value>, String) {
+    fn score(stage: Kind, input: &str) -> (anyhow::Result<()>, Vec<Value>, String) {
         let (mut out, mut warnings) = (Vec::new(), Vec::new());
         let outcome = stage.score(input.as_bytes(), &mut out, &mut warnings);
         let lines = String::from_utf8(out).unwrap();
@@ -168,9 +167,9 @@ mod tests {
         (outcome, rows, String::from_utf8(warnings).unwrap())
     }
 
-    fn error(stage: Stage, input: &str) -> String {
+    fn error(stage: Kind, input: &str) -> String {
         let (outcome, rows, _) = score(stage, input);
-        assert_eq!(rows, Vec::<Value>::new(), "no half of a board is printed");
+        assert_eq!(rows, Vec::<Value>::new(), "no partial board is printed");
         format!("{:#}", outcome.unwrap_err())
     }
 
@@ -181,7 +180,7 @@ mod tests {
     }
 
     #[test]
-    fn the_board_is_one_object_per_row_in_board_order() {
+    fn board_is_one_json_object_per_row_by_rank() {
         let input = json!({"A": tasks(0.9, 501.0), "B": tasks(0.1, 0.0), "C": tasks(0.2, 10.0)});
         let (outcome, rows, _) = score(QUALIFYING, &input.to_string());
         outcome.unwrap();
@@ -209,9 +208,9 @@ mod tests {
     }
 
     #[test]
-    fn weights_and_bounds_may_be_others() {
+    fn custom_weights_and_bounds_apply() {
         let input = json!({"A": tasks(0.9, 501.0), "B": tasks(0.1, 0.0)}).to_string();
-        let stage = Stage::Qualifying {
+        let stage = Kind::Qualifying {
             weights: Some("1,0,0".parse().unwrap()),
             tier_bounds: Some("0.6,0.7".parse().unwrap()),
         };
@@ -228,7 +227,7 @@ mod tests {
     }
 
     #[test]
-    fn the_tournament_is_one_object_with_games_and_standings() {
+    fn tournament_is_one_object_with_games_and_standings() {
         let game = json!({"round": 1, "home": "A", "away": "B", "goals": [1, 4], "fouls": [0, 9],
             "penalty_points": [136.0, 12]});
         let (outcome, rows, warnings) = score(TOURNAMENT, &json!([game, game]).to_string());
@@ -254,7 +253,7 @@ mod tests {
     }
 
     #[test]
-    fn errors_name_the_file_the_place_and_what_came() {
+    fn error_names_file_place_and_value() {
         let wrong = json!({"Alpha": tasks(54.9, 0.0)}).to_string();
         let got = error(QUALIFYING, &wrong);
         assert!(
@@ -305,14 +304,14 @@ mod tests {
     }
 
     #[test]
-    fn an_input_without_end_is_refused() {
+    fn endless_input_is_refused() {
         let endless = std::io::repeat(b' ');
         let outcome = QUALIFYING.score(endless, &mut Vec::new(), &mut Vec::new());
         assert!(format!("{:#}", outcome.unwrap_err()).contains("at most 67108864 bytes"));
     }
 
     #[test]
-    fn nothing_to_score_is_an_empty_board() {
+    fn empty_input_is_an_empty_board() {
         let (outcome, rows, _) = score(QUALIFYING, "{}");
         outcome.unwrap();
         assert_eq!(rows, Vec::<Value>::new());

@@ -1,10 +1,10 @@
-//! `faceoff season`: what is played, and by what commitment.
+//! `faceoff season`: prints the season.
 
 use super::{output::print, server::ServerArgs};
 use clap::Args;
 use faceoff_api::views::season::SeasonView;
 
-/// Shows the season: its name, its commitment, its state.
+/// Shows the season: name, commitment and state.
 #[derive(Debug, Args)]
 pub struct SeasonCommand {
     #[command(flatten)]
@@ -12,33 +12,33 @@ pub struct SeasonCommand {
 }
 
 impl SeasonCommand {
-    /// Asks the server.
+    /// Requests the season and prints it.
     ///
     /// # Errors
-    /// If it cannot be reached.
+    /// If the server cannot be reached.
     pub fn run(self) -> anyhow::Result<()> {
         super::block_on(async {
-            let season = self.server.anybody()?.season().await?;
-            print(self.server.json, &season, || of_season(&season))
+            let season = self.server.client_or_visitor()?.season().await?;
+            print(self.server.json, &season, || season_text(&season))
         })
     }
 }
 
-/// The season in words.
-pub(super) fn of_season(season: &SeasonView) -> String {
+/// The season as text.
+pub(super) fn season_text(season: &SeasonView) -> String {
     let state = match (season.closed_at, season.secret) {
         (Some(closed_at), Some(secret)) => {
             let closed_at = closed_at.strftime("%Y-%m-%d %H:%M UTC");
             format!("closed     {closed_at}\nsecret     {secret}")
         }
         _ if season.archived.is_some() => {
-            "open       it was, so that its secret is not here".to_owned()
+            "open       at the time of the archive, which therefore has no secret".to_owned()
         }
-        _ => "open       its secret is published when it is closed".to_owned(),
+        _ => "open       the secret is published when the season is closed".to_owned(),
     };
     let archived = match &season.archived {
         Some(archived) => format!(
-            "\narchived   as it was on {}, the {} edition: nothing changes any more",
+            "\narchived   {}, {} edition, read-only",
             archived.made_at.strftime("%Y-%m-%d %H:%M UTC"),
             archived.edition
         ),
@@ -52,7 +52,7 @@ pub(super) fn of_season(season: &SeasonView) -> String {
         None => String::new(),
     };
     format!(
-        "{} ({}), {} days played\ncommitment {}\n{state}{queue}{archived}",
+        "{} ({}), {} evaluation days\ncommitment {}\n{state}{queue}{archived}",
         season.name,
         season.ruleset,
         season.days.len(),

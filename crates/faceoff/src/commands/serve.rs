@@ -1,28 +1,28 @@
-//! `faceoff serve`: API, pages, worker slots and the daily schedule in one process.
+//! `faceoff serve`: API, pages, worker slots and schedule in one process.
 
-mod answering;
-mod archived;
-mod folder;
-mod looking_in;
+mod http;
+mod archived_season;
+mod data_folder;
+mod runtime_inventory;
 mod remote;
-mod watching;
+mod monitoring;
 
-pub use answering::signalled;
-pub use folder::{ADMIN_TOKEN_FILE, claim};
+pub use data_folder::{ADMIN_TOKEN_FILE, lock};
+pub use http::shutdown_signal;
 
-use super::staging::private;
+use super::atomic_folder::create_private;
 use crate::{client, config::Config, descriptors::Descriptors, log::LogFormat, machine};
-use answering::answer;
+use http::serve_http;
 use anyhow::{Context, bail};
 use clap::Args;
-use faceoff_http::{Capacity, CapacityWatch, ConnectionLimits, HttpConfig, Offer};
+use faceoff_http::{Capacity, CapacityMonitor, ConnectionLimits, HttpConfig, AgentResources};
 use faceoff_metrics::Metrics;
 use faceoff_notify::Deliverer;
 use faceoff_sandbox::{HostFeature, Layer, MemoryImage, Runtime, affinity, probe_host};
-use faceoff_store::{Actor, Lot, Room, Store};
+use faceoff_store::{Actor, JobFilter, FreeSpace, Store};
 use faceoff_types::Clock;
 use faceoff_worker::{CpuLayout, SlotThreads, SlotsConfig, WorkerConfig};
-use folder::{empty_folder, link_key, set_admin_token};
+use data_folder::{empty_folder, link_key, set_admin_token};
 use jiff::Timestamp;
 use sd_notify::NotifyState;
 use std::{collections::BTreeMap, io::Write as _, net::SocketAddr, path::PathBuf, thread};
@@ -32,28 +32,28 @@ use tokio_util::sync::CancellationToken;
 /// Starts the competition server.
 #[derive(Debug, Args)]
 pub struct ServeCommand {
-    /// Configuration file [default: faceoff.toml in the working folder, if there is one]
+    /// Configuration file [default: faceoff.toml in the working folder, if it exists]
     #[arg(long, value_name = "FILE", env = "FACEOFF_CONFIG")]
     config: Option<PathBuf>,
-    /// Address of API and pages; replaces server.listen of the configuration
+    /// Address of API and pages; overrides server.listen of the configuration
     #[arg(long, value_name = "ADDRESS:PORT")]
     listen: Option<SocketAddr>,
-    /// Folder of database and artifacts; replaces server.data_dir of the configuration
+    /// Folder of database and artifacts; overrides server.data_dir of the configuration
     #[arg(long, value_name = "FOLDER")]
     data_dir: Option<PathBuf>,
-    /// NATS, by which workers on other machines are given work; replaces nats.url of the configuration
+    /// NATS server through which remote workers get jobs; overrides nats.url of the configuration
     #[arg(long, value_name = "URL")]
     nats: Option<String>,
-    /// How the log is written, to standard error; RUST_LOG sets what is logged
+    /// Format of the log on standard error; RUST_LOG sets the log level
     #[arg(long, value_enum, default_value_t = LogFormat::Text)]
     log_format: LogFormat,
 }
 
 impl ServeCommand {
-    /// Serves until SIGINT or SIGTERM.
+    /// Runs the server until SIGINT or SIGTERM.
     ///
     /// # Errors
-    /// If the configuration, the data folder, the address or the sandbox is not as it must be.
+    /// If the configuration, the data folder, the address or the sandbox is unusable.
     pub fn run(self) -> anyhow::Result<()> {
         self.log_format.start()?;
         let mut config = Config::load(self.config.as_deref())?;
@@ -63,14 +63,14 @@ impl ServeCommand {
         if let Some(data_dir) = self.data_dir {
             config.server.data_dir = data_dir;
         }
-        config.reach_nats(self.nats)?;
+        config.override_nats_url(self.nats)?;
         let archived = super::block_on(async {
             let data_dir = &config.server.data_dir;
-            let found = Store::archived_in(data_dir).await;
-            found.with_context(|| format!("looking into the data folder {}", data_dir.display()))
+            let archived = Store::archived_in(data_dir).await;
+            archived.with_context(|| format!("reading the data folder {}", data_dir.display()))
         })?;
         if archived.is_none() {
-            // Before anything is opened: a host that cannot hold agents must not look as if it could.
+            // Checked before anything is opened: a host that cannot isolate agents must not look as if it could.
             check_sandbox(&probe_host(), &config.sandbox.given_up)?;
             config.check_runtimes()?;
         }
@@ -81,50 +81,50 @@ impl ServeCommand {
             reserved = descriptors.reserved,
             connections = descriptors.connections,
             per_address = descriptors.per_address,
-            "file descriptors are divided"
+            "file descriptors assigned"
         );
         if descriptors.connections < connections.open {
             tracing::warn!(
                 wanted = connections.open,
-                "fewer connections than connections.most; raise the limit of descriptors (ulimit -n, LimitNOFILE=)"
+                "fewer connections than connections.most: raise the limit of file descriptors (ulimit -n, LimitNOFILE=)"
             );
         }
         let connections = descriptors.limits(connections);
         if let Some(archived) = archived {
-            // Without agents nothing needs CPUs of its own.
+            // An archived season runs no agents, so no CPUs are reserved.
             return tokio::runtime::Builder::new_multi_thread()
                 .enable_all()
                 .build()
                 .context("starting the async runtime")?
-                .block_on(archived::serve(config, connections, archived));
+                .block_on(archived_season::serve(config, connections, archived));
         }
-        let cpus = CpuLayout::of_a_server(config.slots(), &config.workers.agent_cpus);
-        let offer = looking_in::offer(&config, &cpus)?;
-        let (threads, starter) = SlotThreads::of_another();
+        let cpus = CpuLayout::for_server(config.slots(), &config.workers.agent_cpus);
+        let resources = runtime_inventory::agent_resources(&config, &cpus)?;
+        let (threads, starter) = SlotThreads::from_starter();
         let service = thread::Builder::new()
             .name("service".to_owned())
-            .spawn(move || serve_giving_way(config, connections, cpus, threads, offer))
-            .context("starting the service's thread")?;
-        // This thread keeps its CPUs and its priority, for the slots' threads to inherit.
-        starter.tend();
+            .spawn(move || serve_with_low_priority(config, connections, cpus, threads, resources))
+            .context("starting the service thread")?;
+            // This thread keeps its CPUs and its priority, which the threads of the slots inherit.
+        starter.run();
         service
             .join()
-            .unwrap_or_else(|_| bail!("the service's thread panicked"))
+            .unwrap_or_else(|_| bail!("the service thread panicked"))
     }
 }
 
-/// Requests, the database and the schedule: whatever strangers do with them, slots come first. Threads
-/// inherit from the one that starts them: most from this one. Those that a slot's request makes the runtime start
-/// give way by themselves; a connection of the database that such a request opens keeps the slot's priority.
-fn serve_giving_way(
+/// Runs requests, database and schedule with a lower priority than slots, so that requests do not disturb
+/// evaluations. Threads inherit the priority of the thread that starts them, usually this one. A thread that the
+/// runtime starts for a slot lowers its own priority; a database connection that a slot opens keeps the slot's.
+fn serve_with_low_priority(
     config: Config,
     connections: ConnectionLimits,
     cpus: CpuLayout,
     threads: SlotThreads,
-    offer: Offer,
+    resources: AgentResources,
 ) -> anyhow::Result<()> {
-    if let Err(error) = affinity::give_way(&cpus.service) {
-        tracing::warn!(%error, cpus = ?cpus.service, "requests cannot be kept from disturbing slots");
+    if let Err(error) = affinity::lower_priority(&cpus.service) {
+        tracing::warn!(%error, cpus = ?cpus.service, "cannot lower the priority of requests, which may disturb slots");
     }
     tokio::runtime::Builder::new_multi_thread()
         .enable_all()
@@ -134,20 +134,20 @@ fn serve_giving_way(
                 cpus.service.clone(),
                 affinity::niceness().unwrap_or_default(),
             );
-            move || give_way_too(&cpus, nice)
+            move || lower_priority(&cpus, nice)
         })
         .build()
         .context("starting the async runtime")?
-        .block_on(serve(config, connections, cpus, threads, offer))
+        .block_on(serve(config, connections, cpus, threads, resources))
 }
 
-/// A thread of the runtime that was started for what a slot asked has the slot's priority until here, where
-/// the others have the value `nice`.
-fn give_way_too(cpus: &[usize], nice: i32) {
+/// Lowers the priority of a runtime thread that a slot has started and that has inherited the slot's priority. Other
+/// threads already have the value `nice`.
+fn lower_priority(cpus: &[usize], nice: i32) {
     if affinity::niceness().is_ok_and(|own| own < nice)
-        && let Err(error) = affinity::give_way(cpus)
+        && let Err(error) = affinity::lower_priority(cpus)
     {
-        tracing::warn!(%error, ?cpus, "requests cannot be kept from disturbing slots");
+        tracing::warn!(%error, ?cpus, "cannot lower the priority of requests, which may disturb slots");
     }
 }
 
@@ -156,28 +156,28 @@ async fn serve(
     connections: ConnectionLimits,
     cpus: CpuLayout,
     threads: SlotThreads,
-    offer: Offer,
+    resources: AgentResources,
 ) -> anyhow::Result<()> {
     let data_dir = config.server.data_dir.clone();
-    private(&data_dir)?;
-    let _claimed = claim(&data_dir)?;
+    create_private(&data_dir)?;
+    let _lock = lock(&data_dir)?;
     let upload_dir = data_dir.join("uploads");
-    // What a crash left half uploaded belongs to no submission.
+    // A crash may have left half-uploaded files, which belong to no submission.
     empty_folder(&upload_dir)?;
     let scratch_dir = config.scratch_dir();
-    private(&scratch_dir)?;
-    let watched = vec![data_dir.clone(), scratch_dir.clone()];
+    create_private(&scratch_dir)?;
+    let disks = vec![data_dir.clone(), scratch_dir.clone()];
     let store = Store::open(&data_dir)
         .await
         .with_context(|| format!("opening the data folder {}", data_dir.display()))?
-        .with_room(Room::new(watched, config.server.min_free_bytes));
+        .with_free_space(FreeSpace::new(disks, config.server.min_free_bytes));
     if let Some(upgrade) = store.upgrade() {
         tracing::info!(
             from = upgrade.from.as_deref().unwrap_or("an earlier version"),
             from_schema = upgrade.from_schema,
             to = upgrade.to.version,
             to_schema = upgrade.to.schema,
-            "the database is upgraded"
+            "database upgraded"
         );
     }
     let now = Timestamp::now();
@@ -198,7 +198,7 @@ async fn serve(
         })?;
     let address = listener
         .local_addr()
-        .context("asking for the address that was bound")?;
+        .context("reading the bound address")?;
     let clock = Clock::new(Timestamp::now);
     let season = store.season().await.context("reading the season")?;
     config
@@ -212,7 +212,7 @@ async fn serve(
             clock.now(),
         )
         .await
-        .context("evaluation: giving the season's first stage its rules")?;
+        .context("evaluation: setting the rules of the season's first stage")?;
     let mut agent = config.agent_environment();
     let capacity = Capacity {
         slots: match config.workers.play {
@@ -220,12 +220,12 @@ async fn serve(
             false => 0,
         },
         time: config.time.clone(),
-        runtimes: agent.offered(),
+        runtimes: agent.runtime_names(),
     };
-    let watch = CapacityWatch::new(store.clone(), clock.clone(), capacity.clone());
+    let watch = CapacityMonitor::new(store.clone(), clock.clone(), capacity.clone());
     let metrics = Metrics::new(env!("CARGO_PKG_VERSION"));
     let link_key = link_key(&data_dir)?;
-    let given_elsewhere = remote::config(&config, address, &link_key, &agent)?;
+    let remote = remote::remote_config(&config, address, &link_key, &agent)?;
     let site = HttpConfig {
         max_bundle_bytes: config.bundle.packed_bytes,
         public_url: config.server.public_url.clone(),
@@ -233,28 +233,28 @@ async fn serve(
         clock: clock.clone(),
         limits: config.uploads.limits(),
         capacity,
-        offer,
+        agent_resources: resources,
         webhooks: config.webhooks.clone(),
-        rates: config.rates.limits(),
+        rate_limits: config.rates.limits(),
         link_key,
         metrics: metrics.clone(),
         process: machine::process,
     };
-    let watched_at = match config.server.metrics_listen {
-        Some(address) => Some(watching::listen(address).await?),
+    let metrics_listener = match config.server.metrics_listen {
+        Some(address) => Some(monitoring::listen(address).await?),
         None => None,
     };
     let router = faceoff_http::router(store.clone(), site.clone());
-    let tls = client::trusting_tls(None).unwrap_or_else(|error| {
-        // No evaluation depends on it, and what happens meanwhile is told once they are there.
-        tracing::error!(%error, "webhooks behind TLS are told nothing: install the package ca-certificates and start again");
-        client::no_tls()
+    let tls = client::tls_client_config(None).unwrap_or_else(|error| {
+        // Evaluations do not depend on webhooks, and pending deliveries are retried after the restart.
+        tracing::error!(%error, "deliveries to webhooks with TLS fail: install the package ca-certificates and restart");
+        client::plain_client_config()
     });
     let rules = config.webhooks.clone();
-    let tells_webhooks = rules.enabled;
+    let webhooks_enabled = rules.enabled;
     let deliverer = Deliverer::new(store.clone(), clock.clone(), rules, tls)
-        .context("setting up what tells webhooks")?;
-    // For as long as agents run.
+        .context("setting up the delivery of webhooks")?;
+        // Kept as long as agents run.
     let _image = in_memory(&mut agent.runtimes, config.sandbox.resident_bytes);
     let workers = WorkerConfig {
         slots: SlotsConfig {
@@ -264,9 +264,9 @@ async fn serve(
             agent,
             metrics: metrics.clone(),
         },
-        lot: match config.workers.play {
-            true => Lot::All,
-            false => Lot::Rest,
+        job_filter: match config.workers.play {
+            true => JobFilter::All,
+            false => JobFilter::ValidationAndScoring,
         },
         lease_s: config.workers.lease_s,
         bundle_limits: config.bundle,
@@ -281,7 +281,7 @@ async fn serve(
 
     let shutdown = CancellationToken::new();
     let mut parts = JoinSet::new();
-    if let Some(remote) = given_elsewhere {
+    if let Some(remote) = remote {
         parts.spawn(faceoff_worker::dispatch(
             store.clone(),
             clock.clone(),
@@ -301,38 +301,38 @@ async fn serve(
         clock,
         shutdown.clone(),
     ));
-    let asked_to_end = shutdown.clone();
+    let shutdown_requested = shutdown.clone();
     parts.spawn(async move {
-        watch.run(asked_to_end.cancelled_owned()).await;
+        watch.run(shutdown_requested.cancelled_owned()).await;
         Ok(())
     });
-    parts.spawn(watching::count(store.clone(), metrics, shutdown.clone()));
-    if let Some(listener) = watched_at {
+    parts.spawn(monitoring::count_changes(store.clone(), metrics, shutdown.clone()));
+    if let Some(listener) = metrics_listener {
         let store = store.clone();
-        parts.spawn(watching::answer(listener, store, site, shutdown.clone()));
+        parts.spawn(monitoring::serve_metrics(listener, store, site, shutdown.clone()));
     }
-    let asked_to_end = shutdown.clone();
+    let shutdown_requested = shutdown.clone();
     parts.spawn(async move {
-        if tells_webhooks {
-            deliverer.run(asked_to_end).await;
+        if webhooks_enabled {
+            deliverer.run(shutdown_requested).await;
         } else {
-            asked_to_end.cancelled().await;
+            shutdown_requested.cancelled().await;
         }
         Ok(())
     });
-    parts.spawn(answer(listener, router, connections, shutdown.clone()));
-    // For the program that started this one, whatever is logged: from now on a connection is answered,
-    // and a port that the system chose is known. That nobody listens is no fault.
+    parts.spawn(serve_http(listener, router, connections, shutdown.clone()));
+    // Tells the parent process the address, including a port that the system has chosen, once connections are
+    // accepted. A closed standard output is no error.
     let _ = writeln!(std::io::stdout(), "http://{address}");
-    tell_host(NotifyState::Ready);
+    notify_service_manager(NotifyState::Ready);
 
-    let signal = signalled()?;
+    let signal = shutdown_signal()?;
     let mut outcome = Ok(());
     tokio::select! {
-        name = signal => tracing::info!(signal = name, "ending: slots give their work back"),
-        Some(part) = parts.join_next() => outcome = ended_early(part),
+        name = signal => tracing::info!(signal = name, "shutting down: slots release their jobs"),
+        Some(part) = parts.join_next() => outcome = unexpected_end(part),
     }
-    tell_host(NotifyState::Stopping);
+    notify_service_manager(NotifyState::Stopping);
     shutdown.cancel();
     let rest = async {
         while let Some(part) = parts.join_next().await {
@@ -344,48 +344,48 @@ async fn serve(
             }
         }
     };
-    // The second signal is for the impatient; leases make that safe.
-    let second = signalled()?;
+    // A second signal stops the server immediately, which leases make safe.
+    let second = shutdown_signal()?;
     tokio::select! {
         () = rest => {
             store.close().await;
-            tracing::info!("ended");
+            tracing::info!("stopped");
         }
-        name = second => tracing::warn!(signal = name, "ending at once"),
+        name = second => tracing::warn!(signal = name, "second signal: stopping immediately"),
     }
     outcome
 }
 
-/// Tells the service manager that started this program, if there is one that wants to know.
-fn tell_host(state: NotifyState<'_>) {
+/// Reports a state to the service manager that has started this program, if there is one.
+fn notify_service_manager(state: NotifyState<'_>) {
     if let Err(error) = sd_notify::notify(&[state]) {
-        tracing::warn!(%error, "the service manager was not told how this program stands");
+        tracing::warn!(%error, "cannot notify the service manager");
     }
 }
 
-/// A part of the server came to its end although nobody asked it to.
-fn ended_early(part: Result<anyhow::Result<()>, tokio::task::JoinError>) -> anyhow::Result<()> {
+/// The error of a part of the server that ended before the shutdown.
+fn unexpected_end(part: Result<anyhow::Result<()>, tokio::task::JoinError>) -> anyhow::Result<()> {
     match part {
-        Ok(Ok(())) => bail!("a part of the server ended by itself"),
+        Ok(Ok(())) => bail!("a part of the server ended unexpectedly"),
         Ok(Err(error)) => Err(error),
         Err(panic) => Err(panic).context("a part of the server panicked"),
     }
 }
 
-/// Refuses a host that lacks a layer which the organiser has not given up by name.
+/// Refuses a host that lacks a sandbox layer which the configuration does not give up.
 pub fn check_sandbox(features: &[HostFeature], given_up: &[Layer]) -> anyhow::Result<()> {
     let mut missing = Vec::new();
     for feature in features.iter().filter(|feature| !feature.available) {
         if given_up.contains(&feature.layer) {
-            tracing::warn!(layer = ?feature.layer, found = feature.found, "given up by configuration");
+            tracing::warn!(layer = ?feature.layer, found = feature.found, "sandbox layer given up by configuration");
         } else {
             let cure = feature
                 .cure
                 .as_deref()
-                .unwrap_or("none is known for this host");
+                .unwrap_or("not known for this host");
             missing.push(format!(
-                "{}: {}\n    cure: {cure}",
-                name(feature.layer),
+                "{}: {}\n    fix: {cure}",
+                layer_name(feature.layer),
                 feature.found
             ));
         }
@@ -394,14 +394,14 @@ pub fn check_sandbox(features: &[HostFeature], given_up: &[Layer]) -> anyhow::Re
         return Ok(());
     }
     bail!(
-        "this host cannot isolate agents as it must:\n  {}\n\
-         `faceoff doctor` tells more. To run without a layer, at your own risk, name it in the \
-         configuration: [sandbox] given_up = [\"…\"]",
+        "this host cannot isolate agents sufficiently:\n  {}\n\
+        Run `faceoff doctor` for details. To run without a layer, at your own risk, name it in the \
+        configuration: [sandbox] given_up = [\"…\"]",
         missing.join("\n  ")
     )
 }
 
-/// Has agents use a copy of the runtimes' files in memory, if there may be one.
+/// Lets agents use a copy of the runtimes' files in memory, if it fits.
 pub fn in_memory(
     runtimes: &mut BTreeMap<String, Runtime>,
     limit_bytes: u64,
@@ -409,22 +409,22 @@ pub fn in_memory(
     faceoff_sandbox::sweep_stale();
     match MemoryImage::make(runtimes, limit_bytes) {
         Ok(image) => {
-            tracing::info!(bytes = image.bytes, folder = %image.folder().display(), "the runtimes' files are kept in memory");
+            tracing::info!(bytes = image.bytes, folder = %image.folder().display(), "runtime files are held in memory");
             Some(image)
         }
         Err(why) => {
             tracing::warn!(
                 %why,
-                "the runtimes' files are not kept in memory: by what is read of them, and how fast, one \
-                 agent may tell another something; offer smaller runtimes or raise sandbox.resident_bytes"
+                "runtime files are not held in memory, so agents can exchange information through the timing of file \
+                accesses; offer smaller runtimes or raise sandbox.resident_bytes"
             );
             None
         }
     }
 }
 
-/// A layer's name as the configuration spells it.
-fn name(layer: Layer) -> String {
+/// The name of a layer in the configuration.
+fn layer_name(layer: Layer) -> String {
     serde_json::to_value(layer)
         .ok()
         .and_then(|value| value.as_str().map(str::to_owned))
@@ -439,13 +439,13 @@ mod tests {
         HostFeature {
             layer,
             available,
-            found: "what was found".into(),
-            cure: Some("what to do".into()),
+            found: "no memory controller".into(),
+            cure: Some("enable it".into()),
         }
     }
 
     #[test]
-    fn a_missing_layer_stops_the_start_unless_it_is_given_up_by_name() {
+    fn missing_layer_stops_the_start_unless_given_up() {
         let features = [
             feature(Layer::Seccomp, true),
             feature(Layer::CgroupMemory, false),
@@ -453,8 +453,8 @@ mod tests {
         let error = check_sandbox(&features, &[]).unwrap_err().to_string();
         for part in [
             "cgroup-memory",
-            "what was found",
-            "what to do",
+            "no memory controller",
+            "enable it",
             "faceoff doctor",
             "given_up",
         ] {

@@ -1,4 +1,4 @@
-//! Where commands go that speak to a server, and as whom.
+//! Server and token of a command.
 
 use super::ca_file::CaFile;
 use crate::{
@@ -9,30 +9,30 @@ use crate::{
 use clap::Args;
 use std::path::{Path, PathBuf};
 
-/// Of a server on this machine, as it is configured by default.
-pub const HERE: &str = "http://127.0.0.1:8080";
+/// A server on this machine with the default configuration.
+pub const DEFAULT_SERVER: &str = "http://127.0.0.1:8080";
 
-/// Where a command goes, and as whom. What is left out is that of `faceoff login`.
+/// Options for server and token; their defaults are those of `faceoff login`.
 #[derive(Debug, Args)]
 pub struct ServerArgs {
-    /// The server [default: that of faceoff login, or http://127.0.0.1:8080]
+    /// The server [default: the server of the last faceoff login, or http://127.0.0.1:8080]
     #[arg(long, global = true, value_name = "URL", env = "FACEOFF_SERVER")]
     server: Option<String>,
-    /// Your token, or your team's [default: that of faceoff login]
+    /// Your token, or your team's [default: the token of faceoff login]
     #[arg(long, global = true, env = "FACEOFF_TOKEN", hide_env_values = true)]
     token: Option<String>,
     #[command(flatten)]
     ca: CaFile,
-    /// Print the server's answer as JSON
+    /// Print the server's response as JSON
     #[arg(long, global = true)]
     pub json: bool,
 }
 
-/// Where something that a command needs comes from.
+/// Source of a setting.
 #[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Source {
-    /// Of the command line.
+    /// The command line.
     Option,
     Environment,
     Login,
@@ -40,8 +40,8 @@ pub enum Source {
 }
 
 impl Source {
-    /// In words; `option` and `variable` are what it could have been named with.
-    pub fn words(&self, option: &str, variable: &str) -> String {
+    /// The source as text; `option` and `variable` are the names of the setting.
+    pub fn text(&self, option: &str, variable: &str) -> String {
         match self {
             Self::Option => option.to_owned(),
             Self::Environment => variable.to_owned(),
@@ -50,8 +50,8 @@ impl Source {
         }
     }
 
-    /// Of a value that clap took from either.
-    fn given(value: &str, variable: &str) -> Self {
+    /// The source of a value that clap has read from the command line or the environment.
+    fn of_value(value: &str, variable: &str) -> Self {
         if std::env::var(variable).is_ok_and(|set| set == value) {
             Self::Environment
         } else {
@@ -60,8 +60,9 @@ impl Source {
     }
 }
 
+/// Server, token and certificate authority of a command, with their sources.
 #[derive(Debug)]
-pub struct Found {
+pub struct Connection {
     pub server: String,
     pub server_from: Source,
     pub token: Option<String>,
@@ -69,35 +70,36 @@ pub struct Found {
     pub ca_file: Option<PathBuf>,
 }
 
-impl Found {
-    /// The server and the login of what is given: `server` and `token` of the command line or the environment.
+impl Connection {
+    /// Completes `server` and `token`, given by option or environment, with the stored login. `token` is the token and
+    /// the name of its variable.
     ///
     /// # Errors
-    /// If the file of the logins is needed and cannot be used.
-    pub fn of(
+    /// If the credentials file is needed and cannot be read.
+    pub fn resolve(
         server: Option<&str>,
         token: Option<(&str, &str)>,
         ca_file: Option<&Path>,
     ) -> anyhow::Result<Self> {
-        let kept = match credentials::path() {
-            // Whoever says everything needs no file.
+        let credentials = match credentials::path() {
+            // If both are given, the file is not needed.
             _ if server.is_some() && token.is_some() => Credentials::default(),
             Ok(file) => Credentials::load(&file)?,
             Err(_) => Credentials::default(),
         };
-        let (server, server_from) = match (server, kept.default_server()) {
-            (Some(server), _) => (server, Source::given(server, "FACEOFF_SERVER")),
+        let (server, server_from) = match (server, credentials.default_server()) {
+            (Some(server), _) => (server, Source::of_value(server, "FACEOFF_SERVER")),
             (None, Some(server)) => (server, Source::Login),
-            (None, None) => (HERE, Source::Default),
+            (None, None) => (DEFAULT_SERVER, Source::Default),
         };
-        let login: Option<Login> = kept.of(server).cloned();
+        let login: Option<Login> = credentials.login(server).cloned();
         let ca_file = ca_file
             .map(Path::to_owned)
             .or_else(|| login.as_ref()?.ca_file.clone());
         let (token, token_from) = match (token, login) {
             (Some((token, variable)), _) => (
                 Some(token.trim().to_owned()),
-                Source::given(token, variable),
+                Source::of_value(token, variable),
             ),
             (None, Some(login)) => (Some(login.token), Source::Login),
             (None, None) => (None, Source::Default),
@@ -111,47 +113,47 @@ impl Found {
         })
     }
 
-    /// A client that speaks for whose token it is, or for nobody.
+    /// A client with the token, or without one.
     ///
     /// # Errors
-    /// If the address is none.
+    /// If the address is invalid.
     pub fn client(&self) -> anyhow::Result<Client> {
         Client::new(&self.server, self.token.as_deref(), self.ca_file.as_deref())
     }
 }
 
 impl ServerArgs {
-    /// What this command goes by.
+    /// Server and token of this command.
     ///
     /// # Errors
-    /// If the file of the logins cannot be used.
-    pub fn found(&self) -> anyhow::Result<Found> {
+    /// If the credentials file cannot be read.
+    pub fn connection(&self) -> anyhow::Result<Connection> {
         let token = self.token.as_deref().map(|token| (token, "FACEOFF_TOKEN"));
-        Found::of(self.server.as_deref(), token, self.ca.path())
+        Connection::resolve(self.server.as_deref(), token, self.ca.path())
     }
 
-    /// A client that speaks for whose token it is, or for nobody.
+    /// A client with the token, or without one.
     ///
     /// # Errors
-    /// If the address is none.
-    pub fn anybody(&self) -> anyhow::Result<Client> {
-        self.found()?.client()
+    /// If the address is invalid.
+    pub fn client_or_visitor(&self) -> anyhow::Result<Client> {
+        self.connection()?.client()
     }
 
-    /// A client that speaks for somebody.
+    /// A client with a token.
     ///
     /// # Errors
-    /// If there is no token, or the address is none.
+    /// If there is no token, or the address is invalid.
     pub fn client(&self) -> anyhow::Result<Client> {
-        let found = self.found()?;
-        if found.token.is_none() {
+        let connection = self.connection()?;
+        if connection.token.is_none() {
             return Err(NotSignedIn(format!(
-                "nobody is signed in to {}: faceoff login, or faceoff join LINK with your invitation; or give a token with \
-                 --token or FACEOFF_TOKEN",
-                found.server
+                "not signed in to {}: run faceoff login, or faceoff join LINK with your invitation, or give a token with \
+                --token or FACEOFF_TOKEN",
+                connection.server
             ))
             .into());
         }
-        found.client()
+        connection.client()
     }
 }

@@ -1,4 +1,4 @@
-//! `faceoff sim`: the simulator alone, for comparison with other simulators, for other programs, and for measuring and checking it.
+//! `faceoff sim`: the simulator alone, for comparisons, exports and measurements.
 
 mod bench;
 mod export;
@@ -9,34 +9,34 @@ mod trace;
 
 use clap::{Args, Subcommand};
 
-/// Simulate open loop, export the model, measure the simulator, or check its bits.
+/// Runs the simulator alone: open-loop simulation, model export, benchmark and golden hashes.
 #[derive(Debug, Args)]
 pub struct SimCommand {
     #[command(subcommand)]
-    what: What,
+    action: Action,
 }
 
 #[derive(Debug, Subcommand)]
-enum What {
+enum Action {
     /// Read one scenario (JSON) from standard input, write its states as JSON lines
     ///
-    /// Input: {"puck": [x, y, yaw, vx, vy, yaw rate], "duration_ms": 160} and optionally "task",
+    /// Input: {"puck": [x, y, yaw, vx, vy, yaw rate], "duration_ms": 160}, and optionally "task",
     /// "profile", "seed", "robots", "joints", "interpolation", "actions", "mallet" and "every_ms".
     /// SI units, table frame.
     Trace,
-    /// Read poses from standard input, write positions, Jacobian, mass matrix and bias, one JSON object a line
+    /// Read poses from standard input, write positions, Jacobian, mass matrix and bias, one JSON object per line
     ///
-    /// Input, a line per pose: {"q": [7]} and optionally "dq": [7]; 9 numbers with the universal joint's, which
-    /// are otherwise those that keep the mallet upright, at rest. SI units, robot's base frame. The answer has
-    /// the controller's model, and under "plant" what moves.
+    /// Input, one line per pose: {"q": [7]} and optionally "dq": [7], or 9 numbers with the universal joint.
+    /// By default, the universal joint keeps the mallet upright, at rest. SI units, base frame of the robot. The
+    /// output has the controller's model, and the simulated one under "plant".
     Kinematics,
     /// Write the ideal model of robot, table and puck for other programs: URDF, MJCF, Python
     Export(export::ExportArgs),
-    /// Play the golden episodes and games and write their hashes, which are equal in every build of a ruleset
+    /// Run the golden episodes and games and write their hashes, which are equal in every build of a ruleset
     ///
-    /// tests/golden/simulator.txt in the sources has the hashes as they must be.
+    /// The expected hashes are in tests/golden/simulator.txt of the sources.
     Golden,
-    /// Measure control steps and substeps per second on one core: a held arm, no agent process
+    /// Measure control steps and substeps per second on one core, with an arm that holds still and no agent process
     Bench(bench::BenchArgs),
 }
 
@@ -44,15 +44,15 @@ impl SimCommand {
     /// Runs the simulator.
     ///
     /// # Errors
-    /// If a scenario or a pose is not one, naming the field and what was expected; if reading or writing
+    /// If a scenario or a pose is invalid (the error names the field and what was expected), or reading or writing
     /// fails.
     pub fn run(self) -> anyhow::Result<()> {
-        match self.what {
-            What::Trace => trace::run(),
-            What::Kinematics => kinematics::run(),
-            What::Export(args) => args.run(),
-            What::Golden => golden::run(),
-            What::Bench(args) => args.run(),
+        match self.action {
+            Action::Trace => trace::run(),
+            Action::Kinematics => kinematics::run(),
+            Action::Export(args) => args.run(),
+            Action::Golden => golden::run(),
+            Action::Bench(args) => args.run(),
         }
     }
 }

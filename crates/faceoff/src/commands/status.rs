@@ -1,6 +1,6 @@
-//! `faceoff status`: how the team stands now.
+//! `faceoff status`: prints the team's current state.
 
-use super::{evaluation_text::state, output::print, server::ServerArgs, submissions::status};
+use super::{evaluation_text::status_text, output::print, server::ServerArgs, submissions::status_lines};
 use crate::{
     client::{ApiError, Client},
     exit::Exit,
@@ -12,129 +12,129 @@ use faceoff_api::views::{evaluation::EvaluationView, me::MeView};
 use serde::Serialize;
 use std::time::Duration;
 
-/// Tells what plays for the team, what waits and where in the queue, what plays at the next cut, and what came of the
-/// last evaluations.
+/// Shows the team's running evaluation, pending jobs with their positions in the queue, the submission for the next
+/// cutoff, and the last results.
 #[derive(Debug, Args)]
 pub struct StatusCommand {
-    /// Tell it again whenever it has changed, until this is interrupted; with --json one object in a line each time
+    /// Print the status again whenever it changes, until interrupted; with --json, one object per line
     #[arg(long, short)]
     watch: bool,
-    /// How many of the last evaluations to tell of
+    /// Number of last evaluations to show
     #[arg(long, value_name = "N", default_value_t = 3)]
     results: usize,
     #[command(flatten)]
     server: ServerArgs,
 }
 
-/// How soon the server is asked again after a change; longer each time that nothing has changed.
-const SOONEST: Duration = Duration::from_secs(2);
-const LATEST: Duration = Duration::from_secs(60);
+/// Polling interval after a change. It doubles with each request without a change, up to [`MAX_INTERVAL`].
+const MIN_INTERVAL: Duration = Duration::from_secs(2);
+const MAX_INTERVAL: Duration = Duration::from_secs(60);
 
-/// What is printed with `--json`.
+/// Output of `--json`.
 #[derive(Debug, PartialEq, Serialize)]
-struct Standing {
+struct TeamStatus {
     me: MeView,
     /// The newest first.
     evaluations: Vec<EvaluationView>,
 }
 
 impl StatusCommand {
-    /// Asks the server, once or again and again.
+    /// Prints the status, once or after each change.
     ///
     /// # Errors
-    /// If it cannot be reached or refuses; while watching only if it refuses.
+    /// If the server cannot be reached or refuses; with `--watch`, only if it refuses.
     pub fn run(self) -> anyhow::Result<()> {
         super::block_on(async {
             let client = self.server.client()?;
             if self.watch {
                 return self.watch(&client).await;
             }
-            let standing = self.standing(&client).await?;
-            print(self.server.json, &standing, || standing.text())
+            let status = self.request_status(&client).await?;
+            print(self.server.json, &status, || status.text())
         })
     }
 
-    async fn standing(&self, client: &Client) -> anyhow::Result<Standing> {
+    async fn request_status(&self, client: &Client) -> anyhow::Result<TeamStatus> {
         let me = client.me().await?;
         let evaluations = client.newest_evaluations(self.results).await?;
-        Ok(Standing { me, evaluations })
+        Ok(TeamStatus { me, evaluations })
     }
 
     async fn watch(&self, client: &Client) -> anyhow::Result<()> {
-        let mut last: Option<Standing> = None;
-        let mut pause = SOONEST;
-        let mut is_silent = false;
+        let mut last: Option<TeamStatus> = None;
+        let mut interval = MIN_INTERVAL;
+        let mut is_disconnected = false;
         loop {
-            match self.standing(client).await {
-                Ok(standing) => {
-                    is_silent = false;
-                    if last.as_ref().map(Standing::settled) == Some(standing.settled()) {
-                        pause = (pause * 2).min(LATEST);
+            match self.request_status(client).await {
+                Ok(status) => {
+                    is_disconnected = false;
+                    if last.as_ref().map(TeamStatus::without_estimates) == Some(status.without_estimates()) {
+                        interval = (interval * 2).min(MAX_INTERVAL);
                     } else {
-                        pause = SOONEST;
-                        self.tell(&standing, last.is_some())?;
-                        if terminal::nobody_reads() {
+                        interval = MIN_INTERVAL;
+                        self.print_status(&status, last.is_some())?;
+                        if terminal::stdout_is_closed() {
                             return Ok(());
                         }
-                        last = Some(standing);
+                        last = Some(status);
                     }
                 }
-                // It may be starting anew, or too busy for questions.
-                Err(error) if Exit::of(&error) == Exit::Unreachable || is_too_often(&error) => {
-                    if !is_silent {
-                        eprintln!("{error:#}; asking again");
-                        is_silent = true;
+                // The server may be restarting, or limiting requests.
+                Err(error) if Exit::of(&error) == Exit::Unreachable || is_rate_limited(&error) => {
+                    if !is_disconnected {
+                        eprintln!("{error:#}; retrying");
+                        is_disconnected = true;
                     }
-                    pause = (pause * 2).min(LATEST);
+                    interval = (interval * 2).min(MAX_INTERVAL);
                 }
                 Err(error) => return Err(error),
             }
-            tokio::time::sleep(pause).await;
+            tokio::time::sleep(interval).await;
         }
     }
 
-    fn tell(&self, standing: &Standing, again: bool) -> anyhow::Result<()> {
+    fn print_status(&self, status: &TeamStatus, is_repeated: bool) -> anyhow::Result<()> {
         if self.server.json {
             println!(
                 "{}",
-                serde_json::to_string(standing).context("writing JSON")?
+                serde_json::to_string(status).context("writing JSON")?
             );
             return Ok(());
         }
-        if again {
+        if is_repeated {
             let now = jiff::Timestamp::now().strftime("%Y-%m-%d %H:%M:%S UTC");
             println!("\n── {now}");
         }
-        println!("{}", standing.text());
+        println!("{}", status.text());
         Ok(())
     }
 }
 
-fn is_too_often(error: &anyhow::Error) -> bool {
+fn is_rate_limited(error: &anyhow::Error) -> bool {
     error
         .downcast_ref::<ApiError>()
         .is_some_and(|error| error.status == reqwest::StatusCode::TOO_MANY_REQUESTS)
 }
 
-impl Standing {
-    /// Without what is estimated anew each time: it changes while nothing happens.
-    fn settled(&self) -> Self {
+impl TeamStatus {
+    /// The status without estimated times, which change constantly.
+    fn without_estimates(&self) -> Self {
         let Self { me, evaluations } = self;
-        let mut settled = Self {
+        let mut status = Self {
             me: me.clone(),
             evaluations: evaluations.clone(),
         };
-        let of_me = settled.me.validating.iter_mut().map(|one| &mut one.queue);
-        let of_evaluations = settled.evaluations.iter_mut().map(|one| &mut one.queue);
-        let of_turn = std::iter::once(&mut settled.me.turn.queue);
-        for queue in of_me.chain(of_evaluations).chain(of_turn).flatten() {
+        let submissions = status.me.validating.iter_mut().map(|submission| &mut submission.queue);
+        let evaluations = status.evaluations.iter_mut().map(|evaluation| &mut evaluation.queue);
+        let today = std::iter::once(&mut status.me.turn.queue);
+        for queue in submissions.chain(evaluations).chain(today).flatten() {
             queue.expected_at = None;
-        }
-        settled
+            }
+            status
     }
 
     fn text(&self) -> String {
-        let mut lines = status(&self.me);
+        let mut lines = status_lines(&self.me);
         if !self.evaluations.is_empty() {
             lines.push("last evaluations:".to_owned());
         }
@@ -143,7 +143,7 @@ impl Standing {
                 "  {}  {}  {}",
                 evaluation.day,
                 evaluation.id,
-                state(evaluation)
+                status_text(evaluation)
             ));
         }
         lines.join("\n")

@@ -1,10 +1,10 @@
-//! How much room a team's files take, in words.
+//! Text of a team's disk usage.
 
 use faceoff_api::views::storage::StorageView;
 
-/// Bytes as people read them; powers of 1000.
+/// A number of bytes with a unit; units are powers of 1000.
 pub(super) fn bytes(bytes: u64) -> String {
-    #[expect(clippy::cast_precision_loss, reason = "one decimal of it is shown")]
+    #[expect(clippy::cast_precision_loss, reason = "only one decimal is shown")]
     let mut shown = bytes as f64;
     for unit in ["bytes", "kB", "MB", "GB"] {
         if shown < 1000.0 {
@@ -18,10 +18,10 @@ pub(super) fn bytes(bytes: u64) -> String {
     format!("{shown:.1} TB")
 }
 
-/// A team in a line.
+/// A team's disk usage as one line.
 pub(super) fn storage_line(storage: &StorageView) -> String {
     let mut line = format!(
-        "{:<40} {} archives, {} of {}; {} datasets, {}",
+        "{:<40} {} bundles, {} of {}; {} datasets, {}",
         storage.team_name,
         storage.archives,
         bytes(storage.archive_bytes),
@@ -31,7 +31,7 @@ pub(super) fn storage_line(storage: &StorageView) -> String {
     );
     if storage.unmeasured_datasets > 0 {
         line.push_str(&format!(
-            ", {} of them not measured yet",
+            ", {} of them with unknown size",
             storage.unmeasured_datasets
         ));
     }
@@ -46,8 +46,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn bytes_are_read_in_their_units() {
-        for (count, words) in [
+    fn bytes_have_a_decimal_unit() {
+        for (count, expected) in [
             (0, "0 bytes"),
             (999, "999 bytes"),
             (1500, "1.5 kB"),
@@ -55,7 +55,7 @@ mod tests {
             (34_359_738_368, "34.4 GB"),
             (5_000_000_000_000, "5.0 TB"),
         ] {
-            assert_eq!(bytes(count), words);
+            assert_eq!(bytes(count), expected);
         }
     }
 }

@@ -1,10 +1,10 @@
-//! `faceoff submissions`: a team's uploads, and what it does with them.
+//! `faceoff submissions`: lists and manages a team's submissions.
 
 use super::{
-    ablation_text::ablation,
-    next_cut::next_cut,
-    output::{download_bar, downloaded, or_none, print},
-    queue::in_queue,
+    ablation_text::ablation_text,
+    next_cutoff::next_cutoff_text,
+    output::{download_bar, download_text, lines_or, print},
+    queue::queue_text,
     server::ServerArgs,
 };
 use crate::client::Client;
@@ -19,7 +19,7 @@ use faceoff_api::{
 use faceoff_types::SubmissionId;
 use std::path::PathBuf;
 
-/// Lists the team's submissions, names them, takes one back, downloads or deletes one.
+/// Lists, labels, withdraws, downloads and deletes the team's submissions.
 #[derive(Debug, Args)]
 pub struct SubmissionsCommand {
     #[command(flatten)]
@@ -30,49 +30,49 @@ pub struct SubmissionsCommand {
 
 #[derive(Debug, Subcommand)]
 enum Action {
-    /// List them, the newest first
+    /// List the submissions, the newest first
     List,
-    /// Tell what plays for the team today, what waits, where it stands in the queue, and what happens next
+    /// Show today's evaluation, pending jobs with their positions in the queue, and what happens next
     Status,
-    /// Give one a name that only the team and the organiser see
+    /// Set the label of a submission, visible to the team and organisers only
     Label {
         /// The submission's id
         submission: SubmissionId,
-        /// 1 to 80 characters; left out, it has none
+        /// 1 to 80 characters; without it, the label is removed
         label: Option<String>,
     },
-    /// Write about one what only the team and the organiser read
+    /// Set the note of a submission, visible to the team and organisers only
     Note {
         /// The submission's id
         submission: SubmissionId,
-        /// 1 to 2000 characters; left out, there is none
+        /// 1 to 2000 characters; without it, the note is removed
         note: Option<String>,
     },
-    /// Download the archive of one, as it was uploaded
+    /// Download the bundle of a submission as it was uploaded
     Download {
         /// The submission's id
         submission: SubmissionId,
-        /// Where to
+        /// The file to write; an existing file is replaced
         file: PathBuf,
     },
-    /// Have the archive of one removed for good: nobody plays it again, its results stay; without --confirm, say what
-    /// that would do
+    /// Delete the bundle of a submission permanently; its results are kept; without --confirm, only list the
+    /// effects
     Delete {
         /// The submission's id
         submission: SubmissionId,
-        /// Why; 1 to 500 characters
+        /// Reason, 1 to 500 characters
         #[arg(long)]
         reason: Option<String>,
-        /// The name of its archive
+        /// The file name of the bundle, as confirmation
         #[arg(long, value_name = "FILE_NAME")]
         confirm: Option<String>,
     },
-    /// Show what each perturbation costs one, if the organisers have had that played
+    /// Show the effect of each perturbation on a submission, if the organisers have requested an ablation
     Ablation {
         /// The submission's id
         submission: SubmissionId,
     },
-    /// Take one back: it plays no further day, unless `faceoff activate` chooses it again
+    /// Withdraw a submission: it is not evaluated any more, unless `faceoff activate` makes it active again
     Withdraw {
         /// The submission's id
         submission: SubmissionId,
@@ -80,7 +80,7 @@ enum Action {
 }
 
 impl SubmissionsCommand {
-    /// Does what was asked.
+    /// Runs the chosen action.
     ///
     /// # Errors
     /// If the server cannot be reached or refuses.
@@ -95,15 +95,15 @@ impl SubmissionsCommand {
             Action::List => {
                 let submissions = client.submissions().await?;
                 print(json, &submissions, || {
-                    or_none(
-                        submissions.iter().map(line).collect(),
-                        "nothing was uploaded yet: faceoff submit BUNDLE",
+                    lines_or(
+                        submissions.iter().map(submission_line).collect(),
+                        "no submissions yet; upload one with faceoff submit BUNDLE",
                     )
                 })
             }
             Action::Status => {
                 let me = client.me().await?;
-                print(json, &me, || status(&me).join("\n"))
+                print(json, &me, || status_lines(&me).join("\n"))
             }
             Action::Label { submission, label } => {
                 let change = SubmissionChange {
@@ -111,7 +111,7 @@ impl SubmissionsCommand {
                     ..SubmissionChange::default()
                 };
                 let described = client.describe(submission, &change).await?;
-                print(json, &described, || line(&described))
+                print(json, &described, || submission_line(&described))
             }
             Action::Note { submission, note } => {
                 let change = SubmissionChange {
@@ -119,7 +119,7 @@ impl SubmissionsCommand {
                     ..SubmissionChange::default()
                 };
                 let described = client.describe(submission, &change).await?;
-                print(json, &described, || line(&described))
+                print(json, &described, || submission_line(&described))
             }
             Action::Download { submission, file } => {
                 let bar = download_bar()?;
@@ -128,27 +128,27 @@ impl SubmissionsCommand {
                     .download_submission(submission, &file, &hash, &bar)
                     .await?;
                 bar.finish_and_clear();
-                print(json, &done, || downloaded(&done))
+                print(json, &done, || download_text(&done))
             }
             Action::Delete {
                 submission,
                 reason,
                 confirm,
             } => {
-                let wanted = DeleteSubmission { confirm, reason };
-                let deleted = client.delete_submission(submission, &wanted).await?;
-                print(json, &deleted, || line(&deleted))
+                let deletion = DeleteSubmission { confirm, reason };
+                let deleted = client.delete_submission(submission, &deletion).await?;
+                print(json, &deleted, || submission_line(&deleted))
             }
             Action::Ablation { submission } => {
                 let newest = client.ablation(submission).await?;
-                print(json, &newest, || ablation(&newest))
+                print(json, &newest, || ablation_text(&newest))
             }
             Action::Withdraw { submission } => withdraw(&client, json, submission).await,
         }
     }
 }
 
-/// Takes a submission back, and tells what plays in its place.
+/// Withdraws a submission and prints which one will be evaluated instead.
 pub(super) async fn withdraw(
     client: &Client,
     json: bool,
@@ -158,15 +158,15 @@ pub(super) async fn withdraw(
     let me = client.me().await?;
     print(json, &withdrawn, || {
         let next = match me.active_submission {
-            Some(active) => next_cut(&me, active),
-            None => "nothing of the team is active: upload another, or choose one with faceoff activate ID".to_owned(),
+            Some(active) => next_cutoff_text(&me, active),
+            None => "the team has no active submission: upload another one, or activate one with faceoff activate ID".to_owned(),
         };
-        format!("{}\n{next}", line(&withdrawn))
+        format!("{}\n{next}", submission_line(&withdrawn))
     })
 }
 
-/// How the team stands today, line by line.
-pub(super) fn status(me: &MeView) -> Vec<String> {
+/// The team's current state, line by line.
+pub(super) fn status_lines(me: &MeView) -> Vec<String> {
     let mut lines = Vec::new();
     match (&me.turn.evaluation, &me.turn.next) {
         (Some(evaluation), next) => {
@@ -175,38 +175,39 @@ pub(super) fn status(me: &MeView) -> Vec<String> {
                 me.turn
                     .queue
                     .as_ref()
-                    .map(|queue| format!("  {}", in_queue(queue))),
+                    .map(|queue| format!("  {}", queue_text(queue))),
             );
             lines.extend(next.as_ref().map(|next| format!("  next: {next}")));
         }
-        (None, _) => lines.push(format!("{}: nothing plays for the team", me.turn.day)),
+        (None, _) => lines.push(format!("{}: no evaluation of the team", me.turn.day)),
     }
-    for waiting in &me.validating {
-        lines.push(format!("submission {}: validating", waiting.submission));
+    for pending in &me.validating {
+        lines.push(format!("submission {}: validating", pending.submission));
         lines.extend(
-            waiting
+            pending
                 .queue
                 .as_ref()
-                .map(|queue| format!("  {}", in_queue(queue))),
+                .map(|queue| format!("  {}", queue_text(queue))),
         );
-        lines.push(format!("  next: {}", waiting.next));
+        lines.push(format!("  next: {}", pending.next));
     }
     match me.active_submission {
-        Some(active) => lines.push(format!("submission {active}: {}", next_cut(me, active))),
-        None => lines.push("nothing of the team is active: faceoff submit BUNDLE".to_owned()),
+        Some(active) => lines.push(format!("submission {active}: {}", next_cutoff_text(me, active))),
+        None => lines.push("the team has no active submission; upload one with faceoff submit BUNDLE".to_owned()),
     }
     lines
 }
 
-pub(super) fn line(submission: &SubmissionView) -> String {
+/// A submission as one line, followed by its note.
+pub(super) fn submission_line(submission: &SubmissionView) -> String {
     let state = match &submission.status {
         SubmissionStatus::Validating => match &submission.queue {
-            Some(queue) => format!("validating, {}", in_queue(queue)),
+            Some(queue) => format!("validating, {}", queue_text(queue)),
             None => "validating".to_owned(),
         },
         SubmissionStatus::Valid { .. } => "valid".to_owned(),
         SubmissionStatus::Invalid { reason, .. } => format!("invalid: {reason}"),
-        SubmissionStatus::ValidationError { reason } => format!("not checked: {reason}"),
+        SubmissionStatus::ValidationError { reason } => format!("validation failed by a platform fault: {reason}"),
     };
     let mut line = format!(
         "{}  {}  {}  {state}",
@@ -228,7 +229,7 @@ pub(super) fn line(submission: &SubmissionView) -> String {
         )),
         (None, Some(removed)) if matches!(submission.status, SubmissionStatus::Valid { .. }) => {
             line.push_str(&format!(
-                ", its archive removed on {} {}",
+                ", bundle removed on {} {}",
                 removed.at.strftime("%Y-%m-%d %H:%M UTC"),
                 removed.reason
             ));
@@ -239,10 +240,10 @@ pub(super) fn line(submission: &SubmissionView) -> String {
         line.push_str(&format!(" “{label}”"));
     }
     if let Some(same) = submission.same_as {
-        line.push_str(&format!(", the same archive as {same}"));
+        line.push_str(&format!(", same bundle as {same}"));
     }
-    for written in submission.note.iter().flat_map(|note| note.lines()) {
-        line.push_str(&format!("\n    {written}"));
+    for text in submission.note.iter().flat_map(|note| note.lines()) {
+        line.push_str(&format!("\n    {text}"));
     }
     line
 }

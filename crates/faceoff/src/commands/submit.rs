@@ -1,27 +1,28 @@
-//! `faceoff submit`: uploads an agent and says whether it starts.
+//! `faceoff submit`: uploads a bundle and waits for its validation.
 
-mod packed;
+mod bundle_contents;
 
-use super::{next_cut::next_cut, output::print, server::ServerArgs};
+use super::{next_cutoff::next_cutoff_text, output::print, server::ServerArgs};
 use crate::{client::Client, packing::BundleFile};
 use anyhow::{Context, bail};
 use clap::Args;
 use faceoff_api::views::submission::{SubmissionStatus, SubmissionView};
-use faceoff_types::SmokeTiming;
+use faceoff_types::ValidationTiming;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::{path::PathBuf, time::Duration};
 
-/// How often the server is asked for news.
+/// Interval between requests for the result of the validation.
 const POLL: Duration = Duration::from_millis(500);
 
-/// Uploads a bundle and follows it until its verdict; exit status 0 only if it is valid. Of a folder all goes in but what
-/// no agent needs (histories, caches, environments, builds, editors' files: --dry-run tells) and what its file
-/// .faceoffignore names, in the syntax of .gitignore; a line `!NAME` there has something go in all the same.
+/// Uploads a bundle and waits for its validation; the exit status is 0 only if it is valid. Of a folder, all files are
+/// packed except those that no agent needs (version control, caches, environments, builds, editor files; see --dry-run)
+/// and those that its file .faceoffignore names, in the syntax of .gitignore. A line `!NAME` there includes a file.
 #[derive(Debug, Args)]
 pub struct SubmitCommand {
-    /// The agent: a .tar.gz, .tar.zst or .zip, a container image as docker save writes it, or a folder with agent.toml, which is packed
+    /// The agent: a .tar.gz, .tar.zst or .zip, a container image written by docker save, or a folder with agent.toml,
+    /// which is packed
     bundle: PathBuf,
-    /// List what of a folder would go in and what would not, and upload nothing
+    /// List the files that would be packed and those that are left out, without uploading
     #[arg(long)]
     dry_run: bool,
     #[command(flatten)]
@@ -29,7 +30,7 @@ pub struct SubmitCommand {
 }
 
 impl SubmitCommand {
-    /// Uploads and follows.
+    /// Uploads the bundle and waits for its validation.
     ///
     /// # Errors
     /// If the server cannot be reached or refuses, or the agent is not valid.
@@ -43,13 +44,13 @@ impl SubmitCommand {
         let bundle = tokio::task::spawn_blocking(move || BundleFile::open(&bundle));
         let bundle = bundle.await.context("packing the bundle")??;
         if self.dry_run {
-            let contents = packed::Contents::of(&bundle);
-            return print(json, &contents, || contents.listed());
+            let contents = bundle_contents::BundleContents::new(&bundle);
+            return print(json, &contents, || contents.text());
         }
         let client = self.server.client()?;
         if let Some(selection) = bundle.selection() {
-            // Beside the answer, which --json leaves alone on standard output.
-            for line in packed::told(selection, bundle.bytes()) {
+            // On standard error, because standard output may be JSON.
+            for line in bundle_contents::packing_summary(selection, bundle.bytes()) {
                 eprintln!("{line}");
             }
         }
@@ -64,28 +65,28 @@ impl SubmitCommand {
                 submission.file_name, submission.id
             );
             if let Some(same) = submission.same_as {
-                println!("it is the same archive as submission {same}");
+                println!("the bundle is identical to that of submission {same}");
             }
         }
 
-        let submission = verdict(&client, submission).await?;
+        let submission = wait_for_validation(&client, submission).await?;
         if json {
             print(json, &submission, String::new)?;
         } else {
-            print_verdict(&client, &submission).await?;
+            print_validation(&client, &submission).await?;
         }
         match submission.status {
             SubmissionStatus::Valid { .. } => Ok(()),
             SubmissionStatus::Invalid { reason, .. } => bail!("invalid: {reason}"),
             SubmissionStatus::ValidationError { reason } => {
-                bail!("the server failed to check the bundle ({reason}); submit it again")
+                bail!("the validation failed by a platform fault ({reason}); submit the bundle again")
             }
-            SubmissionStatus::Validating => bail!("the server gave no verdict"),
+            SubmissionStatus::Validating => bail!("the validation has no result"),
         }
     }
 }
 
-async fn print_verdict(client: &Client, submission: &SubmissionView) -> anyhow::Result<()> {
+async fn print_validation(client: &Client, submission: &SubmissionView) -> anyhow::Result<()> {
     for timing in &submission.timing {
         print_timing(timing);
     }
@@ -93,20 +94,20 @@ async fn print_verdict(client: &Client, submission: &SubmissionView) -> anyhow::
         SubmissionStatus::Valid { log } => {
             let agent = submission.agent_name.as_deref().unwrap_or("the agent");
             print_log(log.as_deref());
-            println!("valid: {agent} starts, answers and keeps time");
-            println!("{}", next_cut(&client.me().await?, submission.id));
+            println!("valid: {agent} starts, responds and meets the time limits");
+            println!("{}", next_cutoff_text(&client.me().await?, submission.id));
         }
         SubmissionStatus::Invalid { log, .. } => print_log(log.as_deref()),
         SubmissionStatus::ValidationError { .. } | SubmissionStatus::Validating => {}
     }
     Ok(())
 }
-async fn verdict(
+async fn wait_for_validation(
     client: &Client,
     mut submission: SubmissionView,
 ) -> anyhow::Result<SubmissionView> {
     let spinner =
-        ProgressBar::new_spinner().with_message("smoke run: does it start, answer and keep time?");
+        ProgressBar::new_spinner().with_message("validating: does the agent start, respond and meet the time limits?");
     spinner.enable_steady_tick(Duration::from_millis(100));
     while submission.status == SubmissionStatus::Validating {
         tokio::time::sleep(POLL).await;
@@ -116,7 +117,7 @@ async fn verdict(
     Ok(submission)
 }
 
-fn print_timing(timing: &SmokeTiming) {
+fn print_timing(timing: &ValidationTiming) {
     println!(
         "{:<8} {} answers: mean {:.1} ms, 99 % within {:.1} ms, longest {:.1} ms; {:.1} penalty points per episode",
         timing.task.as_str(),
@@ -131,7 +132,7 @@ fn print_timing(timing: &SmokeTiming) {
 fn print_log(log: Option<&str>) {
     if let Some(log) = log.filter(|log| !log.trim().is_empty()) {
         println!(
-            "--- the agent's log ---\n{}\n--- end of the log ---",
+            "--- agent log ---\n{}\n--- end of log ---",
             log.trim_end()
         );
     }

@@ -1,8 +1,8 @@
-//! `faceoff team`: what a member does for their team, and with the organisers.
+//! `faceoff team`: shows and manages the member's own team.
 
 use super::{
-    output::{or_none, print},
-    people::{invitation_line, invitation_lines, invited, person_line},
+    output::{lines_or, print},
+    people::{invitation_line, invitation_lines, new_invitation_text, person_line},
     server::ServerArgs,
     storage::storage_line,
 };
@@ -13,10 +13,10 @@ use faceoff_api::{
     requests::{InvitedRole, NewInvitation, TeamChange},
     views::team::TeamView,
 };
-use faceoff_types::{InvitationId, PersonId, TeamId, TeamName};
+use faceoff_types::{InvitationId, UserId, TeamId, TeamName};
 use jiff::Timestamp;
 
-/// Shows and changes the team, invites members, asks the organisers.
+/// Shows and changes the team, invites members, and asks the organisers.
 #[derive(Debug, Args)]
 pub struct TeamCommand {
     #[command(flatten)]
@@ -27,61 +27,61 @@ pub struct TeamCommand {
 
 #[derive(Debug, Subcommand)]
 enum Action {
-    /// Show what everybody may know of the team
+    /// Show the team's public profile
     Show,
-    /// Change its name, or what it tells of itself; what is left out stays as it is
+    /// Change the team's name or profile; options that are left out do not change
     Change {
-        /// Another name: 1 to 40 letters, digits, spaces and . _ -
+        /// The new name: 1 to 40 letters, digits, spaces and . _ -
         #[arg(long, value_name = "NAME")]
         rename: Option<TeamName>,
-        /// Where it is from; empty: it does not say
+        /// The team's affiliation; empty: none
         #[arg(long)]
         affiliation: Option<String>,
-        /// Its page; empty: none
+        /// The team's web page; empty: none
         #[arg(long, value_name = "URL")]
         link: Option<String>,
-        /// Does it play no friendly games that other teams ask for?
+        /// Decline friendly games that other teams request
         #[arg(long, value_name = "true|false")]
         declines_friendly_games: Option<bool>,
     },
-    /// Show how much room its submissions and datasets take
+    /// Show the disk usage of the team's submissions and datasets
     Storage,
-    /// List its members
+    /// List the team's members
     Members,
-    /// Make a link by which one person joins, and print it, this once
+    /// Create an invitation link for one member and print it; it is shown only once
     Invite {
-        /// For whom
+        /// Label that identifies the invitation in lists, e.g. the name of the invited person
         note: String,
     },
-    /// List the invitations to it
+    /// List the team's invitations
     Invitations,
-    /// Take an invitation back
+    /// Revoke an invitation
     Uninvite {
         /// The invitation's id
         invitation: InvitationId,
     },
-    /// Leave the team for good; without --confirm, say what that would do
+    /// Leave the team permanently; without --confirm, only list the effects
     Leave {
-        /// Your name
+        /// Your name, as confirmation
         #[arg(long, value_name = "NAME")]
         confirm: Option<String>,
     },
-    /// Take the team out of all days to come; without --confirm, say what that would do
+    /// Retire the team from all future evaluation days; without --confirm, only list the effects
     Retire {
-        /// The team's name
+        /// The team's name, as confirmation
         #[arg(long, value_name = "TEAM")]
         confirm: Option<String>,
     },
-    /// Let the team play again after it has retired
+    /// Return to the competition after the team has retired
     Return,
-    /// Ask the organisers
+    /// Ask the organisers a question
     Ask {
         /// 1 to 2000 characters
         text: String,
     },
-    /// Print what the organisers have told and answered
+    /// Print the organisers' announcements and answers
     News,
-    /// Print the terms of taking part, or accept them
+    /// Print the terms of participation, or accept them
     Terms {
         /// Accept this version
         #[arg(long, value_name = "VERSION")]
@@ -90,7 +90,7 @@ enum Action {
 }
 
 impl TeamCommand {
-    /// Does what was asked.
+    /// Runs the chosen action.
     ///
     /// # Errors
     /// If the server cannot be reached or refuses.
@@ -102,14 +102,14 @@ impl TeamCommand {
 async fn own_team(client: &Client) -> anyhow::Result<TeamId> {
     let who = client.whoami().await?;
     let team = who.team.map(|team| team.id);
-    team.context("the token is no team's: it is an organiser's, for whom there is faceoff admin")
+    team.context("the token does not belong to a team; organisers use faceoff admin")
 }
 
-async fn own_person(client: &Client) -> anyhow::Result<PersonId> {
+async fn own_person(client: &Client) -> anyhow::Result<UserId> {
     let who = client.whoami().await?;
     match who.person {
         Some(person) => Ok(person.id),
-        None => bail!("the token is a program's, not a person's; only people leave"),
+        None => bail!("the token does not belong to a user; only users can leave"),
     }
 }
 
@@ -145,7 +145,7 @@ async fn act(client: &Client, json: bool, action: Action) -> anyhow::Result<()> 
             let people = client.people().await?;
             print(json, &people, || {
                 let lines = people.iter().map(person_line).collect();
-                or_none(lines, "no member yet: faceoff team invite NOTE")
+                lines_or(lines, "no members yet; invite one with faceoff team invite NOTE")
             })
         }
         Action::Invite { note } => {
@@ -156,8 +156,8 @@ async fn act(client: &Client, json: bool, action: Action) -> anyhow::Result<()> 
                 note,
                 expires_at: None,
             };
-            let made = client.invite(&new).await?;
-            print(json, &made, || invited(&made))
+            let invitation = client.invite(&new).await?;
+            print(json, &invitation, || new_invitation_text(&invitation))
         }
         Action::Invitations => {
             let invitations = client.invitations().await?;
@@ -192,7 +192,7 @@ async fn act(client: &Client, json: bool, action: Action) -> anyhow::Result<()> 
                 Some(terms) => format!(
                     "version {} since {}\n\n{}",
                     terms.version,
-                    shown(terms.since),
+                    time_text(terms.since),
                     terms.text
                 ),
                 None => "this season has no terms".to_owned(),
@@ -211,34 +211,34 @@ async fn news(client: &Client, json: bool) -> anyhow::Result<()> {
     let (announcements, questions) = (client.announcements().await?, client.questions().await?);
     let both = serde_json::json!({ "announcements": announcements, "questions": questions });
     print(json, &both, || {
-        let told = announcements
+        let announcements = announcements
             .iter()
-            .map(|told| format!("{}  {}\n{}\n", shown(told.at), told.title, told.text));
-        let asked = questions.iter().map(|asked| {
-            let answer = asked.answer.as_deref().unwrap_or("no answer yet");
-            format!("{}  {}\n→ {answer}\n", shown(asked.at), asked.text)
+            .map(|news| format!("{}  {}\n{}\n", time_text(news.at), news.title, news.text));
+        let answers = questions.iter().map(|question| {
+            let answer = question.answer.as_deref().unwrap_or("no answer yet");
+            format!("{}  {}\n→ {answer}\n", time_text(question.at), question.text)
         });
-        or_none(told.chain(asked).collect(), "nothing was told yet")
+        lines_or(announcements.chain(answers).collect(), "no announcements or questions yet")
     })
 }
 
-fn shown(at: Timestamp) -> String {
+fn time_text(at: Timestamp) -> String {
     at.strftime("%Y-%m-%d %H:%M UTC").to_string()
 }
 
-/// A team in words.
+/// A team's profile as text.
 pub(super) fn team_text(team: &TeamView) -> String {
     let mut lines = vec![format!("{} ({})", team.name, team.id)];
     let division = team.division.as_ref().map(ToString::to_string);
-    for (what, text) in [
+    for (label, text) in [
         ("affiliation", team.affiliation.clone()),
         ("link", team.link.clone()),
         ("division", division),
         (
             "baseline",
-            team.baseline.then(|| "yes: it is not ranked".to_owned()),
+            team.baseline.then(|| "yes, not ranked".to_owned()),
         ),
-        ("retired", team.retired_at.map(shown)),
+        ("retired", team.retired_at.map(time_text)),
         (
             "disqualified",
             team.disqualified
@@ -246,7 +246,7 @@ pub(super) fn team_text(team: &TeamView) -> String {
                 .map(|ruling| ruling.reason.clone()),
         ),
     ] {
-        lines.extend(text.map(|text| format!("{what:<13}{text}")));
+        lines.extend(text.map(|text| format!("{label:<13}{text}")));
     }
     lines.join("\n")
 }

@@ -1,7 +1,7 @@
-//! `faceoff token`: makes, lists, rotates and revokes tokens.
+//! `faceoff token`: creates, lists, rotates and revokes tokens.
 
 use super::{
-    output::{or_none, print},
+    output::{lines_or, print},
     server::ServerArgs,
 };
 use crate::client::Client;
@@ -11,7 +11,7 @@ use faceoff_api::{requests::NewToken, views::token::TokenView};
 use faceoff_types::{TeamId, TokenId};
 use jiff::{SignedDuration, Timestamp};
 
-/// Makes, lists, rotates and revokes tokens.
+/// Creates, lists, rotates and revokes tokens.
 #[derive(Debug, Args)]
 pub struct TokenCommand {
     #[command(flatten)]
@@ -20,29 +20,28 @@ pub struct TokenCommand {
     action: TokenAction,
 }
 
-/// What can be done with tokens.
 #[derive(Debug, Subcommand)]
 pub(super) enum TokenAction {
     /// List tokens and sessions, the newest first
     List,
-    /// Make a token and print it, this once
+    /// Create a token and print it; it is shown only once
     Create {
-        /// What it is for, e.g. laptop
+        /// Name of the token, e.g. laptop
         name: String,
-        /// Days after which it is worth nothing; left out, it has no end
+        /// Days until the token expires [default: never]
         #[arg(long, value_name = "DAYS", value_parser = clap::value_parser!(u16).range(1..))]
         days: Option<u16>,
-        /// For the programs of the team with this id, not for you
+        /// Create a token for API clients of the team with this id instead of your own account
         #[arg(long, value_name = "ID")]
         team: Option<TeamId>,
     },
-    /// Give a token another secret and print it, this once; the old one is worth nothing from then on
+    /// Replace the secret of a token and print the new one, which is shown only once; the old one becomes invalid
     Rotate {
         /// The token's id
         #[arg(id = "id", value_name = "ID")]
         token: TokenId,
     },
-    /// End a token or a session at once
+    /// Revoke a token or end a session
     Revoke {
         /// The token's id
         #[arg(id = "id", value_name = "ID")]
@@ -51,7 +50,7 @@ pub(super) enum TokenAction {
 }
 
 impl TokenCommand {
-    /// Does what was asked.
+    /// Runs the chosen action.
     ///
     /// # Errors
     /// If the server cannot be reached or refuses.
@@ -60,15 +59,15 @@ impl TokenCommand {
     }
 }
 
-/// Does it, as whoever the client is.
+/// Runs an action with the client's token.
 pub(super) async fn act(client: &Client, json: bool, action: TokenAction) -> anyhow::Result<()> {
     match action {
         TokenAction::List => {
             let tokens = client.tokens().await?;
             print(json, &tokens, || {
                 let now = Timestamp::now();
-                let lines = tokens.iter().map(|token| line(token, now)).collect();
-                or_none(lines, "no token yet: faceoff token create NAME")
+                let lines = tokens.iter().map(|token| token_line(token, now)).collect();
+                lines_or(lines, "no tokens yet; create one with faceoff token create NAME")
             })
         }
         TokenAction::Create { name, days, team } => {
@@ -81,37 +80,37 @@ pub(super) async fn act(client: &Client, json: bool, action: TokenAction) -> any
                 expires_at: days.map(end).transpose().context("days")?,
                 team,
             };
-            let made = client.create_token(&new).await?;
-            print(json, &made, || {
+            let created = client.create_token(&new).await?;
+            print(json, &created, || {
                 format!(
-                    "token {} ({})\n{}\nIt is not shown again.",
-                    made.token.name, made.token.id, made.secret
+                    "token {} ({})\n{}\nThe token is not shown again.",
+                    created.token.name, created.token.id, created.secret
                 )
             })
         }
         TokenAction::Rotate { token } => {
-            let made = client.rotate_token(token).await?;
-            print(json, &made, || {
+            let rotated = client.rotate_token(token).await?;
+            print(json, &rotated, || {
                 format!(
-                    "token {} ({})\n{}\nIt is not shown again; what it was before is worth nothing from now on.",
-                    made.token.name, made.token.id, made.secret
+                    "token {} ({})\n{}\nThe token is not shown again. The old one is invalid.",
+                    rotated.token.name, rotated.token.id, rotated.secret
                 )
             })
         }
         TokenAction::Revoke { token } => {
             let revoked = client.revoke_token(token).await?;
-            print(json, &revoked, || line(&revoked, Timestamp::now()))
+            print(json, &revoked, || token_line(&revoked, Timestamp::now()))
         }
     }
 }
 
-fn line(token: &TokenView, now: Timestamp) -> String {
-    let shown = |at: Timestamp| at.strftime("%Y-%m-%d %H:%M UTC").to_string();
+fn token_line(token: &TokenView, now: Timestamp) -> String {
+    let time_text = |at: Timestamp| at.strftime("%Y-%m-%d %H:%M UTC").to_string();
     let state = match (token.revoked_at, token.expires_at) {
-        (Some(at), _) => format!("revoked {}", shown(at)),
-        (None, Some(at)) if at <= now => format!("expired {}", shown(at)),
-        (None, Some(at)) => format!("good until {}", shown(at)),
-        (None, None) => "good".to_owned(),
+        (Some(at), _) => format!("revoked {}", time_text(at)),
+        (None, Some(at)) if at <= now => format!("expired {}", time_text(at)),
+        (None, Some(at)) => format!("valid until {}", time_text(at)),
+        (None, None) => "valid".to_owned(),
     };
     let owner = match (token.team, token.person) {
         (Some(id), _) => format!("team:{id}"),
@@ -120,13 +119,13 @@ fn line(token: &TokenView, now: Timestamp) -> String {
     };
     let used = token.last_used_at.map_or_else(
         || "never used".to_owned(),
-        |at| format!("used {}", shown(at)),
+        |at| format!("used {}", time_text(at)),
     );
     format!(
-        "{}  {:<20} {:<7} {owner}  made {}  {used}  {state}",
+        "{}  {:<20} {:<7} {owner}  created {}  {used}  {state}",
         token.id,
         token.name,
         token.kind,
-        shown(token.created_at)
+        time_text(token.created_at)
     )
 }

@@ -1,6 +1,6 @@
-//! `faceoff tournament`: tournaments as everybody sees them, and how a team leaves one.
+//! `faceoff tournament`: shows tournaments, and withdraws a team from one.
 
-pub(super) mod find;
+pub(super) mod lookup;
 pub(super) mod games;
 pub(super) mod text;
 
@@ -8,9 +8,9 @@ use super::{output::print, score::table, server::ServerArgs};
 use clap::{Args, Subcommand};
 use faceoff_api::requests::Decision;
 use faceoff_types::RoundNumber;
-use find::{find, find_or_newest};
+use lookup::{find_tournament, find_tournament_or_newest};
 
-/// Shows tournaments: who is in them, who plays whom, who won and why, how sure that is.
+/// Shows tournaments: teams, games, results, standings and ratings.
 #[derive(Debug, Args)]
 pub struct TournamentCommand {
     #[command(flatten)]
@@ -21,45 +21,45 @@ pub struct TournamentCommand {
 
 #[derive(Debug, Subcommand)]
 enum Action {
-    /// List them, the first one first
+    /// List the tournaments, the oldest first
     List,
-    /// Show one: rules, teams, rounds, tables, and what comes next
+    /// Show a tournament: rules, teams, rounds, standings and next step
     Show {
-        /// Its name or id [default: the newest]
+        /// The tournament's name or id [default: the newest]
         tournament: Option<String>,
     },
-    /// List its games: score, goals, fouls, penalty points, who won and why
+    /// List the games: score, goals, fouls, penalty points, winner and reason
     Games {
-        /// Its name or id [default: the newest]
+        /// The tournament's name or id [default: the newest]
         tournament: Option<String>,
-        /// Of one round alone
+        /// Only the games of this round
         #[arg(long, value_parser = round)]
         round: Option<RoundNumber>,
     },
-    /// Show how strong the submissions are, from results and from goals, and the record of each two teams
+    /// Show ratings of the submissions, by results and by goals, and head-to-head records
     Ratings {
-        /// Its name or id [default: the newest]
+        /// The tournament's name or id [default: the newest]
         tournament: Option<String>,
     },
-    /// Show who was champion how often when the organiser had the schedule played again with fresh seeds
+    /// Show how often each team was champion in replays of the schedule with new seeds
     Certainty {
-        /// Its name or id [default: the newest]
+        /// The tournament's name or id [default: the newest]
         tournament: Option<String>,
     },
-    /// Withdraw your team from one for good; without --confirm, say what that would do
+    /// Withdraw your team from a tournament permanently; without --confirm, only list the effects
     Withdraw {
-        /// Its name or id
+        /// The tournament's name or id
         tournament: String,
-        /// Everybody may read it
+        /// Shown publicly
         reason: String,
-        /// The team's name
+        /// The team's name, as confirmation
         #[arg(long, value_name = "TEAM")]
         confirm: Option<String>,
     },
 }
 
 impl TournamentCommand {
-    /// Does what was asked.
+    /// Runs the chosen action.
     ///
     /// # Errors
     /// If the server cannot be reached or refuses.
@@ -68,59 +68,59 @@ impl TournamentCommand {
     }
 
     async fn act(self) -> anyhow::Result<()> {
-        let client = self.server.anybody()?;
+        let client = self.server.client_or_visitor()?;
         match self.action {
             Action::List => {
                 let tournaments = client.tournaments().await?;
-                print(self.server.json, &tournaments, || text::list(&tournaments))
+                print(self.server.json, &tournaments, || text::tournament_list(&tournaments))
             }
             Action::Show { tournament } => {
-                let id = find_or_newest(&client, tournament.as_deref()).await?;
+                let id = find_tournament_or_newest(&client, tournament.as_deref()).await?;
                 let tournament = client.tournament(id).await?;
-                print(self.server.json, &tournament, || text::whole(&tournament))
+                print(self.server.json, &tournament, || text::tournament_text(&tournament))
             }
             Action::Games { tournament, round } => {
-                let id = find_or_newest(&client, tournament.as_deref()).await?;
+                let id = find_tournament_or_newest(&client, tournament.as_deref()).await?;
                 let games = client.games(id, round).await?;
-                print(self.server.json, &games, || games::table(&games))
+                print(self.server.json, &games, || games::games_table(&games))
             }
             Action::Ratings { tournament } => {
-                let id = find_or_newest(&client, tournament.as_deref()).await?;
-                let told = Strengths {
+                let id = find_tournament_or_newest(&client, tournament.as_deref()).await?;
+                let view = RatingsView {
                     ratings: client.ratings(id).await?,
                     head_to_head: client.head_to_head(id).await?,
                 };
-                print(self.server.json, &told, || {
-                    table::strengths(&told.ratings, &told.head_to_head)
+                print(self.server.json, &view, || {
+                    table::ratings_text(&view.ratings, &view.head_to_head)
                 })
             }
             Action::Certainty { tournament } => {
-                let id = find_or_newest(&client, tournament.as_deref()).await?;
+                let id = find_tournament_or_newest(&client, tournament.as_deref()).await?;
                 let certainty = client.certainty(id).await?;
-                print(self.server.json, &certainty, || text::certainty(&certainty))
+                print(self.server.json, &certainty, || text::champion_shares_text(&certainty))
             }
             Action::Withdraw {
                 tournament,
                 reason,
                 confirm,
             } => {
-                let id = find(&client, &tournament).await?;
+                let id = find_tournament(&client, &tournament).await?;
                 let decision = Decision { reason, confirm };
                 let left = client.withdraw_from_tournament(id, &decision).await?;
-                print(self.server.json, &left, || text::whole(&left))
+                print(self.server.json, &left, || text::tournament_text(&left))
             }
         }
     }
 }
 
-/// What is printed of ratings with `--json`.
+/// Output of `ratings --json`.
 #[derive(Debug, serde::Serialize)]
-struct Strengths {
+struct RatingsView {
     ratings: faceoff_scoring::tournament::rating::Ratings,
     head_to_head: Vec<faceoff_scoring::tournament::HeadToHead>,
 }
 
-/// A round's number, as typed.
+/// Parses a round number.
 pub(super) fn round(text: &str) -> Result<RoundNumber, String> {
     let number: u32 = text
         .parse()

@@ -1,4 +1,4 @@
-//! `faceoff verify`: does a published dataset, or a recorded game, give its published score?
+//! `faceoff verify`: verifies that a dataset or a recorded game reproduces its score.
 
 mod failure;
 mod game;
@@ -24,66 +24,66 @@ use std::{
     time::{Duration, Instant},
 };
 
-/// Simulates a dataset, or a game, again from its seeds and recorded actions and compares every state,
-/// observation, constraint value and score bit for bit. Exit status 0: all identical; 1: something
-/// differs; 2: the dataset cannot be read, or not be simulated by this version.
+/// Simulates a dataset or a game again from its seeds and recorded actions, and compares every state,
+/// observation, constraint value and score bit for bit. Exit status 0: identical; 1: a difference;
+/// 2: the dataset cannot be read or not be simulated by this version.
 #[derive(Debug, Args)]
 pub struct VerifyCommand {
-    /// dataset.zip or game.zip, the folder it was unpacked to, or the folder that `faceoff eval` or
-    /// `faceoff play` wrote
+    /// dataset.zip or game.zip, the folder it was unpacked to, or the output folder of `faceoff eval` or
+    /// `faceoff play`
     dataset: PathBuf,
-    /// Threads [default: one per CPU]; what is found does not depend on it
-    #[arg(long, value_name = "W")]
+    /// Number of threads, without influence on the result [default: one per CPU]
+    #[arg(long, value_name = "N")]
     workers: Option<NonZero<usize>>,
     /// Print one JSON object
     #[arg(long)]
     json: bool,
-    /// The season's revealed secret, 64 hexadecimal digits: also check that the seeds derive from it
+    /// The season's published secret, 64 hexadecimal digits: also check that the seeds are derived from it
     #[arg(long, value_name = "HEX", requires = "day")]
     secret: Option<Seed>,
-    /// The id of the evaluation's stage; left out, the stage is one whose id enters no seed
+    /// The id of the evaluation's stage, unless the seeds of the stage do not depend on its id
     #[arg(long, value_name = "ID", requires = "secret")]
     stage: Option<StageId>,
-    /// The date of the evaluation's day
+    /// The date of the evaluation day
     #[arg(long, value_name = "YYYY-MM-DD", requires = "secret")]
     day: Option<Date>,
-    /// The commitment that was published before the season: also check that it is the secret's hash
+    /// The commitment published before the season: also check that it is the hash of the secret
     #[arg(long, value_name = "HEX", requires = "secret")]
     commitment: Option<String>,
-    /// The published hash of the archive: also check that it is this one's
+    /// The published hash of the archive: also check that the file has it
     #[arg(long, value_name = "HEX")]
     blake3: Option<blake3::Hash>,
 }
 
-/// What is printed with `--json`.
+/// Output of `--json`.
 #[derive(Debug, Serialize)]
 struct Summary {
     verified: bool,
     /// The first difference.
     #[serde(skip_serializing_if = "Option::is_none")]
     difference: Option<Difference>,
-    /// Why the dataset is not verified, in words.
+    /// Reason why the dataset is not verified.
     #[serde(skip_serializing_if = "Option::is_none")]
     error: Option<String>,
     #[serde(flatten)]
-    simulated: Option<Recording>,
+    simulated: Option<VerifiedRecording>,
 }
 
-/// What was simulated again.
+/// The verified recording.
 #[derive(Debug, Serialize)]
 #[serde(untagged)]
-enum Recording {
-    Evaluation(Box<Simulated>),
+enum VerifiedRecording {
+    Evaluation(Box<SimulatedEvaluation>),
     Game(Box<SimulatedGame>),
 }
 
 #[derive(Debug, Serialize)]
-struct Simulated {
+struct SimulatedEvaluation {
     episodes: u32,
     steps: u64,
     seconds: f64,
     steps_per_s: f64,
-    /// Were the seeds derived from the season's secret?
+    /// The seeds were checked against the season's secret.
     season: bool,
     /// The archive's hash; `null` for an unpacked folder.
     blake3: Option<String>,
@@ -91,18 +91,18 @@ struct Simulated {
 }
 
 impl VerifyCommand {
-    /// Verifies, prints what was found, and returns the exit status.
+    /// Verifies the recording, prints the result and returns the exit status.
     #[must_use]
     pub fn run(self) -> Exit {
-        let outcome = self.recording();
+        let outcome = self.verify_recording();
         let (summary, exit) = match outcome {
             Ok(simulated) => {
                 if !self.json {
-                    let said = match &simulated {
-                        Recording::Evaluation(evaluation) => describe(&self.dataset, evaluation),
-                        Recording::Game(played) => game::describe(&self.dataset, played),
+                    let text = match &simulated {
+                        VerifiedRecording::Evaluation(evaluation) => describe(&self.dataset, evaluation),
+                        VerifiedRecording::Game(played) => game::describe(&self.dataset, played),
                     };
-                    println!("{said}");
+                    println!("{text}");
                 }
                 let summary = Summary {
                     verified: true,
@@ -139,16 +139,16 @@ impl VerifyCommand {
         exit
     }
 
-    fn recording(&self) -> Result<Recording, Failure> {
+    fn verify_recording(&self) -> Result<VerifiedRecording, Failure> {
         if !GameRecording::is_at(&self.dataset)? {
-            return Ok(Recording::Evaluation(Box::new(self.verify()?)));
+            return Ok(VerifiedRecording::Evaluation(Box::new(self.verify_dataset()?)));
         }
         game::refuse_season(self.secret.is_some())?;
         let simulated = game::verify(&self.dataset, self.blake3.as_ref())?;
-        Ok(Recording::Game(Box::new(simulated)))
+        Ok(VerifiedRecording::Game(Box::new(simulated)))
     }
 
-    fn verify(&self) -> Result<Simulated, Failure> {
+    fn verify_dataset(&self) -> Result<SimulatedEvaluation, Failure> {
         let dataset = Dataset::open(&self.dataset)?;
         let archive = dataset.archive()?.map(|digest| digest.blake3);
         check_hash(self.blake3.as_ref(), archive.as_deref())?;
@@ -165,18 +165,18 @@ impl VerifyCommand {
                 }
                 Failure::Season {
                     error,
-                    hint: "; if the id of its stage enters the seeds, as the page /season says, give --stage, too",
+                    hint: "; if the seeds depend on the id of the stage (see the page /season), also give --stage",
                 }
             })?;
         }
         let workers = match self.workers {
             Some(workers) => workers,
             None => thread::available_parallelism()
-                .context("asking for the number of CPUs; say --workers")
-                .map_err(Failure::Here)?,
+                .context("reading the number of CPUs; use --workers")
+                .map_err(Failure::Local)?,
         };
         let (verified, time) = with_progress(&dataset, workers)?;
-        Ok(Simulated {
+        Ok(SimulatedEvaluation {
             episodes: verified.episodes,
             steps: verified.steps,
             seconds: time.as_secs_f64(),
@@ -188,7 +188,7 @@ impl VerifyCommand {
     }
 }
 
-/// Verifies with a progress bar on standard error, if that is a terminal.
+/// Verifies a dataset, with a progress bar if standard error is a terminal.
 fn with_progress(
     dataset: &Dataset,
     workers: NonZero<usize>,
@@ -197,7 +197,7 @@ fn with_progress(
     let bar = ProgressBar::new(episodes.map(|count| u64::from(*count)).sum()).with_style(
         ProgressStyle::with_template("{bar:40} {pos}/{len} episodes, {per_sec}, {eta} left")
             .context("the progress bar's template")
-            .map_err(Failure::Here)?,
+            .map_err(Failure::Local)?,
     );
     let start = Instant::now();
     let verified = verify(dataset, workers, &|| bar.inc(1));
@@ -205,10 +205,10 @@ fn with_progress(
     Ok((verified?, start.elapsed()))
 }
 
-/// Verifies a dataset with all CPUs and says so in one line.
+/// Verifies a dataset with all CPUs and returns the result as one line.
 ///
 /// # Errors
-/// If the dataset cannot be read or is not what the simulation gives.
+/// If the dataset cannot be read or differs from the simulation.
 pub fn verified_line(path: &Path) -> anyhow::Result<String> {
     let command = VerifyCommand {
         dataset: path.to_owned(),
@@ -220,12 +220,12 @@ pub fn verified_line(path: &Path) -> anyhow::Result<String> {
         commitment: None,
         blake3: None,
     };
-    let simulated = command.verify()?;
+    let simulated = command.verify_dataset()?;
     Ok(describe(path, &simulated))
 }
 
-fn describe(path: &Path, simulated: &Simulated) -> String {
-    let Simulated {
+fn describe(path: &Path, simulated: &SimulatedEvaluation) -> String {
+    let SimulatedEvaluation {
         episodes,
         steps,
         seconds,
@@ -238,7 +238,7 @@ fn describe(path: &Path, simulated: &Simulated) -> String {
         .as_ref()
         .map_or_else(String::new, |hash| format!("; BLAKE3 {hash}"));
     let seeds = if *season {
-        "; its seeds derive from the season's secret"
+        "; seeds derived from the season's secret"
     } else {
         ""
     };

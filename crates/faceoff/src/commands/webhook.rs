@@ -1,20 +1,20 @@
-//! `faceoff webhook`: programs that the server tells of what happens.
+//! `faceoff webhook`: manages webhooks, which notify other programs of events.
 
 use super::{
-    output::{or_none, print},
+    output::{lines_or, print},
     server::ServerArgs,
 };
 use crate::client::Client;
 use clap::{Args, Subcommand};
 use faceoff_api::{
-    requests::{NewWebhook, Revived, WebhookChanges},
+    requests::{NewWebhook, WebhookRevival, WebhookChanges},
     views::webhook::{DeliveryStateView, DeliveryView, NewWebhookView, WebhookState, WebhookView},
 };
 use faceoff_types::WebhookId;
 use jiff::Timestamp;
 use serde_json::json;
 
-/// Has programs told of what happens, by signed requests (Standard Webhooks).
+/// Manages webhooks: signed requests that notify other programs of events (Standard Webhooks).
 #[derive(Debug, Args)]
 pub struct WebhookCommand {
     #[command(flatten)]
@@ -23,67 +23,67 @@ pub struct WebhookCommand {
     action: WebhookAction,
 }
 
-/// What can be done with webhooks.
 #[derive(Debug, Subcommand)]
 pub(super) enum WebhookAction {
-    /// List them, with those that take nothing
+    /// List the webhooks with their states
     List,
-    /// Have an address told, and print the secret of its signatures, this once
+    /// Create a webhook and print its signing secret, which is shown only once
     Create {
-        /// What it is for, e.g. chat
+        /// Name of the webhook, e.g. chat
         name: String,
-        /// The address: https, and on the Internet
+        /// The address: a public https URL
         url: String,
-        /// Of what: board, queue, day_released, stage:ID, …; may be given again [default: everything that you may know]
-        #[arg(long, value_name = "WHAT")]
+        /// Events to send: board, queue, day_released, stage:ID, …; can be repeated [default: all events that you may
+        /// see]
+        #[arg(long, value_name = "EVENT")]
         about: Vec<String>,
     },
-    /// Change one
+    /// Change a webhook
     Change {
-        /// Its id
+        /// The webhook's id
         #[arg(id = "id", value_name = "ID")]
         webhook: WebhookId,
-        /// What it is for
+        /// The new name
         #[arg(long)]
         name: Option<String>,
-        /// The address
+        /// The new address
         #[arg(long)]
         url: Option<String>,
-        /// Of what it is told, in place of what it was
-        #[arg(long, value_name = "WHAT")]
+        /// Events to send, instead of the previous ones
+        #[arg(long, value_name = "EVENT")]
         about: Option<Vec<String>>,
-        /// Tell it again, if it was given up
+        /// Enable the webhook again after it was disabled
         #[arg(long)]
         revive: bool,
     },
-    /// Give one another secret and print it, this once; the old one signs, too, for a day
+    /// Replace the secret and print the new one, which is shown only once; the old one also signs for one more day
     Rotate {
-        /// Its id
+        /// The webhook's id
         #[arg(id = "id", value_name = "ID")]
         webhook: WebhookId,
     },
-    /// Have one told something, to see whether it takes it
+    /// Send a test delivery
     Test {
-        /// Its id
+        /// The webhook's id
         #[arg(id = "id", value_name = "ID")]
         webhook: WebhookId,
     },
-    /// Show what one was told of late, and what came of it, the newest first
+    /// List the latest deliveries with their results, the newest first
     Deliveries {
-        /// Its id
+        /// The webhook's id
         #[arg(id = "id", value_name = "ID")]
         webhook: WebhookId,
     },
-    /// Have one told nothing more
+    /// Remove a webhook
     Remove {
-        /// Its id
+        /// The webhook's id
         #[arg(id = "id", value_name = "ID")]
         webhook: WebhookId,
     },
 }
 
 impl WebhookCommand {
-    /// Does what was asked.
+    /// Runs the chosen action.
     ///
     /// # Errors
     /// If the server cannot be reached or refuses.
@@ -92,23 +92,23 @@ impl WebhookCommand {
     }
 }
 
-/// Does it, as whoever the client is.
+/// Runs an action with the client's token.
 pub(super) async fn act(client: &Client, json: bool, action: WebhookAction) -> anyhow::Result<()> {
     match action {
         WebhookAction::List => {
             let webhooks = client.webhooks().await?;
             print(json, &webhooks, || {
-                let lines = webhooks.iter().map(line).collect();
-                or_none(lines, "no webhook yet: faceoff webhook create NAME URL")
+                let lines = webhooks.iter().map(webhook_line).collect();
+                lines_or(lines, "no webhooks yet; create one with faceoff webhook create NAME URL")
             })
         }
         WebhookAction::Create { name, url, about } => {
-            let made = client
+            let created = client
                 .create_webhook(&NewWebhook { name, url, about })
                 .await?;
-            print(json, &made, || with_secret(&made))
-        }
-        WebhookAction::Change {
+            print(json, &created, || new_webhook_text(&created))
+            }
+            WebhookAction::Change {
             webhook,
             name,
             url,
@@ -119,81 +119,81 @@ pub(super) async fn act(client: &Client, json: bool, action: WebhookAction) -> a
                 name,
                 url,
                 about,
-                state: revive.then_some(Revived::Alive),
+                state: revive.then_some(WebhookRevival::Alive),
             };
             let changed = client.change_webhook(webhook, &changes).await?;
-            print(json, &changed, || line(&changed))
+            print(json, &changed, || webhook_line(&changed))
         }
         WebhookAction::Rotate { webhook } => {
-            let made = client.rotate_webhook(webhook).await?;
-            print(json, &made, || with_secret(&made))
+            let rotated = client.rotate_webhook(webhook).await?;
+            print(json, &rotated, || new_webhook_text(&rotated))
         }
         WebhookAction::Test { webhook } => {
             let test = client.test_webhook(webhook).await?;
             print(json, &test, || {
                 format!(
-                    "it is sent in a moment; faceoff webhook deliveries {webhook} says what came of it"
+                    "test delivery queued; for its result, run faceoff webhook deliveries {webhook}"
                 )
             })
         }
         WebhookAction::Deliveries { webhook } => {
-            let told = client.deliveries(webhook).await?;
-            print(json, &told, || {
-                or_none(
-                    told.iter().map(delivery).collect(),
-                    "it was told nothing yet",
+            let deliveries = client.deliveries(webhook).await?;
+            print(json, &deliveries, || {
+                lines_or(
+                    deliveries.iter().map(delivery_line).collect(),
+                    "no deliveries yet",
                 )
             })
         }
         WebhookAction::Remove { webhook } => {
             client.remove_webhook(webhook).await?;
             print(json, &json!({ "removed": webhook }), || {
-                format!("{webhook} is told nothing more")
+                format!("{webhook} is removed")
             })
         }
     }
 }
 
-fn shown(at: Timestamp) -> String {
+fn time_text(at: Timestamp) -> String {
     at.strftime("%Y-%m-%d %H:%M UTC").to_string()
 }
 
-fn with_secret(made: &NewWebhookView) -> String {
+fn new_webhook_text(new: &NewWebhookView) -> String {
     format!(
         "{}\n{}\nIt is not shown again.",
-        line(&made.webhook),
-        made.secret
+        webhook_line(&new.webhook),
+        new.secret
     )
 }
 
-fn line(webhook: &WebhookView) -> String {
+fn webhook_line(webhook: &WebhookView) -> String {
     let state = match &webhook.state {
-        WebhookState::Alive => "takes what it is told".to_owned(),
-        WebhookState::Failing { since } => format!("has taken nothing since {}", shown(*since)),
+        WebhookState::Alive => "active".to_owned(),
+        WebhookState::Failing { since } => format!("failing since {}", time_text(*since)),
         WebhookState::Dead { since, reason } => {
-            format!("given up {}: {reason}", shown(*since))
+            format!("disabled {}: {reason}", time_text(*since))
         }
     };
     let about = match &webhook.about[..] {
-        [] => "everything".to_owned(),
+        [] => "all events".to_owned(),
         about => about.join(", "),
     };
     let owner = webhook
         .team
         .map_or_else(|| "organisers".to_owned(), |id| format!("team:{id}"));
     format!(
-        "{}  {:<20} {owner}  {}  of {about}  {state}",
+        "{}  {:<20} {owner}  {}  {about}  {state}",
         webhook.id, webhook.name, webhook.url
     )
 }
 
-fn delivery(told: &DeliveryView) -> String {
-    let state = match told.state {
-        DeliveryStateView::Waiting { next_at } => format!("sent at {}", shown(next_at)),
-        DeliveryStateView::Delivered { settled_at } => format!("taken {}", shown(settled_at)),
-        DeliveryStateView::GivenUp { settled_at } => format!("given up {}", shown(settled_at)),
+fn delivery_line(delivery: &DeliveryView) -> String {
+    let state = match delivery.state {
+        DeliveryStateView::Waiting { next_at } => format!("next attempt at {}", time_text(next_at)),
+        DeliveryStateView::Delivered { settled_at } => format!("delivered {}", time_text(settled_at)),
+        DeliveryStateView::GivenUp { settled_at } => format!("failed {}", time_text(settled_at)),
     };
-    let last = told.last.as_ref().map_or_else(String::new, |last| {
+    let last = delivery.last.as_ref().map_or_else(String::new, |last| {
         let status = last
             .status
             .map_or_else(|| "no answer".to_owned(), |status| status.to_string());
@@ -203,9 +203,9 @@ fn delivery(told: &DeliveryView) -> String {
         }
     });
     format!(
-        "{}  {:<24} {} tries  {state}{last}",
-        shown(told.created_at),
-        told.kind,
-        told.attempts
+        "{}  {:<24} {} attempts  {state}{last}",
+        time_text(delivery.created_at),
+        delivery.kind,
+        delivery.attempts
     )
 }

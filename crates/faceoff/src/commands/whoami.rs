@@ -1,65 +1,65 @@
-//! `faceoff whoami`: whom a token speaks for.
+//! `faceoff whoami`: prints the account of a token.
 
 use super::{
     output::print,
     server::{ServerArgs, Source},
 };
 use clap::Args;
-use faceoff_api::views::person::WhoView;
+use faceoff_api::views::user::CallerView;
 use serde::Serialize;
 
-/// Says whom the token speaks for, to which server, and where both come from.
+/// Shows the account of the token, the server, and the sources of both settings.
 #[derive(Debug, Args)]
 pub struct WhoamiCommand {
     #[command(flatten)]
     server: ServerArgs,
 }
 
-/// What is printed with `--json`.
+/// Output of `--json`.
 #[derive(Debug, Serialize)]
-struct Me<'a> {
+struct WhoamiView<'a> {
     #[serde(flatten)]
-    who: &'a WhoView,
+    who: &'a CallerView,
     server: &'a str,
     server_from: Source,
     token_from: Source,
 }
 
 impl WhoamiCommand {
-    /// Asks the server.
+    /// Requests the account and prints it.
     ///
     /// # Errors
     /// If the server cannot be reached or refuses.
     pub fn run(self) -> anyhow::Result<()> {
         super::block_on(async {
-            let found = self.server.found()?;
+            let connection = self.server.connection()?;
             let who = self.server.client()?.whoami().await?;
-            let me = Me {
+            let view = WhoamiView {
                 who: &who,
-                server: &found.server,
-                server_from: found.server_from,
-                token_from: found.token_from,
+                server: &connection.server,
+                server_from: connection.server_from,
+                token_from: connection.token_from,
             };
-            print(self.server.json, &me, || {
+            print(self.server.json, &view, || {
                 format!(
-                    "{}\nserver {} ({}), token by {}",
-                    text(&who),
-                    me.server,
-                    me.server_from.words("--server", "FACEOFF_SERVER"),
-                    me.token_from.words("--token", "FACEOFF_TOKEN")
+                    "{}\nserver {} ({}), token from {}",
+                    whoami_text(&who),
+                    view.server,
+                    view.server_from.text("--server", "FACEOFF_SERVER"),
+                    view.token_from.text("--token", "FACEOFF_TOKEN")
                 )
             })
         })
     }
 }
 
-/// Who it is, in words.
-pub(super) fn text(who: &WhoView) -> String {
+/// User, role, team and token as one line.
+pub(super) fn whoami_text(who: &CallerView) -> String {
     let team = who.team.as_ref();
     let of_team = team.map(|team| format!(" of the team {} ({})", team.name, team.id));
     let role = match who.role.as_str() {
-        "team" => "a program",
-        "host" => "the host, which may do what organisers may",
+        "team" => "API client",
+        "host" => "host, with the rights of an organiser",
         "organiser" => "organiser",
         role => role,
     };
@@ -68,7 +68,7 @@ pub(super) fn text(who: &WhoView) -> String {
         None => String::new(),
     };
     format!(
-        "{person}{role}{}, by the token {} ({})",
+        "{person}{role}{}, with the token {} ({})",
         of_team.unwrap_or_default(),
         who.token.name,
         who.token.id

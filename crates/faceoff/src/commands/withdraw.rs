@@ -1,10 +1,10 @@
-//! `faceoff withdraw`: takes a submission back.
+//! `faceoff withdraw`: withdraws a submission.
 
 use super::{server::ServerArgs, submissions::withdraw};
 use clap::Args;
 use faceoff_types::SubmissionId;
 
-/// Takes a submission back: it plays no further day, unless `faceoff activate` chooses it again.
+/// Withdraws a submission: it is not evaluated any more, unless `faceoff activate` makes it active again.
 #[derive(Debug, Args)]
 pub struct WithdrawCommand {
     /// The submission's id
@@ -14,7 +14,7 @@ pub struct WithdrawCommand {
 }
 
 impl WithdrawCommand {
-    /// Takes it back.
+    /// Withdraws the submission.
     ///
     /// # Errors
     /// If the server cannot be reached or refuses.

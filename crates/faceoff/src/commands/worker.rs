@@ -1,8 +1,8 @@
-//! `faceoff worker`: slots that work for a server on another machine.
+//! `faceoff worker`: runs a remote worker.
 
 use super::{
     files_client::files_client,
-    introduction::introduction,
+    capabilities::own_capabilities,
     serve::{check_sandbox, in_memory},
 };
 use crate::{config::Config, log::LogFormat};
@@ -10,8 +10,8 @@ use anyhow::{Context as _, anyhow};
 use clap::Args;
 use faceoff_metrics::Metrics;
 use faceoff_sandbox::probe_host;
-use faceoff_types::is_harmless;
-use faceoff_wire::remote::Introduction;
+use faceoff_types::is_printable;
+use faceoff_wire::remote::WorkerCapabilities;
 use faceoff_worker::{CpuLayout, RemoteWorker, SlotThreads, SlotsConfig};
 use jiff::SignedDuration;
 use std::{
@@ -22,63 +22,64 @@ use std::{
 };
 use tokio_util::sync::CancellationToken;
 
-/// Plays for a server on another machine.
+/// Runs jobs of a server on this machine, as a remote worker.
 ///
-/// Takes what the server gives out by NATS: episodes and games. It needs this very program, the runtimes that the server offers, and a
-/// host that can isolate agents as the server's; it needs no data folder and learns no secret. SIGTERM gives back what is under way.
+/// The worker gets episodes and games from the server through NATS. It needs the same build of this program, the
+/// runtimes that the server offers, and a host with the same isolation. It needs no data folder and learns no secret.
+/// SIGTERM releases running jobs.
 #[derive(Debug, Args)]
 pub struct WorkerCommand {
-    /// Configuration file [default: faceoff.toml in the working folder, if there is one]; of it, [nats], [workers], [sandbox] and
-    /// [runtimes] matter
+    /// Configuration file, of which [nats], [workers], [sandbox] and [runtimes] are used [default: faceoff.toml in
+    /// the working folder, if it exists]
     #[arg(long, value_name = "FILE", env = "FACEOFF_CONFIG")]
     config: Option<PathBuf>,
-    /// Where NATS is; replaces nats.url of the configuration
+    /// NATS server; overrides nats.url of the configuration
     #[arg(long, value_name = "URL")]
     nats: Option<String>,
-    /// What this worker is called [default: the host's name]
+    /// Name of this worker [default: the host's name]
     #[arg(long)]
     name: Option<String>,
-    /// Units of work at the same time; replaces workers.slots of the configuration
+    /// Number of jobs in parallel; overrides workers.slots of the configuration
     #[arg(long, value_name = "N")]
     slots: Option<usize>,
-    /// What organisers see beside its name, as "lab 3,borrowed"; up to 8
+    /// Up to 8 labels, shown to organisers beside the name, e.g. "lab 3,borrowed"
     #[arg(long, value_name = "TEXT,…", value_delimiter = ',', value_parser = label)]
     labels: Vec<String>,
-    /// Folder for what is under way, of this worker alone; replaces workers.scratch_dir of the configuration
+    /// Folder for temporary files, used by this worker only; overrides workers.scratch_dir of the configuration
     #[arg(long, value_name = "FOLDER")]
     scratch_dir: Option<PathBuf>,
-    /// Ends once no slot has had anything to do for so long, as 10m; left out, it goes on
+    /// Exit after all slots have been idle for this time, e.g. 10m [default: never]
     #[arg(long, value_name = "TIME")]
     drain_after_idle: Option<SignedDuration>,
-    /// Makes a key by which NATS knows a server or a worker, keeps its secret half in FILE, for nats.nkey_file, prints the other half
-    /// for NATS' configuration, and ends
+    /// Create a key that identifies a server or worker to NATS: write the secret seed to FILE (for nats.nkey_file),
+    /// print the public key (for the configuration of NATS), and exit
     #[arg(long, value_name = "FILE")]
     make_key: Option<PathBuf>,
-    /// How the log is written, to standard error; RUST_LOG sets what is logged
+    /// Format of the log on standard error; RUST_LOG sets the log level
     #[arg(long, value_enum, default_value_t = LogFormat::Text)]
     log_format: LogFormat,
 }
 
 impl WorkerCommand {
-    /// Works until SIGINT or SIGTERM.
+    /// Runs the worker until SIGINT or SIGTERM.
     ///
     /// # Errors
-    /// If the configuration, the scratch folder or the sandbox is not as it must be.
+    /// If the configuration, the scratch folder or the sandbox is unusable.
     pub fn run(self) -> anyhow::Result<()> {
         if let Some(file) = &self.make_key {
             return make_key(file);
         }
         self.log_format.start()?;
         let mut config = Config::load(self.config.as_deref())?;
-        config.reach_nats(self.nats)?;
+        config.override_nats_url(self.nats)?;
         if let Some(slots) = self.slots {
-            config.have_slots(slots)?;
+            config.override_slots(slots)?;
         }
         if let Some(scratch_dir) = self.scratch_dir {
             config.workers.scratch_dir = Some(scratch_dir);
         }
         let nats = config.nats.connection().ok_or_else(|| {
-            anyhow!("no NATS is named: give --nats nats://HOST:4222, or set nats.url in the configuration")
+            anyhow!("no NATS server is configured: use --nats nats://HOST:4222, or set nats.url in the configuration")
         })?;
         let name = match self.name {
             Some(name) => name,
@@ -87,29 +88,29 @@ impl WorkerCommand {
         check_sandbox(&probe_host(), &config.sandbox.given_up)?;
         config.check_runtimes()?;
         let mut agent = config.agent_environment();
-        let mut own = introduction(&agent, config.slots())?;
+        let mut own = own_capabilities(&agent, config.slots())?;
         anyhow::ensure!(
-            self.labels.len() <= Introduction::MOST_LABELS,
+            self.labels.len() <= WorkerCapabilities::MAX_LABELS,
             "--labels: expected at most {}, got {}",
-            Introduction::MOST_LABELS,
+            WorkerCapabilities::MAX_LABELS,
             self.labels.len()
         );
         own.labels = self.labels;
         let http = files_client(config.nats.ca_file.as_deref())?;
-        // For as long as agents run.
+        // Kept as long as agents run.
         let _image = in_memory(&mut agent.runtimes, config.sandbox.resident_bytes);
         let scratch_dir = config.scratch_dir();
         fs::create_dir_all(&scratch_dir)
-            .with_context(|| format!("making the folder {}", scratch_dir.display()))?;
+            .with_context(|| format!("creating the folder {}", scratch_dir.display()))?;
         let worker = RemoteWorker {
             nats,
             name,
-            own,
+            capabilities: own,
             http,
             ends_after: self.drain_after_idle.map(SignedDuration::unsigned_abs),
             slots: SlotsConfig {
-                cpus: CpuLayout::of_a_server(config.slots(), &config.workers.agent_cpus),
-                threads: SlotThreads::of_the_caller(),
+                cpus: CpuLayout::for_server(config.slots(), &config.workers.agent_cpus),
+                threads: SlotThreads::from_caller(),
                 scratch_dir,
                 agent,
                 metrics: Metrics::new(env!("CARGO_PKG_VERSION")),
@@ -119,39 +120,39 @@ impl WorkerCommand {
             name = worker.name,
             slots = worker.slots.cpus.slots.len(),
             nats = worker.nats.url,
-            "working"
-        );
+            "worker started"
+            );
         tokio::runtime::Builder::new_multi_thread()
             .enable_all()
             .build()
             .context("starting the async runtime")?
-            .block_on(work(worker))
+            .block_on(run_until_signal(worker))
     }
 }
 
-async fn work(worker: RemoteWorker) -> anyhow::Result<()> {
+async fn run_until_signal(worker: RemoteWorker) -> anyhow::Result<()> {
     let shutdown = CancellationToken::new();
-    let mut working = tokio::spawn(faceoff_worker::work(worker, shutdown.clone()));
-    let signal = super::serve::signalled()?;
+    let mut working = tokio::spawn(faceoff_worker::run_remote_worker(worker, shutdown.clone()));
+    let signal = super::serve::shutdown_signal()?;
     tokio::select! {
-        name = signal => tracing::info!(signal = name, "ending: slots give their work back"),
+        name = signal => tracing::info!(signal = name, "shutting down: slots release their jobs"),
         ended = &mut working => return ended.context("the worker panicked")?,
     }
     shutdown.cancel();
-    let second = super::serve::signalled()?;
+    let second = super::serve::shutdown_signal()?;
     tokio::select! {
         ended = working => ended.context("the worker panicked")?,
         name = second => {
-            tracing::warn!(signal = name, "ending at once");
+            tracing::warn!(signal = name, "second signal: stopping immediately");
             Ok(())
         }
     }
 }
 
-/// Keeps the secret half, which nobody but its owner can read, and prints the other.
+/// Writes the secret seed to a private file and prints the public key.
 fn make_key(file: &Path) -> anyhow::Result<()> {
     let key = nkeys::KeyPair::new_user();
-    let seed = key.seed().context("making a key")?;
+    let seed = key.seed().context("generating a key")?;
     let write = || -> io::Result<()> {
         let mut options = fs::OpenOptions::new();
         let mut writer = options
@@ -167,29 +168,29 @@ fn make_key(file: &Path) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// A label that a page shows as it is.
+/// Parses a label; refuses invisible characters.
 fn label(text: &str) -> Result<String, String> {
     let chars = text.chars().count();
-    let most = Introduction::LONGEST_LABEL;
-    if (1..=most).contains(&chars) && text.chars().all(is_harmless) {
+    let max = WorkerCapabilities::MAX_LABEL_CHARS;
+    if (1..=max).contains(&chars) && text.chars().all(is_printable) {
         return Ok(text.to_owned());
     }
     Err(format!(
-        "expected 1 to {most} characters, none of them invisible"
+        "expected 1 to {max} characters, none of them invisible"
     ))
 }
 
-/// This host's name, as subjects can have it.
+/// The host's name, with characters that NATS subjects allow.
 pub(super) fn host_name() -> anyhow::Result<String> {
     let name = rustix::system::uname();
     let name = name.nodename().to_string_lossy();
-    let word: String = name
+    let subject: String = name
         .chars()
         .map(|c| if c.is_ascii_alphanumeric() { c } else { '-' })
         .collect();
     anyhow::ensure!(
-        !word.is_empty(),
+        !subject.is_empty(),
         "this host has no name; choose one with --name"
     );
-    Ok(word)
+    Ok(subject)
 }

@@ -1,23 +1,23 @@
-//! Values that no server, or no host like this one, can have.
+//! Checks of values that are invalid on any server or on this host.
 
 use super::Config;
 use anyhow::{Context as _, bail, ensure};
 use faceoff_dataset::has_robot;
 use faceoff_types::{
-    DayDeadline, IMAGE_RUNTIME, LONGEST_DEADLINE_H, MAX_EPISODES_PER_TASK, MismatchSettings, Seed,
+    DayDeadline, IMAGE_RUNTIME, MAX_DEADLINE_H, MAX_EPISODES_PER_TASK, MismatchSettings, Seed,
 };
 use std::collections::BTreeSet;
 
-/// Slots per CPU beyond which none would get on.
-const MOST_SLOTS_PER_CPU: usize = 4;
+/// More slots per CPU than this would make no progress.
+const MAX_SLOTS_PER_CPU: usize = 4;
 
 impl Config {
-    /// What no host with these CPUs can do.
+    /// Refuses settings that are impossible on a host with these CPUs.
     pub(super) fn check_host(&self, cpus: &[usize]) -> anyhow::Result<()> {
-        let most = MOST_SLOTS_PER_CPU * cpus.len();
+        let max_slots = MAX_SLOTS_PER_CPU * cpus.len();
         ensure!(
-            self.slots() <= most,
-            "workers.slots: expected at most {most} on a host with {} CPUs, got {}; left out, it is {}",
+            self.slots() <= max_slots,
+            "workers.slots: expected at most {max_slots} on a host with {} CPUs, got {}; the default is {}",
             cpus.len(),
             self.slots(),
             Self::slots_on(cpus.len())
@@ -33,19 +33,19 @@ impl Config {
         Ok(())
     }
 
-    /// Folders of runtimes that hold none.
+    /// Checks the folders of all runtimes.
     ///
     /// # Errors
-    /// The first, and how to make it.
+    /// The first folder without a runtime, and how to create it.
     pub fn check_runtimes(&self) -> anyhow::Result<()> {
         let mut names = self.runtimes.keys();
         names.try_for_each(|name| self.check_runtime(name))
     }
 
-    /// [`Self::check_runtimes`], of one.
+    /// Checks the folder of one runtime.
     ///
     /// # Errors
-    /// If its folder holds none.
+    /// If the folder has no runtime.
     pub fn check_runtime(&self, name: &str) -> anyhow::Result<()> {
         match self.runtimes.get(name) {
             Some(runtime) => runtime
@@ -55,20 +55,20 @@ impl Config {
         }
     }
 
-    /// Magnitudes that no robot with this seed of its mismatch meets.
+    /// Refuses perturbations for which no robot with this mismatch seed exists.
     pub fn check_robot(&self, mismatch_seed: Seed) -> anyhow::Result<()> {
         let settings = self.rules().variation.perturbations;
         let [least, most] = settings.model_mismatch.static_error_m;
         ensure!(
             settings.model_mismatch == MismatchSettings::default()
                 || has_robot(&settings, mismatch_seed),
-            "evaluation.perturbations: of 300 robots drawn by these ranges of mass and gains none has its largest static \
-             error within {least} to {most} m (model_mismatch.static_error_m); widen one of them"
+            "evaluation.perturbations: none of 300 robots drawn from these ranges of mass and gains has its largest static \
+            error within {least} to {most} m (model_mismatch.static_error_m); widen one of the ranges"
         );
         Ok(())
     }
 
-    /// What types alone cannot say.
+    /// Checks that the types do not cover.
     pub(super) fn check(&self) -> anyhow::Result<()> {
         self.nats.check()?;
         if let Some(url) = &self.server.public_url {
@@ -80,17 +80,17 @@ impl Config {
             });
             ensure!(
                 is_address,
-                "server.public_url: expected an address like https://faceoff.example.org, without a slash at its \
-                 end, got {url:?}"
+                "server.public_url: expected an address like https://faceoff.example.org, without a trailing \
+                slash, got {url:?}"
             );
         }
         ensure!(
             !self.runtimes.contains_key(IMAGE_RUNTIME),
-            "runtimes.{IMAGE_RUNTIME}: agents that are container images have this name; call the runtime otherwise"
+            "runtimes.{IMAGE_RUNTIME}: this name is reserved for container images; choose another name"
         );
         let evaluation = &self.evaluation;
         if evaluation.at.is_some() && evaluation.cron.is_some() {
-            bail!("evaluation.cron: there is evaluation.at, too; leave one of them out");
+            bail!("evaluation.cron: evaluation.at is also set; remove one of them");
         }
         self.settings().context("evaluation.cron")?;
         ensure!(
@@ -109,8 +109,8 @@ impl Config {
         );
         if let DayDeadline::Hours(hours) = evaluation.day_deadline {
             ensure!(
-                (1..=LONGEST_DEADLINE_H).contains(&hours),
-                "evaluation.day_deadline: expected 1 to {LONGEST_DEADLINE_H} hours, got {hours}"
+                (1..=MAX_DEADLINE_H).contains(&hours),
+                "evaluation.day_deadline: expected 1 to {MAX_DEADLINE_H} hours, got {hours}"
             );
         }
         ensure!(
@@ -163,7 +163,7 @@ impl Config {
         ] {
             ensure!(value >= 1, "{name}: expected at least 1, got 0");
         }
-        // Below these no agent starts, or no bundle exists.
+        // With smaller values, no agent starts or no bundle fits.
         for (name, least, value) in [
             ("limits.memory_bytes", 16 << 20, self.limits.memory_bytes),
             ("limits.pids", 2, self.limits.pids.into()),

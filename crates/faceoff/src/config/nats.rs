@@ -7,22 +7,23 @@ use std::path::PathBuf;
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct NatsSection {
-    /// Where it is; left out: no work is given to other machines.
+    /// Address of NATS; left out: no remote workers.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub url: Option<String>,
-    /// What this server's streams and subjects begin with; no two servers of one NATS have the same.
+    /// Prefix of this server's streams and subjects; it must be unique for each server of one NATS.
     pub name: String,
-    /// A file with the seed of the nkey by which NATS knows who connects.
+    /// File with the nkey seed that identifies this server or worker to NATS.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub nkey_file: Option<PathBuf>,
-    /// Certificates (PEM) of the authorities by which NATS is known, instead of those of the host; a worker fetches files by either.
+    /// Certificate authorities (PEM) of NATS, instead of the host's; for file transfers, a worker trusts both.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub ca_file: Option<PathBuf>,
-    /// Where workers reach this server's files; left out, `server.public_url`, or else the address that it listens on.
+    /// Address of this server for the file transfers of workers; left out, `server.public_url`, or else the listen
+    /// address.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub files_url: Option<String>,
-    /// Where bundles and recordings pass instead: a bucket of S3, or of what speaks as it does. Keys, region and endpoint are the
-    /// environment's (`AWS_ACCESS_KEY_ID` …).
+    /// S3-compatible bucket for bundles and recordings instead. Keys, region and endpoint come from the environment
+    /// (`AWS_ACCESS_KEY_ID` …).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub bucket: Option<String>,
 }
@@ -41,7 +42,7 @@ impl Default for NatsSection {
 }
 
 impl NatsSection {
-    /// As workers take it; `None`: there is none.
+    /// The settings of the connection; `None` without NATS.
     #[must_use]
     pub fn connection(&self) -> Option<NatsConfig> {
         Some(NatsConfig {
@@ -52,9 +53,9 @@ impl NatsSection {
         })
     }
 
-    /// What types alone cannot say.
+    /// Checks that the types do not cover.
     pub(super) fn check(&self) -> anyhow::Result<()> {
-        let begins = |url: &Option<String>, schemes: &[&str]| {
+        let has_scheme = |url: &Option<String>, schemes: &[&str]| {
             url.as_ref().is_none_or(|url| {
                 let rest = schemes.iter().find_map(|scheme| url.strip_prefix(scheme));
                 rest.is_some_and(|rest| {
@@ -63,18 +64,18 @@ impl NatsSection {
             })
         };
         ensure!(
-            begins(&self.url, &["nats://", "tls://"]),
+            has_scheme(&self.url, &["nats://", "tls://"]),
             "nats.url: expected nats://HOST:PORT or tls://HOST:PORT, got {:?}",
             self.url.as_deref().unwrap_or_default()
         );
         ensure!(
-            begins(&self.files_url, &["http://", "https://"]),
-            "nats.files_url: expected http://HOST:PORT or https://HOST without a slash at its end, got {:?}",
+            has_scheme(&self.files_url, &["http://", "https://"]),
+            "nats.files_url: expected http://HOST:PORT or https://HOST without a trailing slash, got {:?}",
             self.files_url.as_deref().unwrap_or_default()
         );
         ensure!(
-            begins(&self.bucket, &["s3://"]),
-            "nats.bucket: expected s3://BUCKET or s3://BUCKET/PREFIX without a slash at its end, got {:?}",
+            has_scheme(&self.bucket, &["s3://"]),
+            "nats.bucket: expected s3://BUCKET or s3://BUCKET/PREFIX without a trailing slash, got {:?}",
             self.bucket.as_deref().unwrap_or_default()
         );
         Ok(())

@@ -1,18 +1,18 @@
-use faceoff_http::{Rate, RateLimits};
+use faceoff_http::{RateLimit, RateLimits};
 use serde::{Deserialize, Serialize};
 use std::num::NonZeroU32;
 
-/// `[rates]`: how often somebody may ask. 0 requests per second are no bound.
+/// `[rates]`: limits of requests. 0 requests per second means no limit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct RatesConfig {
-    /// Requests per second of one address, or IPv6 network of 64 bits, in the mean.
+    /// Mean number of requests per second of one address or IPv6 network of 64 bits.
     pub address_per_s: u32,
-    /// And so many at once.
+    /// Largest burst.
     pub address_burst: NonZeroU32,
-    /// Requests per second with one token or session, in the mean.
+    /// Mean number of requests per second with one token or session.
     pub token_per_s: u32,
-    /// And so many at once.
+    /// Largest burst.
     pub token_burst: NonZeroU32,
 }
 
@@ -29,10 +29,10 @@ impl Default for RatesConfig {
 }
 
 impl RatesConfig {
-    /// As the web side takes them.
+    /// The limits for the HTTP server.
     #[must_use]
     pub fn limits(&self) -> RateLimits {
-        let rate = |per_s, burst| NonZeroU32::new(per_s).map(|per_s| Rate { per_s, burst });
+        let rate = |per_s, burst| NonZeroU32::new(per_s).map(|per_s| RateLimit { per_s, burst });
         RateLimits {
             address: rate(self.address_per_s, self.address_burst),
             token: rate(self.token_per_s, self.token_burst),

@@ -1,29 +1,29 @@
-//! `[runtimes.NAME]`: a folder that holds a Python, or paths of the host.
+//! `[runtimes.NAME]`: a folder with a Python environment, or paths of the host.
 
 use anyhow::{Context as _, bail};
 use faceoff_sandbox::{Runtime, RuntimeFiles};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
-/// What is below these folders of the host no agent sees. `tests/runtimes.sh` has the same list.
+/// Agents do not see these folders of the host. `tests/runtimes.sh` has the same list.
 const COVERED: [&str; 4] = ["/tmp", "/dev", "/proc", "/agent"];
 
 /// A runtime that the organiser offers.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Fields", into = "Fields")]
 pub enum RuntimeConfig {
-    /// A virtual environment, as `docker/runtime.sh` makes it: its packages, and the Python behind it.
+    /// A virtual environment, e.g. one created by `docker/runtime.sh`, and its Python interpreter.
     Folder(PathBuf),
-    /// What agents see of the host, path by path.
+    /// Paths of the host that agents see.
     Paths {
-        /// Absolute; see [`Runtime`].
+        /// Absolute paths; see [`Runtime`].
         read_only_paths: Vec<PathBuf>,
         /// The agent's `PATH`.
         path: String,
     },
 }
 
-/// As the file has it.
+/// The fields in the file.
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Fields {
@@ -59,7 +59,7 @@ impl TryFrom<Fields> for RuntimeConfig {
                 path,
             }),
             _ => Err(
-                "expected a runtime of either `folder`, or `read_only_paths` and `path`".to_owned(),
+                "expected a runtime with either `folder`, or `read_only_paths` and `path`".to_owned(),
             ),
         }
     }
@@ -86,16 +86,16 @@ impl From<RuntimeConfig> for Fields {
 }
 
 impl RuntimeConfig {
-    /// Is there a Python in the folder? Paths are not looked at: `faceoff doctor` does.
+    /// Checks that the folder has a Python that starts. Paths are only checked by `faceoff doctor`.
     ///
     /// # Errors
-    /// If there is none, or it does not start.
+    /// If there is no Python, or it does not start.
     pub fn check(&self) -> anyhow::Result<()> {
         match self {
             Self::Paths { .. } => Ok(()),
             Self::Folder(folder) if COVERED.iter().any(|covered| folder.starts_with(covered)) => {
                 bail!(
-                    "expected a folder outside of {}, in place of which agents see their own, got {}",
+                    "expected a folder outside of {}, which agents see as private folders, got {}",
                     COVERED.join(", "),
                     folder.display()
                 )
@@ -104,14 +104,14 @@ impl RuntimeConfig {
                 .map(drop)
                 .with_context(|| {
                     format!(
-                        "expected a virtual environment in {0}; make it: docker/runtime.sh {0}",
+                        "expected a virtual environment in {0}; create it: docker/runtime.sh {0}",
                         folder.display()
                     )
                 }),
         }
     }
 
-    /// What agents see. Of a folder that holds no Python that is a path that does not exist.
+    /// The runtime for the sandbox. For a folder without Python, its path does not exist.
     #[must_use]
     pub fn runtime(&self) -> Runtime {
         match self {

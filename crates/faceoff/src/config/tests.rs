@@ -6,7 +6,7 @@ fn error(text: &str) -> String {
 }
 
 #[test]
-fn an_empty_file_is_the_defaults_and_so_is_what_they_write() {
+fn empty_file_gives_the_defaults() {
     let default = Config::default();
     assert_eq!(Config::parse("").unwrap(), default);
     let written = toml::to_string(&default).unwrap();
@@ -14,7 +14,7 @@ fn an_empty_file_is_the_defaults_and_so_is_what_they_write() {
 }
 
 #[test]
-fn every_section_is_read() {
+fn all_sections_are_read() {
     let config = Config::parse(
         r#"
         [server]
@@ -74,15 +74,15 @@ fn every_section_is_read() {
     assert_eq!(variation.perturbations.tracking_loss.probability, 0.05);
     assert_eq!(variation.perturbations.tracking_loss.steps, [5, 20]);
     let settings = config.settings().unwrap();
-    assert_eq!(settings.publishes, Publishes::Never);
-    assert_eq!(settings.standings, Standings::MeanOfLast(5));
+    assert_eq!(settings.publishes, Publication::Never);
+    assert_eq!(settings.standings, CountingResult::MeanOfLast(5));
     assert_eq!(config.slots(), 3);
     assert_eq!(config.limits.pids, 9);
     assert_eq!(config.limits.open_files, Limits::default().open_files);
     assert_eq!(config.bundle.files, 10);
     assert_eq!(config.uploads.limits().upload_quota.day_bytes, 7);
     let connections = config.connections.limits();
-    assert_eq!(connections.head, Duration::from_secs(5));
+    assert_eq!(connections.head_timeout, Duration::from_secs(5));
     assert_eq!(connections.exempt, [IpAddr::from([10, 0, 0, 1])]);
     let environment = config.agent_environment();
     assert_eq!(
@@ -96,7 +96,7 @@ fn every_section_is_read() {
 }
 
 #[test]
-fn an_error_names_the_field() {
+fn error_names_the_field() {
     assert!(error("[server]\nlisten_on = 1").contains("listen_on"));
     assert!(error("[serve]").contains("serve"));
     assert!(error("[evaluation]\nepisodes_per_task = 0").contains("evaluation.episodes_per_task"));
@@ -131,10 +131,10 @@ fn an_error_names_the_field() {
 }
 
 #[test]
-fn what_init_writes_is_the_defaults_and_the_documentation_shows_it() {
-    // Values whose default is “none” or of the host stand there as comments.
+fn commented_file_has_the_defaults_and_is_documented() {
+    // Values without a fixed default are comments in the file.
     assert_eq!(Config::parse(COMMENTED).unwrap(), Config::default());
-    let documentation = include_str!("../../../../docs/operating.md");
+    let documentation = include_str!("../../../../docs/configuration.md");
     let block = documentation
         .split("```toml\n")
         .nth(1)
@@ -143,11 +143,11 @@ fn what_init_writes_is_the_defaults_and_the_documentation_shows_it() {
 }
 
 #[test]
-fn init_writes_every_value_with_what_it_means() {
+fn commented_file_explains_all_values() {
     let mut written = toml::Table::try_from(Config::default()).unwrap();
-    // Named by the organiser, each of them.
+    // Organisers choose the names of runtimes.
     written.remove("runtimes");
-    // No default is written of these.
+    // These have no default in the file.
     for (section, name) in [
         ("season", "name"),
         ("evaluation", "at"),
@@ -169,13 +169,13 @@ fn init_writes_every_value_with_what_it_means() {
             .take_while(|line| !line.starts_with('['))
             .collect();
         for name in values.as_table().unwrap().keys() {
-            let of_name = |line: &&&str| {
+            let has_name = |line: &&&str| {
                 let line = line.trim_start_matches("# ");
                 line.strip_prefix(name.as_str())
                     .is_some_and(|rest| rest.starts_with(" = "))
             };
-            let line = lines.iter().find(of_name);
-            let line = line.unwrap_or_else(|| panic!("{section}.{name} is not there"));
+            let line = lines.iter().find(has_name);
+            let line = line.unwrap_or_else(|| panic!("{section}.{name} is missing"));
             let (_, meaning) = line.rsplit_once("  # ").unwrap_or_else(|| panic!("{line}"));
             assert!(meaning.len() > 10, "{line}");
         }
@@ -183,8 +183,8 @@ fn init_writes_every_value_with_what_it_means() {
 }
 
 #[test]
-fn an_unknown_name_is_told_with_the_one_that_was_meant() {
-    for (text, meant) in [
+fn unknown_name_gets_a_suggestion() {
+    for (text, suggestion) in [
         ("[server]\nlisten_on = 1", "listen"),
         ("[serve]", "server"),
         ("[evaluation]\nepisodes_pre_task = 1", "episodes_per_task"),
@@ -193,7 +193,7 @@ fn an_unknown_name_is_told_with_the_one_that_was_meant() {
     ] {
         let error = error(text);
         assert!(
-            error.contains(&format!("did you mean `{meant}`?")),
+            error.contains(&format!("did you mean `{suggestion}`?")),
             "{error}"
         );
     }
@@ -205,7 +205,7 @@ fn an_unknown_name_is_told_with_the_one_that_was_meant() {
 }
 
 #[test]
-fn what_cannot_be_is_refused() {
+fn impossible_value_is_refused() {
     for (section, name, value) in [
         ("limits", "memory_bytes", "10"),
         ("limits", "pids", "0"),
@@ -246,7 +246,7 @@ fn what_cannot_be_is_refused() {
 }
 
 #[test]
-fn a_schedule_is_a_time_or_an_expression_in_a_zone() {
+fn schedule_is_a_time_or_an_expression_in_a_zone() {
     let settings = |text: &str| {
         let config = Config::parse(&format!("[evaluation]\n{text}")).unwrap();
         let settings = serde_json::to_value(config.settings().unwrap()).unwrap();
@@ -267,10 +267,10 @@ fn a_schedule_is_a_time_or_an_expression_in_a_zone() {
     );
     let cron = settings("cron = \"0 6 * * 1-5\"");
     assert_eq!(cron, (r#"{"cron":"0 6 * * 1-5"}"#.into(), utc));
-    for (text, words) in [
+    for (text, expected) in [
         (
             "at = \"06:00\"\ncron = \"0 6 * * *\"",
-            "evaluation.cron: there is evaluation.at",
+            "evaluation.cron: evaluation.at is also set",
         ),
         (
             "cron = \"6\"",
@@ -281,19 +281,19 @@ fn a_schedule_is_a_time_or_an_expression_in_a_zone() {
         ("days_off = [\"Christmas\"]", "Christmas"),
     ] {
         let error = error(&format!("[evaluation]\n{text}"));
-        assert!(error.contains(words), "{words:?} is not in {error}");
+        assert!(error.contains(expected), "{expected:?} is not in {error}");
     }
 }
 
 #[test]
-fn a_named_file_must_exist() {
+fn named_file_must_exist() {
     let missing = Path::new("/nonexistent/faceoff.toml");
     let error = Config::load(Some(missing)).unwrap_err();
     assert!(format!("{error:#}").contains("/nonexistent/faceoff.toml"));
 }
 
 #[test]
-fn the_page_on_the_sandbox_tells_the_default_limits() {
+fn sandbox_page_has_the_default_limits() {
     let page = include_str!("../../../../docs/sandbox.md");
     let Config {
         limits,
@@ -342,7 +342,7 @@ fn the_page_on_the_sandbox_tells_the_default_limits() {
 }
 
 #[test]
-fn a_runtime_is_a_folder_or_paths_and_a_folder_must_hold_a_python() {
+fn runtime_is_a_folder_with_python_or_paths() {
     let config = Config::parse("[runtimes.python3-ml]\nfolder = \"/nowhere\"").unwrap();
     let refused = format!("{:#}", config.check_runtimes().unwrap_err());
     for words in [
@@ -355,7 +355,7 @@ fn a_runtime_is_a_folder_or_paths_and_a_folder_must_hold_a_python() {
     let covered = Config::parse("[runtimes.python3-ml]\nfolder = \"/tmp/ml\"").unwrap();
     let refused = format!("{:#}", covered.check_runtimes().unwrap_err());
     assert!(refused.contains("outside of /tmp"), "{refused}");
-    // What is not there is not hidden behind what is.
+    // A missing runtime is not replaced by an existing one.
     let runtime = &config.agent_environment().runtimes["python3-ml"];
     assert_eq!(
         runtime.read_only_paths,
@@ -363,15 +363,15 @@ fn a_runtime_is_a_folder_or_paths_and_a_folder_must_hold_a_python() {
     );
     let written = toml::to_string(&config).unwrap();
     assert_eq!(Config::parse(&written).unwrap(), config);
-    let taken = error("[runtimes.image]\nfolder = \"/a\"");
-    assert!(taken.contains("call the runtime otherwise"), "{taken}");
-    for (text, words) in [
+    let reserved = error("[runtimes.image]\nfolder = \"/a\"");
+    assert!(reserved.contains("choose another name"), "{reserved}");
+    for (text, expected) in [
         ("folder = \"here\"", "absolute path"),
         ("folder = \"/a\"\npath = \"/b\"", "either `folder`"),
         ("path = \"/b\"", "either `folder`"),
         ("folders = \"/a\"", "did you mean `folder`?"),
     ] {
         let refused = error(&format!("[runtimes.x]\n{text}"));
-        assert!(refused.contains(words), "{refused}");
+        assert!(refused.contains(expected), "{refused}");
     }
 }

@@ -1,26 +1,26 @@
-//! A bundle as one file: an archive as it is, or a folder packed into a temporary one.
+//! A bundle as one file: an existing archive, or a folder packed into a temporary file.
 
 use super::selection::Selection;
 use anyhow::Context;
 use std::path::{Path, PathBuf};
 use tempfile::NamedTempFile;
 
-/// The archive to upload; a packed folder's file goes when this is dropped.
+/// The archive to upload. The temporary file of a packed folder is deleted when this is dropped.
 #[derive(Debug)]
 pub struct BundleFile {
-    place: Place,
+    source: Source,
     name: String,
     bytes: u64,
 }
 
 #[derive(Debug)]
-enum Place {
-    Given(PathBuf),
+enum Source {
+    Archive(PathBuf),
     Packed(NamedTempFile, Selection),
 }
 
 impl BundleFile {
-    /// The file of an archive, or one that a folder is packed into.
+    /// Opens an archive, or packs a folder.
     ///
     /// # Errors
     /// If the bundle cannot be read, or is a folder without `agent.toml`.
@@ -33,42 +33,42 @@ impl BundleFile {
             .unwrap_or_default()
             .to_string_lossy()
             .into_owned();
-        let (place, name) = if absolute.is_dir() {
-            let selection = Selection::of(&absolute)?;
-            let packed = NamedTempFile::new().context("making a temporary file")?;
+        let (source, name) = if absolute.is_dir() {
+            let selection = Selection::read(&absolute)?;
+            let packed = NamedTempFile::new().context("creating a temporary file")?;
             let file = packed.reopen().context("opening a temporary file")?;
             selection.pack(file)?;
-            (Place::Packed(packed, selection), format!("{name}.tar.gz"))
+            (Source::Packed(packed, selection), format!("{name}.tar.gz"))
         } else {
-            (Place::Given(absolute), name)
+            (Source::Archive(absolute), name)
         };
-        let path = match &place {
-            Place::Given(path) => path.as_path(),
-            Place::Packed(file, _) => file.path(),
+        let path = match &source {
+            Source::Archive(path) => path.as_path(),
+            Source::Packed(file, _) => file.path(),
         };
         let bytes = path
             .metadata()
             .with_context(|| format!("reading {}", path.display()))?
             .len();
-        Ok(Self { place, name, bytes })
+        Ok(Self { source, name, bytes })
     }
 
-    /// What of a folder is in it; of an archive nobody has looked.
+    /// The packed files of a folder; `None` for an archive, which is not opened.
     pub const fn selection(&self) -> Option<&Selection> {
-        match &self.place {
-            Place::Given(_) => None,
-            Place::Packed(_, selection) => Some(selection),
+        match &self.source {
+            Source::Archive(_) => None,
+            Source::Packed(_, selection) => Some(selection),
         }
     }
 
     pub fn path(&self) -> &Path {
-        match &self.place {
-            Place::Given(path) => path,
-            Place::Packed(file, _) => file.path(),
+        match &self.source {
+            Source::Archive(path) => path,
+            Source::Packed(file, _) => file.path(),
         }
     }
 
-    /// What the server is told that it is called.
+    /// The file name for the server.
     pub fn name(&self) -> &str {
         &self.name
     }

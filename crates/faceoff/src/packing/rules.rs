@@ -1,4 +1,4 @@
-//! What of a folder stays out of the bundle.
+//! Rules for files that are left out of a bundle.
 
 use anyhow::Context;
 use ignore::{
@@ -7,13 +7,13 @@ use ignore::{
 };
 use std::{fs, io::ErrorKind, path::Path};
 
-/// In a bundle's folder: what stays out of it besides [`DEFAULTS`], and with `!` what does not, in the syntax of
-/// `.gitignore`.
+/// File in a bundle's folder that leaves out further files than [`DEFAULTS`], or includes them with `!`, in the syntax
+/// of `.gitignore`.
 pub const IGNORE_FILE: &str = ".faceoffignore";
 
-/// What no agent needs to run: histories, caches, environments, builds, what editors and systems leave behind, and the
-/// results of `faceoff eval` and `play` in the folder itself, among them what they are just unpacking there. Links that are
-/// called so, too.
+/// Files that no agent needs: version control, caches, environments, builds, files of editors and operating systems,
+/// and results and temporary files of `faceoff eval` and `play` in the folder. Links with these names are also left
+/// out.
 pub const DEFAULTS: [&str; 25] = [
     ".git",
     ".hg",
@@ -42,15 +42,15 @@ pub const DEFAULTS: [&str; 25] = [
     "/.faceoffignore",
 ];
 
-/// The rules of a folder.
+/// Compiled rules of a folder.
 pub(super) struct Rules(Gitignore);
 
 impl Rules {
-    /// Those of all bundles, then those of the folder's own file: the last one that speaks of a name counts.
+    /// Reads the default rules and then those of the folder's own file; the last matching rule decides.
     ///
     /// # Errors
-    /// If that file cannot be read, or a line of it is no rule.
-    pub(super) fn of(folder: &Path) -> anyhow::Result<Self> {
+    /// If the file cannot be read, or a line is not a valid rule.
+    pub(super) fn read(folder: &Path) -> anyhow::Result<Self> {
         let mut rules = GitignoreBuilder::new(folder);
         for line in DEFAULTS {
             rules.add_line(None, line).context("a default rule")?;
@@ -69,8 +69,8 @@ impl Rules {
         Ok(Self(rules.build().with_context(reading)?))
     }
 
-    /// Does it stay out? `path` is within the folder; what is inside of a folder that does is not asked for.
-    pub(super) fn leave_out(&self, path: &Path, is_folder: bool) -> bool {
+    /// The path, relative to the folder, is left out. Not called for the content of folders that are left out.
+    pub(super) fn leaves_out(&self, path: &Path, is_folder: bool) -> bool {
         matches!(self.0.matched(path, is_folder), Match::Ignore(_))
     }
 }
@@ -80,15 +80,15 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_stays_out_is_told_in_the_documents() {
+    fn default_rules_are_documented() {
         let documented = include_str!("../../../../docs/cli.md");
-        let (_, told) = documented
+        let (_, section) = documented
             .split_once("**What goes into a bundle.**")
             .unwrap();
-        let (told, _) = told.split_once("**Downloads.**").unwrap();
+        let (section, _) = section.split_once("**Downloads.**").unwrap();
         for rule in DEFAULTS {
             let name = rule.trim_matches('/');
-            let words = match name {
+            let expected = match name {
                 "*.py[co]" => "`*.pyc`, `*.pyo`".to_owned(),
                 ".mypy_cache" | ".pytest_cache" | ".ruff_cache" => {
                     name.trim_start_matches('.').replace("_cache", "")
@@ -96,7 +96,7 @@ mod tests {
                 ".ipynb_checkpoints" => "notebooks".to_owned(),
                 name => format!("`{name}`"),
             };
-            assert!(told.contains(&words), "{rule} is not told as {words}");
+            assert!(section.contains(&expected), "{rule} is not documented as {expected}");
         }
     }
 }

@@ -6,69 +6,69 @@ use std::{
     path::{Path, PathBuf},
 };
 
-/// What of a folder goes into the bundle.
+/// The files of a folder that are packed into the bundle.
 #[derive(Debug)]
 pub struct Selection {
     folder: PathBuf,
-    /// By name, a folder before what is in it.
+    /// Sorted by name, each folder before its content.
     entries: Vec<Entry>,
     left_out: Vec<PathBuf>,
 }
 
-/// One name in the archive.
+/// An entry of the archive.
 #[derive(Debug)]
 pub struct Entry {
     pub path: PathBuf,
     pub kind: Kind,
 }
 
-/// What a name stands for.
+/// Type of an entry.
 #[derive(Debug, PartialEq, Eq)]
 pub enum Kind {
-    /// A folder, perhaps an empty one.
+    /// A folder, possibly empty.
     Folder,
     File {
         bytes: u64,
-        /// May its owner run it?
+        /// Its owner may execute it.
         executable: bool,
     },
     Link {
-        /// Where to, as it says.
+        /// The link's target, unresolved.
         target: PathBuf,
     },
 }
 
 impl Selection {
-    /// Looks through a folder.
+    /// Selects the files of a folder.
     ///
     /// # Errors
-    /// If it has no `agent.toml`, something in it cannot be read, or is neither file nor folder nor link.
-    pub fn of(folder: &Path) -> anyhow::Result<Self> {
+    /// If the folder has no `agent.toml`, or an entry cannot be read or is neither file, folder nor link.
+    pub fn read(folder: &Path) -> anyhow::Result<Self> {
         ensure!(
             folder.join("agent.toml").is_file(),
-            "there is no agent.toml in {}; the folder of a bundle holds one, see docs/start.md",
+            "there is no agent.toml in {}; the folder of a bundle needs one, see docs/start.md",
             folder.display()
         );
-        let rules = Rules::of(folder)?;
-        let mut found = Self {
+        let rules = Rules::read(folder)?;
+        let mut selection = Self {
             folder: folder.to_owned(),
             entries: Vec::new(),
             left_out: Vec::new(),
         };
-        found.look_into(Path::new(""), &rules)?;
+        selection.add_folder(Path::new(""), &rules)?;
         ensure!(
-            found
-                .entries
+            selection
+            .entries
                 .iter()
                 .any(|entry| entry.path == Path::new("agent.toml")),
-            "{} leaves agent.toml out, without which there is no bundle",
+            "{} leaves out agent.toml, which every bundle needs",
             super::IGNORE_FILE
         );
-        Ok(found)
+        Ok(selection)
     }
 
-    fn look_into(&mut self, at: &Path, rules: &Rules) -> anyhow::Result<()> {
-        let reading = || format!("looking into {}", self.folder.join(at).display());
+    fn add_folder(&mut self, at: &Path, rules: &Rules) -> anyhow::Result<()> {
+        let reading = || format!("reading {}", self.folder.join(at).display());
         let mut names = fs::read_dir(self.folder.join(at))
             .with_context(reading)?
             .map(|entry| Ok(entry?.file_name()))
@@ -77,10 +77,10 @@ impl Selection {
         names.sort_unstable();
         for name in names {
             let path = at.join(name);
-            let place = self.folder.join(&path);
-            let looking = || format!("looking at {}", place.display());
-            let metadata = fs::symlink_metadata(&place).with_context(looking)?;
-            if rules.leave_out(&path, metadata.is_dir()) {
+            let absolute = self.folder.join(&path);
+            let context = || format!("reading {}", absolute.display());
+            let metadata = fs::symlink_metadata(&absolute).with_context(context)?;
+            if rules.leaves_out(&path, metadata.is_dir()) {
                 self.left_out.push(path);
                 continue;
             }
@@ -93,12 +93,12 @@ impl Selection {
                 }
             } else if metadata.is_symlink() {
                 Kind::Link {
-                    target: fs::read_link(&place).with_context(looking)?,
+                    target: fs::read_link(&absolute).with_context(context)?,
                 }
             } else {
                 bail!(
-                    "{} is neither file nor folder nor link: it cannot be in a bundle",
-                    place.display()
+                    "{} is neither file, folder nor link: it cannot be part of a bundle",
+                    absolute.display()
                 );
             };
             let is_folder = kind == Kind::Folder;
@@ -107,18 +107,18 @@ impl Selection {
                 kind,
             });
             if is_folder {
-                self.look_into(&path, rules)?;
+                self.add_folder(&path, rules)?;
             }
         }
         Ok(())
     }
 
-    /// Where it was looked.
+    /// The folder of the bundle.
     pub fn folder(&self) -> &Path {
         &self.folder
     }
 
-    /// All that goes in, in the order of the archive.
+    /// All packed entries, in the sequence of the archive.
     pub fn entries(&self) -> &[Entry] {
         &self.entries
     }
@@ -131,7 +131,7 @@ impl Selection {
         })
     }
 
-    /// What stays out; of a folder that does, itself alone.
+    /// Files and folders that are left out, without the content of those folders.
     pub fn left_out(&self) -> &[PathBuf] {
         &self.left_out
     }

@@ -17,16 +17,16 @@ fn folder(files: &[&str]) -> TempDir {
 }
 
 fn names(folder: &Path) -> (Vec<String>, Vec<String>) {
-    let found = Selection::of(folder).unwrap();
+    let selection = Selection::read(folder).unwrap();
     let text = |path: &Path| path.to_str().unwrap().to_owned();
     (
-        found.files().map(|(path, _)| text(path)).collect(),
-        found.left_out().iter().map(|path| text(path)).collect(),
+        selection.files().map(|(path, _)| text(path)).collect(),
+        selection.left_out().iter().map(|path| text(path)).collect(),
     )
 }
 
 #[test]
-fn what_no_agent_needs_stays_out_unless_the_folder_says_otherwise() {
+fn default_rules_apply_unless_overridden() {
     let folder = folder(&[
         "agent.toml",
         "agent.py",
@@ -41,9 +41,9 @@ fn what_no_agent_needs_stays_out_unless_the_folder_says_otherwise() {
         "agent.py~",
         ".DS_Store",
     ]);
-    let (kept, left_out) = names(folder.path());
+    let (packed, left_out) = names(folder.path());
     assert_eq!(
-        kept,
+        packed,
         [
             "agent.py",
             "agent.toml",
@@ -64,11 +64,11 @@ fn what_no_agent_needs_stays_out_unless_the_folder_says_otherwise() {
             "target"
         ]
     );
-    let rules = "# what the server need not have\nnotes/\n!target/\n*.npz\n";
+    let rules = "# not needed on the server\nnotes/\n!target/\n*.npz\n";
     fs::write(folder.path().join(IGNORE_FILE), rules).unwrap();
-    let (kept, left_out) = names(folder.path());
+    let (packed, left_out) = names(folder.path());
     assert_eq!(
-        kept,
+        packed,
         [
             "agent.py",
             "agent.toml",
@@ -84,23 +84,23 @@ fn what_no_agent_needs_stays_out_unless_the_folder_says_otherwise() {
 }
 
 #[test]
-fn a_folder_without_a_manifest_or_with_what_is_no_file_is_refused() {
-    let refused = |folder: &TempDir| format!("{:#}", Selection::of(folder.path()).unwrap_err());
+fn folder_without_manifest_or_with_a_socket_is_refused() {
+    let refused = |folder: &TempDir| format!("{:#}", Selection::read(folder.path()).unwrap_err());
     let empty = folder(&["agent.py"]);
     assert!(refused(&empty).contains("there is no agent.toml"));
     let folder = folder(&["agent.toml"]);
     fs::write(folder.path().join(IGNORE_FILE), "*.toml\n").unwrap();
-    assert!(refused(&folder).contains("leaves agent.toml out"));
+    assert!(refused(&folder).contains("leaves out agent.toml"));
     fs::write(folder.path().join(IGNORE_FILE), "a{b\n").unwrap();
     assert!(refused(&folder).contains("line 1"), "{}", refused(&folder));
     fs::remove_file(folder.path().join(IGNORE_FILE)).unwrap();
     let _socket = std::os::unix::net::UnixListener::bind(folder.path().join("socket")).unwrap();
-    assert!(refused(&folder).contains("neither file nor folder nor link"));
+    assert!(refused(&folder).contains("neither file, folder nor link"));
 }
 
-fn packed(folder: &Path) -> Vec<u8> {
+fn pack(folder: &Path) -> Vec<u8> {
     let archive = tempfile::NamedTempFile::new().unwrap();
-    Selection::of(folder)
+    Selection::read(folder)
         .unwrap()
         .pack(archive.reopen().unwrap())
         .unwrap();
@@ -108,32 +108,31 @@ fn packed(folder: &Path) -> Vec<u8> {
 }
 
 #[test]
-fn the_same_files_are_the_same_archive_whenever_and_by_whomever_they_were_made() {
+fn archive_depends_only_on_the_files() {
     let files = ["agent.toml", "run", "a/b/c.txt"];
     let make = |time: u64| {
         let folder = folder(&files);
-        // Names of one length, so that the contents agree.
-        let place = folder.path();
+        let root = folder.path();
         for file in files {
-            fs::write(place.join(file), file).unwrap();
+            fs::write(root.join(file), file).unwrap();
         }
         fs::set_permissions(
-            place.join("run"),
+            root.join("run"),
             fs::Permissions::from_mode(0o700 | (time % 8) as u32),
         )
         .unwrap();
-        symlink("a/b", place.join("link")).unwrap();
-        fs::create_dir(place.join("empty")).unwrap();
+        symlink("a/b", root.join("link")).unwrap();
+        fs::create_dir(root.join("empty")).unwrap();
         let at = std::time::UNIX_EPOCH + std::time::Duration::from_secs(time);
-        fs::File::open(place.join("a/b/c.txt"))
+        fs::File::open(root.join("a/b/c.txt"))
             .unwrap()
             .set_modified(at)
             .unwrap();
         folder
     };
     let (one, other) = (make(1_000_000), make(2_000_005));
-    let archive = packed(one.path());
-    assert_eq!(archive, packed(other.path()));
+    let archive = pack(one.path());
+    assert_eq!(archive, pack(other.path()));
 
     let unpacked = tempfile::tempdir().unwrap();
     tar::Archive::new(flate2::read::GzDecoder::new(&archive[..]))

@@ -5,21 +5,21 @@ let startedAt = null;
 let startedFrom = 0;
 
 function show(step) {
-  const whole = Math.min(last, Math.floor(step));
+  const current = Math.min(last, Math.floor(step));
   for (const name of ["puck", "seen", "mallet", "opponent"]) {
-    const places = motion[name];
+    const positions = motion[name];
     const disc = element(name);
-    if (!disc || places.length === 0) continue;
-    const [x, y] = places[Math.min(whole, places.length - 1)];
+    if (!disc || positions.length === 0) continue;
+    const [x, y] = positions[Math.min(current, positions.length - 1)];
     disc.setAttribute("cx", x);
     disc.setAttribute("cy", y);
   }
-  element("at").value = whole;
-  element("told").textContent = `step ${whole}, ${(whole * motion.step_s).toFixed(2)} s`;
+  element("at").value = current;
+  element("time").textContent = `step ${current}, ${(current * motion.step_s).toFixed(2)} s`;
   const plots = element("plots");
   const scale = plots.firstElementChild.getBoundingClientRect().width / plots.firstElementChild.viewBox.baseVal.width;
-  const share = last === 0 ? 0 : whole / last;
-  element("now").style.left = `${scale * (axis[0] + share * (axis[1] - axis[0]))}px`;
+  const fraction = last === 0 ? 0 : current / last;
+  element("now").style.left = `${scale * (axis[0] + fraction * (axis[1] - axis[0]))}px`;
 }
 
 function frame(now) {
@@ -35,16 +35,16 @@ function stop() {
   element("play").textContent = "play";
 }
 
-function go() {
+function start() {
   startedFrom = Number(element("at").value) >= last ? 0 : Number(element("at").value);
   startedAt = performance.now();
   element("play").textContent = "pause";
   requestAnimationFrame(frame);
 }
 
-element("play").addEventListener("click", () => (startedAt === null ? go() : stop()));
+element("play").addEventListener("click", () => (startedAt === null ? start() : stop()));
 element("at").addEventListener("input", () => { stop(); show(Number(element("at").value)); });
-element("speed").addEventListener("change", () => { if (startedAt !== null) go(); });
+element("speed").addEventListener("change", () => { if (startedAt !== null) start(); });
 element("controls").hidden = false;
 element("now").hidden = false;
 show(last);

@@ -1,14 +1,14 @@
-//! The season's archive as an organiser takes it along: exported from a site, imported, and served by the program.
+//! The season's archive: exported from a server, imported, and served read-only.
 
 use faceoff_api::token::hash_token;
 use faceoff_archive::{Edition, Entry, FORMAT, Manifest, Writer};
 use faceoff_http::{
-    Capacity, ConnectionLimits, HttpConfig, HttpLimits, LinkKey, Offer, RateLimits,
+    Capacity, ConnectionLimits, HttpConfig, HttpLimits, LinkKey, AgentResources, RateLimits,
 };
 use faceoff_metrics::{Metrics, Process};
-use faceoff_store::{Actor, Claimed, Store, UploadQuota, Work};
+use faceoff_store::{Actor, ClaimedJob, Store, UploadQuota, Job};
 use faceoff_types::{
-    BundleRef, Clock, EvaluationId, EvaluationResult, Profile, Ruleset, SmokeOutcome, StageRules,
+    BundleRef, Clock, EvaluationId, EvaluationResult, Profile, Ruleset, ValidationOutcome, StageRules,
     StageSettings, Task, TimeLimits, Zone,
 };
 use jiff::Timestamp;
@@ -41,15 +41,15 @@ fn done(output: &Output) -> String {
 }
 
 #[track_caller]
-fn refused(output: &Output, words: &[&str]) {
+fn refused(output: &Output, expected: &[&str]) {
     assert_eq!(output.status.code(), Some(1), "{output:?}");
-    let told = String::from_utf8_lossy(&output.stderr);
-    for word in words {
-        assert!(told.contains(word), "{word:?} is not in {told:?}");
+    let stderr = String::from_utf8_lossy(&output.stderr);
+    for part in expected {
+        assert!(stderr.contains(part), "{part:?} is not in {stderr:?}");
     }
 }
 
-/// A season with one evaluation, whose dataset is a real one.
+/// A server with a season that has one evaluation with a real dataset.
 struct Site {
     url: String,
     store: Store,
@@ -83,14 +83,14 @@ async fn site() -> Site {
         runtimes: Default::default(),
     };
     let settings = StageSettings {
-        publishes: faceoff_types::Publishes::AtRelease,
+        publishes: faceoff_types::Publication::AtRelease,
         ..StageSettings::default()
     };
     store
         .configure_stage(rules, settings, Zone::UTC, now())
         .await
         .unwrap();
-    let evaluation = played(&store).await;
+    let evaluation = run_day(&store).await;
     let config = HttpConfig {
         max_bundle_bytes: 64,
         public_url: None,
@@ -102,8 +102,8 @@ async fn site() -> Site {
             slots: 1,
             time: TimeLimits::default(),
         },
-        offer: Offer::nothing(),
-        rates: RateLimits::default(),
+        agent_resources: AgentResources::none(),
+        rate_limits: RateLimits::default(),
         link_key: LinkKey::generate().unwrap(),
         metrics: Metrics::new("0.0.0"),
         process: Process::default,
@@ -126,8 +126,8 @@ async fn site() -> Site {
     }
 }
 
-/// Plays a day of one team.
-async fn played(store: &Store) -> EvaluationId {
+/// Runs an evaluation day of one team.
+async fn run_day(store: &Store) -> EvaluationId {
     let host = Actor::Organiser;
     let name = "Alpha".parse().unwrap();
     let team = store
@@ -140,11 +140,11 @@ async fn played(store: &Store) -> EvaluationId {
         blake3: blake3::hash(b"abc").to_string(),
         file_name: "agent.tar.gz".into(),
     };
-    let here = tempfile::NamedTempFile::new().unwrap();
-    fs::write(here.path(), "abc").unwrap();
+    let file = tempfile::NamedTempFile::new().unwrap();
+    fs::write(file.path(), "abc").unwrap();
     store
         .artifacts()
-        .put_file(&bundle.key, here.path())
+        .put_file(&bundle.key, file.path())
         .await
         .unwrap();
     store
@@ -159,23 +159,23 @@ async fn played(store: &Store) -> EvaluationId {
         .unwrap();
     let mut stage = Some(store.stages().await.unwrap()[0].id);
     loop {
-        let Some(Claimed { claim, work }) = store.claim("slot 0", 60, now()).await.unwrap() else {
-            panic!("the day is not over");
+        let Some(ClaimedJob { claim, job: work }) = store.claim("slot 0", 60, now()).await.unwrap() else {
+            panic!("there is no job, but the day is not over");
         };
         match work {
-            Work::Game { .. } => panic!("no game is queued"),
-            Work::Smoke { .. } => {
-                let outcome = SmokeOutcome::Valid {
+            Job::Game { .. } => panic!("no game is queued"),
+            Job::Validation { .. } => {
+                let outcome = ValidationOutcome::Valid {
                     runtime: "native".into(),
                     agent_name: "striker".into(),
                     timing: Vec::new(),
                     log: String::new(),
                 };
-                store.commit_smoke(&claim, outcome, now()).await.unwrap();
+                store.commit_validation(&claim, outcome, now()).await.unwrap();
                 let stage = stage.take().unwrap();
                 store.start_day(host.clone(), stage, now()).await.unwrap();
             }
-            Work::Shard { run, shard, .. } => {
+            Job::Shard { run, shard, .. } => {
                 let outcome = serde_json::from_value(serde_json::json!({
                     "task": "hit", "episode": 0, "steps": 17, "end": "left_table", "success": true,
                     "violations": { "ee": false, "link": false, "joint_pos": false, "joint_vel": false },
@@ -190,7 +190,7 @@ async fn played(store: &Store) -> EvaluationId {
                 assert_eq!(shard.episodes(), 1);
                 store.commit_shard(&claim, commit, now()).await.unwrap();
             }
-            Work::Finalise {
+            Job::Scoring {
                 evaluation,
                 run,
                 seeds,
@@ -220,18 +220,18 @@ async fn played(store: &Store) -> EvaluationId {
     }
 }
 
-/// Off the runtime, on which the site answers.
-async fn at_once<T: Send + 'static>(work: impl FnOnce() -> T + Send + 'static) -> T {
+/// Runs blocking work beside the runtime on which the server runs.
+async fn blocking<T: Send + 'static>(work: impl FnOnce() -> T + Send + 'static) -> T {
     tokio::task::spawn_blocking(work).await.unwrap()
 }
 
-/// `faceoff serve` until it is dropped.
-struct Served {
+/// A running `faceoff serve`, killed on drop.
+struct ServeProcess {
     child: Child,
     url: String,
 }
 
-impl Served {
+impl ServeProcess {
     fn start(folder: &Path, data: &str) -> Self {
         let mut child = Command::new(env!("CARGO_BIN_EXE_faceoff"))
             .args(["serve", "--data-dir", data, "--listen", "127.0.0.1:0"])
@@ -250,8 +250,8 @@ impl Served {
         }
     }
 
-    /// Ends it, as a service manager would; its log.
-    fn end(mut self) -> String {
+    /// Terminates the server like a service manager; returns its log.
+    fn terminate(mut self) -> String {
         let pid = self.child.id().to_string();
         assert!(
             Command::new("kill")
@@ -272,7 +272,7 @@ impl Served {
     }
 }
 
-impl Drop for Served {
+impl Drop for ServeProcess {
     fn drop(&mut self) {
         let _ = self.child.kill();
         let _ = self.child.wait();
@@ -280,12 +280,12 @@ impl Drop for Served {
 }
 
 async fn text(url: String, token: Option<&str>) -> (u16, String) {
-    let nobody = rustls::ClientConfig::builder()
+    let no_tls = rustls::ClientConfig::builder()
         .with_root_certificates(rustls::RootCertStore::empty())
         .with_no_client_auth();
     let client = reqwest::Client::builder()
         .no_proxy()
-        .tls_backend_preconfigured(nobody)
+        .tls_backend_preconfigured(no_tls)
         .build()
         .unwrap();
     let request = client.get(url);
@@ -298,27 +298,27 @@ async fn text(url: String, token: Option<&str>) -> (u16, String) {
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-async fn a_season_is_taken_along_and_shown_on_another_host() {
+async fn exported_season_is_shown_on_another_host() {
     let site = site().await;
-    let elsewhere = tempfile::tempdir().unwrap();
-    let folder = elsewhere.path().to_owned();
+    let other_host = tempfile::tempdir().unwrap();
+    let folder = other_host.path().to_owned();
     let url = site.url.clone();
-    at_once(move || {
+    blocking(move || {
         let export = |arguments: &[&str]| {
-            let always = ["admin", "--server", &url, "--token", ADMIN, "export"];
-            faceoff(&folder, &[&always[..], arguments].concat())
+            let command = ["admin", "--server", &url, "--token", ADMIN, "export"];
+            faceoff(&folder, &[&command[..], arguments].concat())
         };
-        let told = done(&export(&["public.tar.zst", "--public"]));
+        let message = done(&export(&["public.tar.zst", "--public"]));
         assert!(
-            told.contains("the public archive of \"Season 1\" as it was at 2026-03-01 10:00:00"),
-            "{told}"
+            message.contains("the public archive of \"Season 1\" of 2026-03-01 10:00:00"),
+            "{message}"
         );
         refused(
             &export(&["public.tar.zst"]),
-            &["exists and was left as it is"],
+            &["already exists and was not changed"],
         );
-        let told: Value = serde_json::from_str(&done(&export(&["--json", "all.tar.zst"]))).unwrap();
-        assert_eq!(told["edition"], "organiser");
+        let message: Value = serde_json::from_str(&done(&export(&["--json", "all.tar.zst"]))).unwrap();
+        assert_eq!(message["edition"], "organiser");
         let mut left: Vec<_> = fs::read_dir(&folder)
             .unwrap()
             .map(|entry| entry.unwrap().file_name())
@@ -327,20 +327,20 @@ async fn a_season_is_taken_along_and_shown_on_another_host() {
         assert_eq!(left, ["all.tar.zst", "public.tar.zst"]);
         for name in ["public", "all"] {
             let archive = format!("{name}.tar.zst");
-            let told = done(&faceoff(&folder, &["import", &archive, "--data", name]));
+            let message = done(&faceoff(&folder, &["import", &archive, "--data", name]));
             let manifest = fs::read(folder.join(name).join("archive/manifest.json")).unwrap();
             let manifest: Value = serde_json::from_slice(&manifest).unwrap();
             assert_eq!(manifest["season"], "Season 1");
             assert!(
-                told.contains(&format!("faceoff serve --data-dir {name}")),
-                "{told}"
+                message.contains(&format!("faceoff serve --data-dir {name}")),
+                "{message}"
             );
         }
         refused(
             &faceoff(&folder, &["import", "all.tar.zst", "--data", "all"]),
-            &["all is not empty", "folder of its own"],
+            &["all is not empty", "its own folder"],
         );
-        // Outsiders check what came.
+        // The dataset can be verified without the server.
         let dataset = fs::read_dir(folder.join("public/artifacts/datasets"))
             .unwrap()
             .next();
@@ -350,11 +350,11 @@ async fn a_season_is_taken_along_and_shown_on_another_host() {
             fs::read(fixture("dataset-layout-3.zip")).unwrap()
         );
         let verified = faceoff(&folder, &["verify", dataset.to_str().unwrap()]);
-        let there = faceoff(
+        let original = faceoff(
             &folder,
             &["verify", fixture("dataset-layout-3.zip").to_str().unwrap()],
         );
-        assert_eq!(verified.status, there.status, "{verified:?}");
+        assert_eq!(verified.status, original.status, "{verified:?}");
         assert!(verified.status.success(), "{verified:?}");
     })
     .await;
@@ -362,12 +362,12 @@ async fn a_season_is_taken_along_and_shown_on_another_host() {
     let board = text(format!("{}/api/v1/board", site.url), None).await;
     assert!(board.1.contains("Alpha"), "{board:?}");
     for name in ["public", "all"] {
-        let folder = elsewhere.path().to_owned();
-        // What a kill in the middle of an export leaves is gone with the next start.
+        let folder = other_host.path().to_owned();
+        // The next start removes what an interrupted export has left.
         let left = folder.join(name).join("uploads/archive-left");
         fs::create_dir_all(&left).unwrap();
         fs::write(left.join("snapshot.sqlite3"), "with secrets").unwrap();
-        let served = at_once(move || Served::start(&folder, name)).await;
+        let served = blocking(move || ServeProcess::start(&folder, name)).await;
         assert!(!left.exists());
         assert_eq!(
             text(format!("{}/api/v1/board", served.url), None).await,
@@ -378,28 +378,28 @@ async fn a_season_is_taken_along_and_shown_on_another_host() {
         assert_eq!(status, 200, "{name}");
         let (_, page) = text(served.url.clone(), None).await;
         assert!(page.contains("Archived season"), "{page}");
-        let token = fs::read_to_string(elsewhere.path().join(name).join("admin-token")).unwrap();
+        let token = fs::read_to_string(other_host.path().join(name).join("admin-token")).unwrap();
         let (status, events) =
             text(format!("{}/api/v1/events", served.url), Some(token.trim())).await;
         assert_eq!(status, 200, "{events}");
         let (status, _) = text(format!("{}/api/v1/events", served.url), Some(ADMIN)).await;
-        assert_eq!(status, 401, "the old server's key is worth nothing here");
-        let log = at_once(move || served.end()).await;
+        assert_eq!(status, 401, "the token of the old server is invalid");
+        let log = blocking(move || served.terminate()).await;
         assert!(
-            log.contains("showing an archived season, read-only"),
+            log.contains("serving an archived season read-only"),
             "{log}"
         );
         assert!(
-            !log.contains("the runtimes' files"),
-            "nothing is made ready for agents: {log}"
+            !log.contains("runtime files"),
+            "no runtimes are prepared: {log}"
         );
     }
     drop(site.folder);
     site.store.close().await;
 }
 
-/// An archive that is whole, and of which one thing is wrong.
-fn written(folder: &Path, name: &str, files: &[(&str, &[u8])], edition: Edition) {
+/// Writes an archive with these files.
+fn write_archive(folder: &Path, name: &str, files: &[(&str, &[u8])], edition: Edition) {
     let entries = files.iter().map(|(path, content)| Entry {
         path: (*path).to_owned(),
         bytes: content.len() as u64,
@@ -424,7 +424,7 @@ fn written(folder: &Path, name: &str, files: &[(&str, &[u8])], edition: Edition)
 }
 
 #[tokio::test]
-async fn what_is_not_imported_leaves_nothing() {
+async fn refused_import_leaves_nothing() {
     let scratch = tempfile::tempdir().unwrap();
     let folder = scratch.path();
     let store = Store::open(&folder.join("running")).await.unwrap();
@@ -441,20 +441,20 @@ async fn what_is_not_imported_leaves_nothing() {
         fs::read(folder.join("running/faceoff.sqlite3")).unwrap()
     };
     fs::write(folder.join("text"), "no archive").unwrap();
-    written(folder, "bare", &[("README.txt", b"")], Edition::Public);
-    written(
+    write_archive(folder, "bare", &[("README.txt", b"")], Edition::Public);
+    write_archive(
         folder,
         "running.tar.zst",
         &[("database.sqlite3", &running)],
         Edition::Public,
     );
-    written(
+    write_archive(
         folder,
         "other",
         &[("database.sqlite3", &database)],
         Edition::Organiser,
     );
-    written(
+    write_archive(
         folder,
         "good",
         &[("database.sqlite3", &database)],
@@ -462,21 +462,21 @@ async fn what_is_not_imported_leaves_nothing() {
     );
     fs::create_dir(folder.join("empty")).unwrap();
     let import = |archive: &str, data: &str| faceoff(folder, &["import", archive, "--data", data]);
-    for (archive, words) in [
+    for (archive, expected) in [
         ("none", &["none is not imported", "No such file"][..]),
         ("text", &["expected a .tar.zst"]),
-        ("bare", &["there is no database.sqlite3 in it"]),
+        ("bare", &["it contains no database.sqlite3"]),
         ("running.tar.zst", &["database is refused", "an archive"]),
         (
             "other",
             &[
-                "its manifest tells of the organiser edition",
-                "its database of the public one",
+                "its manifest is of the organiser edition",
+                "its database of the public edition",
             ],
         ),
     ] {
         for data in ["new", "empty"] {
-            refused(&import(archive, data), words);
+            refused(&import(archive, data), expected);
         }
         assert!(!folder.join("new").exists());
         assert!(!folder.join("new.importing").exists());
@@ -484,14 +484,14 @@ async fn what_is_not_imported_leaves_nothing() {
     }
     refused(&import("good", "/"), &["not empty"]);
 
-    // Somebody's own folder in the way stays, that of a killed import goes.
+    // A foreign folder with the temporary name is kept; that of an interrupted import is removed.
     fs::create_dir(folder.join("new.importing")).unwrap();
-    refused(&import("good", "new"), &["new.importing is in the way"]);
+    refused(&import("good", "new"), &["new.importing already exists"]);
     fs::write(folder.join("new.importing/faceoff-import.lock"), "").unwrap();
     fs::create_dir(folder.join("new.importing/data")).unwrap();
     for data in ["new", "empty"] {
-        let told = done(&import("good", data));
-        assert!(told.contains("imported the public archive"), "{told}");
+        let message = done(&import("good", data));
+        assert!(message.contains("imported the public archive"), "{message}");
         let found = Store::archived_in(&folder.join(data))
             .await
             .unwrap()
@@ -502,15 +502,15 @@ async fn what_is_not_imported_leaves_nothing() {
 }
 
 #[tokio::test]
-async fn a_folder_of_an_earlier_version_becomes_an_archive_too() {
+async fn data_folder_of_an_earlier_version_can_be_archived() {
     let folder = tempfile::tempdir().unwrap();
     let file = fs::File::open(fixture("data-folder-e67a08c.tar.gz")).unwrap();
     tar::Archive::new(flate2::read::GzDecoder::new(file))
         .unpack(folder.path())
         .unwrap();
     let store = Store::open(&folder.path().join("data")).await.unwrap();
-    for run in store.unsummed_runs(0).await.unwrap() {
-        let kept = store.keep_episode_summary(run, 0, "{}", now());
+    for run in store.unsummarised_runs(0).await.unwrap() {
+        let kept = store.store_episode_summary(run, 0, "{}", now());
         kept.await.unwrap();
     }
     for edition in [
@@ -530,18 +530,18 @@ async fn a_folder_of_an_earlier_version_becomes_an_archive_too() {
         let stage = store.stages().await.unwrap().remove(0);
         let revision = store.board_revision(&stage).await.unwrap();
         let rows = shown.board(stage.id, revision).await.unwrap();
-        // Of its second day some is under way: the archive shows the first.
+        // The second day is unfinished, so the archive shows the first.
         assert_eq!(rows.len(), 1, "{rows:?}");
         for row in rows {
-            let was = store.evaluation(row.evaluation).await.unwrap();
-            assert!(was.released_at.is_some());
-            assert_eq!(shown.evaluation(row.evaluation).await.unwrap(), was);
+            let original = store.evaluation(row.evaluation).await.unwrap();
+            assert!(original.released_at.is_some());
+            assert_eq!(shown.evaluation(row.evaluation).await.unwrap(), original);
         }
     }
 }
 
 #[tokio::test]
-async fn a_killed_import_has_made_all_of_the_folder_or_none() {
+async fn killed_import_creates_all_of_the_folder_or_none() {
     let scratch = tempfile::tempdir().unwrap();
     let folder = scratch.path();
     let store = Store::open(&folder.join("running")).await.unwrap();
@@ -550,14 +550,14 @@ async fn a_killed_import_has_made_all_of_the_folder_or_none() {
     let database = folder.join("database");
     snapshot.unwrap().finish(&database).await.unwrap();
     let database = fs::read(database).unwrap();
-    // As many files as take a while, each of which is flushed.
+    // Each file is synced, so many files take a while.
     let names: Vec<String> = (0..60)
         .map(|number| format!("artifacts/datasets/{number}.zip"))
         .collect();
     let mut files: Vec<(&str, &[u8])> = vec![("database.sqlite3", &database)];
     files.extend(names.iter().map(|name| (name.as_str(), &b"PK"[..])));
-    written(folder, "season.tar.zst", &files, Edition::Public);
-    let (mut killed, mut whole) = (0, 0);
+    write_archive(folder, "season.tar.zst", &files, Edition::Public);
+    let (mut killed, mut complete) = (0, 0);
     for round in 0_u64.. {
         let mut child = Command::new(env!("CARGO_BIN_EXE_faceoff"))
             .args(["import", "season.tar.zst", "--data", "shown"])
@@ -566,7 +566,7 @@ async fn a_killed_import_has_made_all_of_the_folder_or_none() {
             .stderr(Stdio::null())
             .spawn()
             .unwrap();
-        // Ever later, until it is done before.
+        // Killed later in each round, until the import finishes first.
         std::thread::sleep(std::time::Duration::from_millis(20 * round * round));
         child.kill().unwrap();
         let ended = child.wait().unwrap();
@@ -574,20 +574,20 @@ async fn a_killed_import_has_made_all_of_the_folder_or_none() {
         if shown.exists() {
             let found = Store::archived_in(&shown).await.unwrap().unwrap();
             assert!(found.imported_at.is_some());
-            let brought = fs::read_dir(shown.join("artifacts/datasets")).unwrap();
-            assert_eq!(brought.count(), names.len());
+            let datasets = fs::read_dir(shown.join("artifacts/datasets")).unwrap();
+            assert_eq!(datasets.count(), names.len());
             fs::remove_dir_all(&shown).unwrap();
-            whole += 1;
+            complete += 1;
         } else {
             assert!(!ended.success(), "{ended}");
             killed += 1;
         }
-        if whole > 1 {
+        if complete > 1 {
             break;
         }
     }
-    assert!(killed > 0, "it was never killed in time");
-    // What the killed ones have left is gone after one that was not.
+    assert!(killed > 0, "no import was killed before its end");
+    // A complete import removes what the killed ones have left.
     done(&faceoff(
         folder,
         &["import", "season.tar.zst", "--data", "shown"],

@@ -1,4 +1,4 @@
-//! What the program says of itself.
+//! Help, completions and exit statuses of the program.
 
 use std::process::Command;
 
@@ -15,13 +15,13 @@ fn faceoff(args: &[&str]) -> (Option<i32>, String, String) {
     )
 }
 
-/// The commands that a help lists.
+/// The commands that a help text lists.
 fn commands(help: &str) -> Vec<String> {
     let (_, listed) = help.split_once("\nCommands:\n").unwrap_or_default();
     listed
         .lines()
         .take_while(|line| !line.is_empty())
-        // A description that goes on is further in.
+        // Continued descriptions are indented further.
         .filter(|line| line.starts_with("  ") && !line.starts_with("   "))
         .filter_map(|line| line.split_whitespace().next())
         .filter(|name| *name != "help")
@@ -30,7 +30,7 @@ fn commands(help: &str) -> Vec<String> {
 }
 
 #[test]
-fn every_command_has_a_help() {
+fn all_commands_have_a_help() {
     let mut todo: Vec<Vec<String>> = vec![Vec::new()];
     let mut seen = 0;
     while let Some(path) = todo.pop() {
@@ -50,7 +50,7 @@ fn every_command_has_a_help() {
 }
 
 #[test]
-fn each_shell_gets_its_completions() {
+fn completions_exist_for_all_shells() {
     for shell in ["bash", "zsh", "fish", "powershell", "elvish"] {
         let (code, script, error) = faceoff(&["completions", shell]);
         assert_eq!(code, Some(0), "{shell}: {error}");
@@ -65,7 +65,7 @@ fn each_shell_gets_its_completions() {
 }
 
 #[test]
-fn a_server_that_is_not_there_is_told_by_the_status() {
+fn unreachable_server_ends_with_status_4() {
     let (code, out, error) = faceoff(&["board", "--server", "http://127.0.0.1:1", "--token", "x"]);
     assert_eq!((code, out.as_str()), (Some(4), ""), "{error}");
 }

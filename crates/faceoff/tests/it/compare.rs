@@ -24,7 +24,7 @@ fn agent(name: &str) -> PathBuf {
         .join(name)
 }
 
-/// Plays an agent into the folder `out` of `folder`.
+/// Evaluates an agent into the folder `out` of `folder`.
 fn eval(folder: &Path, name: &str, out: &str, args: &[&str]) {
     let bundle = agent(name);
     let bundle = bundle.to_str().unwrap();
@@ -34,7 +34,7 @@ fn eval(folder: &Path, name: &str, out: &str, args: &[&str]) {
 }
 
 #[test]
-fn local_evaluations_are_compared_if_they_played_the_same_episodes() {
+fn local_evaluations_with_equal_episodes_are_compared() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     let common = ["--task", "hit,defend", "--episodes", "4"];
@@ -72,12 +72,12 @@ fn local_evaluations_are_compared_if_they_played_the_same_episodes() {
     assert!(view.get("episodes").is_none());
     let output = faceoff(&["compare", "a", "b", "--episodes", "--json"], folder);
     let listed: Value = serde_json::from_slice(&output.stdout).unwrap();
-    for (task, of) in view["tasks"].as_object().unwrap() {
+    for (task, counts) in view["tasks"].as_object().unwrap() {
         let episodes = &listed["episodes"][task];
         let mut all = Vec::new();
-        for whom in ["both", "only_a", "only_b", "neither"] {
-            let list = episodes[whom].as_array().unwrap();
-            assert_eq!(of[whom], list.len(), "{task}, {whom}");
+        for group in ["both", "only_a", "only_b", "neither"] {
+            let list = episodes[group].as_array().unwrap();
+            assert_eq!(counts[group], list.len(), "{task}, {group}");
             all.extend(list.iter().map(|episode| episode.as_u64().unwrap()));
         }
         all.sort_unstable();
@@ -93,8 +93,8 @@ fn local_evaluations_are_compared_if_they_played_the_same_episodes() {
     for (side, out, only) in [("a", "a", "only_a"), ("b", "b", "only_b")] {
         let results = results(out);
         assert_eq!(view["overall"][format!("score_{side}")], results["score"]);
-        for (task, of) in view["tasks"].as_object().unwrap() {
-            let successes = of["both"].as_u64().unwrap() + of[only].as_u64().unwrap();
+        for (task, counts) in view["tasks"].as_object().unwrap() {
+            let successes = counts["both"].as_u64().unwrap() + counts[only].as_u64().unwrap();
             assert_eq!(
                 results["tasks"][task]["successes"], successes,
                 "{side} {task}"
@@ -103,7 +103,7 @@ fn local_evaluations_are_compared_if_they_played_the_same_episodes() {
     }
     assert_eq!(view["tasks"].as_object().unwrap().len(), 2);
 
-    // Packed or unpacked, folder or archive: the same.
+    // The result is the same for folder, archive and unpacked archive.
     let unpacked = folder.join("unpacked");
     let file = fs::File::open(folder.join("a/dataset.zip")).unwrap();
     zip::ZipArchive::new(file)
@@ -118,7 +118,7 @@ fn local_evaluations_are_compared_if_they_played_the_same_episodes() {
     }
     let table = faceoff(&["compare", "a", "a"], folder);
     let table = text(&table.stdout);
-    for part in ["A: hold (a)", "not told apart", "95 % interval", "score"] {
+    for part in ["A: hold (a)", "statistically tied", "95 % interval", "score"] {
         assert!(table.contains(part), "{part:?} is not in {table}");
     }
 
@@ -139,7 +139,7 @@ fn local_evaluations_are_compared_if_they_played_the_same_episodes() {
         assert!(message.contains(field), "{field:?} is not in {message}");
     }
 
-    // What was changed by hand is no evidence.
+    // A dataset that was changed by hand is refused.
     let episodes = unpacked.join("episodes.parquet");
     let mut bytes = fs::read(&episodes).unwrap();
     bytes[40] ^= 1;

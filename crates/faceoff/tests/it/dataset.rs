@@ -1,4 +1,4 @@
-//! What `faceoff eval` records, `verify` confirms and `dataset` shows: the program itself.
+//! `faceoff verify` and `faceoff dataset` on datasets of `faceoff eval`.
 
 use crate::PATIENT;
 use std::{
@@ -39,7 +39,7 @@ fn eval(out: &Path, extra: &[&str]) {
     assert!(output.status.success(), "{}", text(&output.stderr));
 }
 
-/// A sandboxed evaluation of two tasks, its folder.
+/// The folder of a sandboxed evaluation of two tasks.
 fn evaluated() -> PathBuf {
     static DIR: OnceLock<TempDir> = OnceLock::new();
     let dir = DIR.get_or_init(|| {
@@ -61,7 +61,7 @@ fn stdout(args: &[&str]) -> String {
 }
 
 #[test]
-fn an_evaluation_verifies_with_any_number_of_workers() {
+fn evaluation_verifies_with_any_number_of_workers() {
     let out = evaluated();
     let dir = out.to_str().unwrap();
     let line = stdout(&["verify", dir]);
@@ -84,7 +84,7 @@ fn an_evaluation_verifies_with_any_number_of_workers() {
 }
 
 #[test]
-fn what_differs_ends_with_1_and_what_cannot_be_read_with_2() {
+fn difference_ends_with_1_and_unreadable_dataset_with_2() {
     let dir = tempfile::tempdir().unwrap();
     let copy = dir.path().join("dataset.zip");
     let good = fs::read(evaluated().join("dataset.zip")).unwrap();
@@ -96,30 +96,30 @@ fn what_differs_ends_with_1_and_what_cannot_be_read_with_2() {
     assert_eq!(verify(&good, &[]).0, 0);
     let mut flipped = good.clone();
     flipped[good.len() / 2] ^= 1;
-    let (code, words) = verify(&flipped, &[]);
+    let (code, message) = verify(&flipped, &[]);
     assert!(
-        code == 1 && words.contains("damaged or altered"),
-        "{code}: {words}"
+        code == 1 && message.contains("damaged or altered"),
+        "{code}: {message}"
     );
-    let (code, words) = verify(&good[..good.len() / 2], &[]);
+    let (code, message) = verify(&good[..good.len() / 2], &[]);
     assert!(
-        code == 2 && words.contains("not a readable dataset"),
-        "{code}: {words}"
+        code == 2 && message.contains("not a readable dataset"),
+        "{code}: {message}"
     );
-    let (code, words) = verify(
+    let (code, message) = verify(
         &good,
         &["--secret", &"00".repeat(32), "--day", "2026-11-21"],
     );
     assert!(
-        code == 1 && words.contains("seed does not follow from the season's secret"),
-        "{code}: {words}"
+        code == 1 && message.contains("seed does not follow from the season's secret"),
+        "{code}: {message}"
     );
-    let (code, words) = verify(&good, &["--day", "2026-11-21"]);
-    assert!(code == 2 && words.contains("--secret"), "{code}: {words}");
+    let (code, message) = verify(&good, &["--day", "2026-11-21"]);
+    assert!(code == 2 && message.contains("--secret"), "{code}: {message}");
     let missing = faceoff(&["verify", dir.path().join("none").to_str().unwrap()]);
     assert_eq!(missing.status.code(), Some(2));
 
-    // A score beside the archive that is not the one inside.
+    // A results.json that differs from the score in the archive.
     fs::write(&copy, &good).unwrap();
     fs::write(dir.path().join("results.json"), "{}").unwrap();
     let output = faceoff(&["verify", dir.path().to_str().unwrap()]);
@@ -127,7 +127,7 @@ fn what_differs_ends_with_1_and_what_cannot_be_read_with_2() {
 }
 
 #[test]
-fn episodes_are_listed_and_steps_are_cut_out() {
+fn episodes_are_listed_and_steps_are_sliced() {
     let out = evaluated();
     let dir = out.to_str().unwrap();
     let list = stdout(&["dataset", "list", dir]);
@@ -177,7 +177,7 @@ fn episodes_are_listed_and_steps_are_cut_out() {
         501
     );
 
-    for (args, words) in [
+    for (args, message) in [
         (
             ["--task", "prepare", "--episode", "0"],
             "no episode of prepare",
@@ -187,7 +187,7 @@ fn episodes_are_listed_and_steps_are_cut_out() {
         let output = faceoff(&[&["dataset", "slice", dir][..], &args].concat());
         assert_eq!(output.status.code(), Some(1));
         assert!(
-            text(&output.stderr).contains(words),
+            text(&output.stderr).contains(message),
             "{}",
             text(&output.stderr)
         );
@@ -211,20 +211,20 @@ fn episodes_are_listed_and_steps_are_cut_out() {
 }
 
 #[test]
-fn the_export_says_where_it_went() {
+fn export_refers_to_the_python_package() {
     let old = ["dataset", "export", "result/", "--out", "export/"];
     let output = faceoff(&old);
     assert_eq!(output.status.code(), Some(1));
-    let words = text(&output.stderr);
+    let message = text(&output.stderr);
     assert!(
-        words.contains("python -m faceoff.dataset export DATASET --layout 2023 --out DIR"),
-        "{words}"
+        message.contains("python -m faceoff.dataset export DATASET --layout 2023 --out DIR"),
+        "{message}"
     );
     assert!(!stdout(&["dataset", "--help"]).contains("export"));
 }
 
 #[test]
-fn workers_and_shards_change_nothing_but_times() {
+fn workers_and_shards_only_change_times() {
     let dir = tempfile::tempdir().unwrap();
     let measured = ["penalty_points", "computation_time", "fault"];
     let mut runs = Vec::new();
@@ -261,7 +261,7 @@ fn workers_and_shards_change_nothing_but_times() {
 }
 
 #[test]
-fn the_archives_hash_is_told_and_compared() {
+fn archive_hash_is_printed_and_compared() {
     let archive = evaluated().join("dataset.zip");
     let hash = blake3::hash(&fs::read(&archive).unwrap()).to_hex();
     let path = archive.to_str().unwrap();
@@ -269,10 +269,10 @@ fn the_archives_hash_is_told_and_compared() {
     assert!(line.contains(&*hash), "{line}");
     let other = faceoff(&["verify", path, "--blake3", &"00".repeat(32)]);
     assert_eq!(other.status.code(), Some(1));
-    let words = text(&other.stderr);
+    let message = text(&other.stderr);
     assert!(
-        words.contains(&*hash) && words.contains("expected 0000"),
-        "{words}"
+        message.contains(&*hash) && message.contains("expected 0000"),
+        "{message}"
     );
 
     let dir = tempfile::tempdir().unwrap();
@@ -283,12 +283,12 @@ fn the_archives_hash_is_told_and_compared() {
         .unwrap();
     let folder = faceoff(&["verify", dir.path().to_str().unwrap(), "--blake3", &hash]);
     assert_eq!(folder.status.code(), Some(2));
-    let words = text(&folder.stderr);
-    assert!(words.contains("name dataset.zip"), "{words}");
+    let message = text(&folder.stderr);
+    assert!(message.contains("name dataset.zip"), "{message}");
 }
 
 #[test]
-fn a_dataset_of_the_layout_before_is_read() {
+fn dataset_of_the_previous_layout_is_read() {
     let archive =
         Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/fixtures/dataset-layout-2.zip");
     let archive = archive.to_str().unwrap();
@@ -311,5 +311,5 @@ fn a_dataset_of_the_layout_before_is_read() {
     ]);
     assert_eq!(slice.lines().count(), 186);
     let comparison = stdout(&["compare", archive, archive]);
-    assert!(comparison.contains("A: striker") && comparison.contains("not told apart"));
+    assert!(comparison.contains("A: striker") && comparison.contains("statistically tied"));
 }

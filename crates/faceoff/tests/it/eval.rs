@@ -20,7 +20,7 @@ fn eval(bundle: &Path, out: &Path, args: &[&str]) -> Output {
         .arg("--out")
         .arg(out)
         .args(["--config", PATIENT])
-        // Another configuration in the working folder must not decide.
+        // A configuration in the working folder must not have an effect.
         .current_dir(out.parent().unwrap())
         .output()
         .unwrap()
@@ -30,7 +30,7 @@ fn text(bytes: &[u8]) -> String {
     String::from_utf8_lossy(bytes).into_owned()
 }
 
-/// `results.json` without what is measured.
+/// `results.json` without measured values.
 fn result(out: &Path) -> serde_json::Value {
     let mut result: serde_json::Value =
         serde_json::from_slice(&fs::read(out.join("results.json")).unwrap()).unwrap();
@@ -47,7 +47,7 @@ fn result(out: &Path) -> serde_json::Value {
 }
 
 #[test]
-fn the_result_does_not_depend_on_workers_sandbox_or_packing() {
+fn result_does_not_depend_on_workers_sandbox_or_packing() {
     let dir = tempfile::tempdir().unwrap();
     let archive = dir.path().join("hold.tar.gz");
     let packed = Command::new("tar")
@@ -90,14 +90,14 @@ fn the_result_does_not_depend_on_workers_sandbox_or_packing() {
 }
 
 #[test]
-fn an_agent_that_fails_is_told_with_fault_and_log_and_leaves_no_score() {
+fn failed_agent_is_reported_with_fault_and_log() {
     let dir = tempfile::tempdir().unwrap();
     let bundle = dir.path().join("bundle");
     fs::create_dir(&bundle).unwrap();
     fs::write(bundle.join("agent.toml"), MANIFEST).unwrap();
     fs::write(bundle.join("agent.py"), "import torch_of_olympia").unwrap();
     let out = dir.path().join("out");
-    // The score of an earlier run must not be taken for this one's.
+    // The score of an earlier run must not be mistaken for this one's.
     let first = eval(&hold(), &out, &["--task", "defend", "--episodes", "1"]);
     assert!(first.status.success(), "{}", text(&first.stderr));
 
@@ -105,7 +105,7 @@ fn an_agent_that_fails_is_told_with_fault_and_log_and_leaves_no_score() {
     assert_eq!(output.status.code(), Some(1));
     let stderr = text(&output.stderr);
     assert!(
-        stderr.contains("the agent failed: more than 10 faults"),
+        stderr.contains("the agent failed: it had more than 10 faults"),
         "{stderr}"
     );
     assert!(
@@ -123,7 +123,7 @@ fn an_agent_that_fails_is_told_with_fault_and_log_and_leaves_no_score() {
 }
 
 #[test]
-fn a_fault_is_told_with_its_traceback_and_ends_with_status_1_beside_the_result() {
+fn fault_with_a_result_has_traceback_and_status_1() {
     let dir = tempfile::tempdir().unwrap();
     let bundle = dir.path().join("bundle");
     fs::create_dir(&bundle).unwrap();
@@ -138,14 +138,14 @@ fn a_fault_is_told_with_its_traceback_and_ends_with_status_1_beside_the_result()
     let args = ["--task", "hit,defend", "--episodes", "2"];
     let output = eval(&bundle, &out, &args);
     assert_eq!(output.status.code(), Some(1));
-    let (told, stderr) = (text(&output.stdout), text(&output.stderr));
-    for words in [
+    let (stdout, stderr) = (text(&output.stdout), text(&output.stderr));
+    for expected in [
         "fault: defend, episode 0, step 0",
-        "what the agent wrote before the first fault:\n  \\u001b[31mlooking\n  Traceback (most recent call last):",
+        "the agent's output before its first fault:\n  \\u001b[31mlooking\n  Traceback (most recent call last):",
         "  ZeroDivisionError: division by zero",
         "penalty points",
     ] {
-        assert!(told.contains(words), "{words:?} is not in {told}");
+        assert!(stdout.contains(expected), "{expected:?} is not in {stdout}");
     }
     assert!(stderr.contains("the agent had 2 faults"), "{stderr}");
     assert!(out.join("results.json").exists() && out.join("dataset.zip").exists());
@@ -158,19 +158,19 @@ fn a_fault_is_told_with_its_traceback_and_ends_with_status_1_beside_the_result()
         &[&args[..], &["--allow-faults", "--json"]].concat(),
     );
     assert!(allowed.status.success(), "{}", text(&allowed.stderr));
-    let told: serde_json::Value = serde_json::from_slice(&allowed.stdout).unwrap();
-    assert_eq!(told["faults"].as_array().unwrap().len(), 2, "{told:#}");
-    assert_eq!(told["result"]["tasks"]["defend"]["episodes"], 2);
+    let view: serde_json::Value = serde_json::from_slice(&allowed.stdout).unwrap();
+    assert_eq!(view["faults"].as_array().unwrap().len(), 2, "{view:#}");
+    assert_eq!(view["result"]["tasks"]["defend"]["episodes"], 2);
     assert!(text(&allowed.stderr).contains("ZeroDivisionError"));
 }
 
 #[test]
-fn a_bundle_is_evaluated_from_its_own_folder_again_and_again() {
+fn bundle_can_be_evaluated_repeatedly_in_its_own_folder() {
     let dir = tempfile::tempdir().unwrap();
     for file in ["agent.toml", "agent.py", "protocol.py"] {
         fs::copy(hold().join(file), dir.path().join(file)).unwrap();
     }
-    let here = |args: &[&str]| {
+    let run_in_folder = |args: &[&str]| {
         let output = Command::new(env!("CARGO_BIN_EXE_faceoff"))
             .args(args)
             .current_dir(dir.path())
@@ -194,15 +194,15 @@ fn a_bundle_is_evaluated_from_its_own_folder_again_and_again() {
         &["--out", "results/a"],
         &["--out", "results/a"],
     ] {
-        here(&[&eval[..], out].concat());
+        run_in_folder(&[&eval[..], out].concat());
     }
-    let packed = here(&["submit", ".", "--dry-run", "--json"]);
+    let packed = run_in_folder(&["submit", ".", "--dry-run", "--json"]);
     let packed: serde_json::Value = serde_json::from_str(&packed).unwrap();
     assert_eq!(packed["left_out"], serde_json::json!(["faceoff-eval"]));
 }
 
 #[test]
-fn what_cannot_be_evaluated_is_refused_with_a_reason() {
+fn invalid_evaluation_is_refused_with_a_reason() {
     let dir = tempfile::tempdir().unwrap();
     let out = dir.path().join("out");
     let refused = |bundle: &Path, args: &[&str], reason: &str| {
@@ -236,7 +236,7 @@ fn what_cannot_be_evaluated_is_refused_with_a_reason() {
 }
 
 #[test]
-fn an_ablation_plays_the_same_episodes_in_every_profile_and_compares_them() {
+fn ablation_compares_the_profiles_on_the_same_episodes() {
     let dir = tempfile::tempdir().unwrap();
     let out = dir.path().join("out");
     let args = [
@@ -276,8 +276,8 @@ fn an_ablation_plays_the_same_episodes_in_every_profile_and_compares_them() {
         );
         assert!(out.join(profile).join("dataset.zip").exists());
     }
-    // The profile alone is what the ablation's run of it is.
-    let alone = dir.path().join("alone");
+    // An evaluation in one profile gives the same result as the ablation.
+    let single = dir.path().join("single");
     let args = [
         "--profile",
         "tracking_loss",
@@ -288,12 +288,12 @@ fn an_ablation_plays_the_same_episodes_in_every_profile_and_compares_them() {
         "--seed",
         "5",
     ];
-    assert!(eval(&hold(), &alone, &args).status.success());
-    assert_eq!(result(&alone), result(&out.join("tracking_loss")));
+    assert!(eval(&hold(), &single, &args).status.success());
+    assert_eq!(result(&single), result(&out.join("tracking_loss")));
 }
 
 #[test]
-fn a_servers_rules_count_here_too_and_the_dataset_verifies_by_them() {
+fn rules_of_a_configuration_apply_and_verify() {
     let dir = tempfile::tempdir().unwrap();
     let config = dir.path().join("rules.toml");
     let patient = fs::read_to_string(PATIENT).unwrap();
@@ -339,9 +339,9 @@ fn a_servers_rules_count_here_too_and_the_dataset_verifies_by_them() {
         .unwrap();
     assert!(verified.status.success(), "{}", text(&verified.stderr));
 
-    let nowhere =
+    let impossible =
         "[evaluation]\nperturbations = { model_mismatch = { static_error_m = [0.9, 1.0] } }\n";
-    fs::write(&config, format!("{patient}\n{nowhere}")).unwrap();
+    fs::write(&config, format!("{patient}\n{impossible}")).unwrap();
     let output = run(&out);
     let error = text(&output.stderr);
     assert!(

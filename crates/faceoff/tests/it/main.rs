@@ -1,4 +1,4 @@
-//! The program as a team calls it.
+//! Tests of the `faceoff` program.
 #![expect(clippy::unwrap_used, reason = "a helper's failure is its test's")]
 
 mod archive;
@@ -12,5 +12,5 @@ mod play;
 mod replay;
 mod sim;
 
-/// A configuration that gives agents time: what is played again must not differ by a busy machine's faults.
+/// A configuration with generous time limits, so that a busy machine causes no agent faults.
 const PATIENT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/patient.toml");

@@ -1,4 +1,4 @@
-//! What `faceoff new` makes: it runs as it is, and plays.
+//! `faceoff new`: the new agents pass their tests and can be evaluated.
 
 use crate::PATIENT;
 use serde_json::Value;
@@ -33,8 +33,8 @@ fn succeed(program: &str, args: &[&str], folder: &Path) -> String {
     text(&output.stdout)
 }
 
-/// Success rate and penalty points but for computation time, of some episodes in the evaluation profile.
-fn played(bundle: &Path, task: &str) -> (f64, u64) {
+/// Evaluates some episodes in the evaluation profile; returns success rate and number of constraint violations.
+fn evaluate(bundle: &Path, task: &str) -> (f64, u64) {
     let (folder, bundle) = (bundle.parent().unwrap(), bundle.to_str().unwrap());
     let args = [
         "eval",
@@ -66,40 +66,40 @@ fn played(bundle: &Path, task: &str) -> (f64, u64) {
     )
 }
 
-fn made(folder: &Path, args: &[&str]) -> PathBuf {
-    let told = succeed(FACEOFF, &[&["new", "my-agent"], args].concat(), folder);
-    assert!(told.contains("cd my-agent"), "{told}");
+fn new_agent(folder: &Path, args: &[&str]) -> PathBuf {
+    let message = succeed(FACEOFF, &[&["new", "my-agent"], args].concat(), folder);
+    assert!(message.contains("cd my-agent"), "{message}");
     folder.join("my-agent")
 }
 
 #[test]
-fn a_python_defender_passes_its_tests_and_stops_pucks() {
+fn python_defender_passes_its_tests_and_stops_pucks() {
     let dir = tempfile::tempdir().unwrap();
-    let agent = made(dir.path(), &[]);
+    let agent = new_agent(dir.path(), &[]);
     succeed("python3", &["-m", "unittest"], &agent);
     let readme = fs::read_to_string(agent.join("README.md")).unwrap();
     assert!(
         readme.starts_with("# my-agent\n") && !readme.contains("{{"),
         "{readme}"
     );
-    let (success_rate, violations) = played(&agent, "defend");
+    let (success_rate, violations) = evaluate(&agent, "defend");
     assert!(success_rate > 0.45, "{success_rate}");
     assert_eq!(violations, 0);
 }
 
 #[test]
-fn a_python_hitter_passes_its_tests_and_keeps_the_rules() {
+fn python_hitter_passes_its_tests_and_keeps_the_rules() {
     let dir = tempfile::tempdir().unwrap();
-    let agent = made(dir.path(), &["--lang", "python", "--example", "hitter"]);
+    let agent = new_agent(dir.path(), &["--lang", "python", "--example", "hitter"]);
     succeed("python3", &["-m", "unittest"], &agent);
-    let (_, violations) = played(&agent, "hit");
+    let (_, violations) = evaluate(&agent, "hit");
     assert_eq!(violations, 0);
 }
 
 #[test]
-fn the_files_that_are_faceoffs_own_are_the_packages() {
+fn library_files_are_copies_of_the_python_package() {
     let dir = tempfile::tempdir().unwrap();
-    let agent = made(dir.path(), &[]);
+    let agent = new_agent(dir.path(), &[]);
     let package = Path::new(env!("CARGO_MANIFEST_DIR")).join("../faceoff-py/python/faceoff");
     for (copy, original) in [
         ("protocol.py", "agent.py"),
@@ -110,15 +110,15 @@ fn the_files_that_are_faceoffs_own_are_the_packages() {
     }
 }
 
-/// Builds outside of this workspace, without network, with the versions that this workspace has.
+/// Builds outside of this workspace, without network and with this workspace's versions of dependencies.
 #[test]
-fn a_rust_agent_is_built_tested_and_plays() {
+fn rust_agents_pass_their_tests_and_are_evaluated() {
     let dir = tempfile::tempdir().unwrap();
     let repository = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
-    for (example, task, enough) in [("defender", "defend", 0.45), ("hitter", "hit", 0.0)] {
-        let agent = made(dir.path(), &["--lang", "rust", "--example", example]);
+    for (example, task, min_rate) in [("defender", "defend", 0.45), ("hitter", "hit", 0.0)] {
+        let agent = new_agent(dir.path(), &["--lang", "rust", "--example", example]);
         fs::copy(repository.join("Cargo.lock"), agent.join("Cargo.lock")).unwrap();
-        // One folder for both: their dependencies are the same.
+        // Both examples share a target folder, because they have the same dependencies.
         let target = dir.path().join("target");
         let cargo = |args: &[&str]| {
             let output = Command::new("cargo")
@@ -139,38 +139,38 @@ fn a_rust_agent_is_built_tested_and_plays() {
         cargo(&["build"]);
         let bundle = agent.join("bundle");
         fs::copy(target.join("debug/my-agent"), bundle.join("agent")).unwrap();
-        let (success_rate, violations) = played(&bundle, task);
-        assert!(success_rate >= enough, "{example}: {success_rate}");
+        let (success_rate, violations) = evaluate(&bundle, task);
+        assert!(success_rate >= min_rate, "{example}: {success_rate}");
         assert_eq!(violations, 0, "{example}");
         fs::remove_dir_all(agent).unwrap();
     }
 }
 
 #[test]
-fn what_is_there_already_is_left_alone() {
+fn existing_folder_is_not_changed() {
     let dir = tempfile::tempdir().unwrap();
-    let agent = made(dir.path(), &[]);
+    let agent = new_agent(dir.path(), &[]);
     fs::write(agent.join("agent.py"), "mine").unwrap();
     let output = run(FACEOFF, &["new", "my-agent"], dir.path());
     assert!(!output.status.success());
-    let words = text(&output.stderr);
+    let message = text(&output.stderr);
     assert!(
-        words.contains("my-agent is there already; choose another name"),
-        "{words}"
+        message.contains("my-agent already exists; choose another name"),
+        "{message}"
     );
     assert_eq!(fs::read_to_string(agent.join("agent.py")).unwrap(), "mine");
 }
 
 #[test]
-fn a_name_that_a_board_or_a_crate_would_not_take_is_refused() {
+fn invalid_agent_name_is_refused() {
     let dir = tempfile::tempdir().unwrap();
     for name in ["My Agent", "1st", "..", "a/..", "é", &"a".repeat(41)] {
         let output = run(FACEOFF, &["new", name], dir.path());
         assert!(!output.status.success(), "{name}");
-        let words = text(&output.stderr);
+        let message = text(&output.stderr);
         assert!(
-            words.contains("that begins with a letter, such as my-agent, got"),
-            "{words}"
+            message.contains("that begins with a letter, such as my-agent, got"),
+            "{message}"
         );
     }
     assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 0);

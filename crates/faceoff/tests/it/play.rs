@@ -34,7 +34,7 @@ fn text(bytes: &[u8]) -> String {
 }
 
 #[test]
-fn a_game_leaves_results_and_a_recording_that_verifies() {
+fn game_has_results_and_a_recording_that_verifies() {
     let dir = tempfile::tempdir().unwrap();
     let out = dir.path().join("out");
     let hold = hold();
@@ -90,7 +90,7 @@ fn a_game_leaves_results_and_a_recording_that_verifies() {
             assert!(side.get(key).is_some(), "{key}");
         }
     }
-    // The folder, the archive, and with --json.
+    // Verifies the folder, and the archive with --json.
     for (path, json) in [(out.clone(), false), (out.join("game.zip"), true)] {
         let args: &[&str] = if json {
             &["verify", "--json"]
@@ -99,18 +99,18 @@ fn a_game_leaves_results_and_a_recording_that_verifies() {
         };
         let verified = faceoff(args, &[&path]);
         assert!(verified.status.success(), "{}", text(&verified.stderr));
-        let said = text(&verified.stdout);
+        let stdout = text(&verified.stdout);
         if json {
-            let said: serde_json::Value = serde_json::from_str(&said).unwrap();
+            let view: serde_json::Value = serde_json::from_str(&stdout).unwrap();
             assert_eq!(
-                (&said["verified"], &said["steps"]),
+                (&view["verified"], &view["steps"]),
                 (&true.into(), &1000.into())
             );
-            assert_eq!(said["result"], results);
+            assert_eq!(view["result"], results);
         } else {
             assert!(
-                said.contains("a game of 2 rallies, 1000 control steps"),
-                "{said}"
+                stdout.contains("a game of 2 rallies, 1000 control steps"),
+                "{stdout}"
             );
         }
     }
@@ -122,10 +122,10 @@ fn a_game_leaves_results_and_a_recording_that_verifies() {
         text(&side.stderr)
     );
 
-    // A score that was changed beside the archive, and a byte that was changed inside.
-    let beside = out.join("results.json");
-    let altered = text(&fs::read(&beside).unwrap()).replace("\"goals\": 0", "\"goals\": 9");
-    fs::write(&beside, altered).unwrap();
+    // A changed results.json, and a changed byte in the archive.
+    let results_file = out.join("results.json");
+    let altered = text(&fs::read(&results_file).unwrap()).replace("\"goals\": 0", "\"goals\": 9");
+    fs::write(&results_file, altered).unwrap();
     let verified = faceoff(&["verify"], &[&out]);
     assert_eq!(verified.status.code(), Some(1));
     assert!(
@@ -148,7 +148,7 @@ fn a_game_leaves_results_and_a_recording_that_verifies() {
 }
 
 #[test]
-fn json_is_what_results_json_is_and_a_forfeit_is_a_result() {
+fn forfeit_is_a_result_and_json_equals_results_json() {
     let dir = tempfile::tempdir().unwrap();
     let bundle = dir.path().join("broken");
     fs::create_dir(&bundle).unwrap();
@@ -162,9 +162,9 @@ fn json_is_what_results_json_is_and_a_forfeit_is_a_result() {
     let args = ["--steps", "45000", "--profile", "ideal", "--json"];
     let output = play([&bundle, &bundle], &out, &args);
     assert!(output.status.success(), "{}", text(&output.stderr));
-    let said = output.stdout;
-    assert_eq!(said, fs::read(out.join("results.json")).unwrap());
-    let results: serde_json::Value = serde_json::from_slice(&said).unwrap();
+    let stdout = output.stdout;
+    assert_eq!(stdout, fs::read(out.join("results.json")).unwrap());
+    let results: serde_json::Value = serde_json::from_slice(&stdout).unwrap();
     assert_eq!(results["end"], "both_forfeit");
     assert_eq!(results["drawn_by"], "both_forfeit");
     assert_eq!(results["winner"], serde_json::Value::Null);
@@ -177,10 +177,10 @@ fn json_is_what_results_json_is_and_a_forfeit_is_a_result() {
 }
 
 #[test]
-fn what_cannot_be_played_is_refused_with_a_reason() {
+fn invalid_game_is_refused_with_a_reason() {
     let dir = tempfile::tempdir().unwrap();
     let out = dir.path().join("out");
-    let (hold, nothing) = (hold(), dir.path().join("nothing"));
+    let (hold, missing) = (hold(), dir.path().join("missing"));
     let refused = |bundles: [&Path; 2], args: &[&str], reason: &str| {
         let output = play(bundles, &out, args);
         assert!(!output.status.success());
@@ -196,10 +196,10 @@ fn what_cannot_be_played_is_refused_with_a_reason() {
     assert!(!output.status.success());
     assert!(text(&output.stderr).contains("results of an evaluation"));
     assert!(evaluated.join("results.json").exists());
-    // Of an earlier game nothing is left that could be taken for this one's.
+    // The files of an earlier game are removed, so that they are not mistaken for this one's.
     fs::create_dir(&out).unwrap();
     fs::write(out.join("game.zip"), "an earlier game").unwrap();
-    refused([&hold, &nothing], &[], "there is no bundle at");
+    refused([&hold, &missing], &[], "there is no bundle at");
     assert!(!out.join("game.zip").exists());
     refused([dir.path(), &hold], &[], "there is no agent.toml");
     refused([&hold, &hold], &["--steps", "0"], "0 is not in 1..=450000");
@@ -212,7 +212,7 @@ fn what_cannot_be_played_is_refused_with_a_reason() {
 }
 
 #[test]
-fn mirrored_pairs_have_one_seed_each_swapped_sides_and_recordings_that_verify() {
+fn mirrored_pairs_share_a_seed_and_swap_sides() {
     let dir = tempfile::tempdir().unwrap();
     let out = dir.path().join("out");
     let hold = hold();
@@ -220,22 +220,22 @@ fn mirrored_pairs_have_one_seed_each_swapped_sides_and_recordings_that_verify() 
     let output = play([&hold, &hold], &out, &args);
     assert!(output.status.success(), "{}", text(&output.stderr));
     assert_eq!(output.stdout, fs::read(out.join("results.json")).unwrap());
-    let told: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    let results: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
     assert_eq!(
-        (&told["series"], &told["wanted"], &told["draws"]),
+        (&results["series"], &results["wanted"], &results["draws"]),
         (&"mirrored_pairs".into(), &2.into(), &4.into())
     );
-    let mean = &told["goal_difference"];
+    let mean = &results["goal_difference"];
     assert_eq!((&mean["of"], &mean["mean"]), (&2.into(), &0.0.into()));
-    assert!(mean["mean_ci95"].is_null(), "two pairs make no interval");
-    let spread = &told["spread"];
+    assert!(mean["mean_ci95"].is_null(), "there is no interval with two pairs");
+    let spread = &results["spread"];
     assert_eq!(spread["of_independent_games"], 0.0);
-    assert!(spread["ratio"].is_null(), "nothing varied");
-    let games = told["games"].as_array().unwrap();
-    let of = |key: &str| -> Vec<_> { games.iter().map(|game| game[key].clone()).collect() };
-    assert_eq!(of("home"), [0, 1, 0, 1]);
-    assert_eq!(of("pair"), [1, 1, 2, 2]);
-    let seeds = of("seed");
+    assert!(spread["ratio"].is_null(), "there is no variance");
+    let games = results["games"].as_array().unwrap();
+    let column = |key: &str| -> Vec<_> { games.iter().map(|game| game[key].clone()).collect() };
+    assert_eq!(column("home"), [0, 1, 0, 1]);
+    assert_eq!(column("pair"), [1, 1, 2, 2]);
+    let seeds = column("seed");
     assert_eq!((&seeds[0], &seeds[2]), (&seeds[1], &seeds[3]));
     assert_ne!(seeds[0], seeds[2]);
     for game in games {
@@ -245,7 +245,7 @@ fn mirrored_pairs_have_one_seed_each_swapped_sides_and_recordings_that_verify() 
         let verified: serde_json::Value = serde_json::from_slice(&verified.stdout).unwrap();
         assert_eq!(verified["result"]["seed"], game["seed"]);
     }
-    // Another series is not mixed with what is left of this one.
+    // A second series does not overwrite the recordings of the first.
     let output = play([&hold, &hold], &out, &args);
     assert!(!output.status.success());
     let stderr = text(&output.stderr);
@@ -254,7 +254,7 @@ fn mirrored_pairs_have_one_seed_each_swapped_sides_and_recordings_that_verify() 
 }
 
 #[test]
-fn a_series_of_games_changes_sides_and_counts_goals_for_the_agent_who_ever_is_at_home() {
+fn series_alternates_sides_and_counts_goals_by_agent() {
     let dir = tempfile::tempdir().unwrap();
     let broken = dir.path().join("broken");
     fs::create_dir(&broken).unwrap();
@@ -264,20 +264,20 @@ fn a_series_of_games_changes_sides_and_counts_goals_for_the_agent_who_ever_is_at
     fs::write(broken.join("agent.py"), "import torch_of_olympia").unwrap();
     let out = dir.path().join("out");
     let hold = hold();
-    // Eleven faults take 7,520 steps: a rally of a side that holds ends with a foul.
+    // Eleven faults take 7,520 steps, because a rally against an arm that holds still ends with a foul.
     let args = ["--steps", "9000", "--games", "2", "--profile", "ideal"];
     let output = play([&hold, &broken], &out, &args);
     assert!(output.status.success(), "{}", text(&output.stderr));
-    let said = text(&output.stdout);
-    assert!(said.contains("hold won 2 games, drew 0, lost 0"), "{said}");
+    let stdout = text(&output.stdout);
+    assert!(stdout.contains("hold won 2 games, drew 0, lost 0"), "{stdout}");
     assert!(
-        said.contains("by game: mean +10.00, variance 0.00"),
-        "{said}"
+        stdout.contains("per game: mean +10.00, variance 0.00"),
+        "{stdout}"
     );
-    let told: serde_json::Value =
+    let results: serde_json::Value =
         serde_json::from_slice(&fs::read(out.join("results.json")).unwrap()).unwrap();
-    assert!(told.get("spread").is_none(), "no pairs");
-    let games = told["games"].as_array().unwrap();
+    assert!(results.get("spread").is_none(), "there are no pairs");
+    let games = results["games"].as_array().unwrap();
     assert_ne!(games[0]["seed"], games[1]["seed"]);
     for (number, game) in games.iter().enumerate() {
         assert_eq!(game["home"], number);

@@ -1,4 +1,4 @@
-//! What `faceoff replay` draws and says.
+//! `faceoff replay`.
 
 use crate::PATIENT;
 use std::{
@@ -20,7 +20,7 @@ fn text(bytes: &[u8]) -> String {
     String::from_utf8_lossy(bytes).into_owned()
 }
 
-/// Two episodes of each task by an agent that breaks limits; its name is to be escaped.
+/// An evaluation with two episodes per task, of an agent that violates limits and whose name must be escaped.
 fn evaluated() -> &'static Path {
     static DIR: OnceLock<TempDir> = OnceLock::new();
     let dir = DIR.get_or_init(|| {
@@ -56,8 +56,8 @@ fn evaluated() -> &'static Path {
     dir.path()
 }
 
-/// What is printed, and where it was drawn.
-fn replayed(task: &str, episode: &str, file: &str) -> (String, PathBuf) {
+/// Draws an episode; returns the output and the file.
+fn replay(task: &str, episode: &str, file: &str) -> (String, PathBuf) {
     let dir = evaluated();
     let out = dir.join(file);
     let output = faceoff(&[
@@ -75,38 +75,38 @@ fn replayed(task: &str, episode: &str, file: &str) -> (String, PathBuf) {
 }
 
 #[test]
-fn a_page_is_complete_by_itself_and_says_why() {
+fn page_is_self_contained_and_explains_the_end() {
     for task in ["hit", "defend", "prepare"] {
-        let (told, file) = replayed(task, "1", &format!("{task}.html"));
-        let lines: Vec<&str> = told.lines().collect();
+        let (stdout, file) = replay(task, "1", &format!("{task}.html"));
+        let lines: Vec<&str> = stdout.lines().collect();
         assert_eq!(
             lines[0],
             format!("{task}, episode 1 of <b>&reckless: no success")
         );
         let page = fs::read_to_string(file).unwrap();
-        let why = lines[1].replace('<', "&#60;").replace('\'', "&#39;");
-        assert!(page.contains(&why), "{why}\n{page:.2000}");
+        let reason = lines[1].replace('<', "&#60;").replace('\'', "&#39;");
+        assert!(page.contains(&reason), "{reason}\n{page:.2000}");
         assert!(
-            told.contains("3 points: end effector limit broken from step "),
-            "{told}"
+            stdout.contains("3 points: end effector limit violated from step "),
+            "{stdout}"
         );
-        assert!(!page.contains("<b>"), "an agent's name is text");
-        // The name of SVG's vocabulary is the only address; nothing is fetched.
+        assert!(!page.contains("<b>"), "the agent's name is escaped");
+        // The SVG namespace is the only address; nothing is fetched.
         let rest = page.replace("http://www.w3.org/2000/svg", "");
-        for outside in ["http:", "https:", "src=", "@import", "url("] {
-            assert!(!rest.contains(outside), "{outside}");
+        for reference in ["http:", "https:", "src=", "@import", "url("] {
+            assert!(!rest.contains(reference), "{reference}");
         }
         assert_eq!(page.contains("opponent</span>"), task == "hit");
     }
 }
 
-/// An agent that fails at its first step leaves an episode of one state.
+/// An agent that fails at its first step has an episode with a single state.
 #[test]
-fn a_fault_is_told_with_the_line_that_the_agent_left() {
+fn fault_is_shown_with_the_agents_error() {
     let dir = tempfile::tempdir().unwrap();
     let bundle = dir.path().join("bundle");
-    let made = faceoff(&["new", bundle.to_str().unwrap()]);
-    assert!(made.status.success(), "{}", text(&made.stderr));
+    let created = faceoff(&["new", bundle.to_str().unwrap()]);
+    assert!(created.status.success(), "{}", text(&created.stderr));
     let source = fs::read_to_string(bundle.join("agent.py")).unwrap();
     let broken = source.replace(
         "        mallet, puck =",
@@ -139,18 +139,18 @@ fn a_fault_is_told_with_the_line_that_the_agent_left() {
         page.to_str().unwrap(),
     ]);
     assert!(drawn.status.success(), "{}", text(&drawn.stderr));
-    let told = text(&drawn.stdout);
+    let stdout = text(&drawn.stdout);
     assert!(
-        told.contains("the agent's fault ended the episode"),
-        "{told}"
+        stdout.contains("the agent's fault ended the episode"),
+        "{stdout}"
     );
-    assert!(told.contains("ValueError: 7 (agent.py, line "), "{told}");
+    assert!(stdout.contains("ValueError: 7 (agent.py, line "), "{stdout}");
     assert!(fs::read_to_string(page).unwrap().contains("ValueError: 7"));
 }
 
 #[test]
-fn a_picture_is_well_formed() {
-    let (_, file) = replayed("hit", "0", "hit.svg");
+fn picture_is_well_formed() {
+    let (_, file) = replay("hit", "0", "hit.svg");
     let program = "import sys, xml.dom.minidom as x; d = x.parse(sys.argv[1]); \
                    print(len(d.getElementsByTagName('svg')), len(d.getElementsByTagName('polyline')) > 9)";
     let output = Command::new("python3")
@@ -162,7 +162,7 @@ fn a_picture_is_well_formed() {
 }
 
 #[test]
-fn what_cannot_be_drawn_is_said() {
+fn invalid_replay_is_refused_with_a_reason() {
     let dir = evaluated();
     let out = dir.join("out");
     let refused = |dataset: &Path, episode: &str, file: &str| {
@@ -181,16 +181,16 @@ fn what_cannot_be_drawn_is_said() {
         assert!(!file.exists());
         text(&output.stderr)
     };
-    let words = refused(&out, "7", "absent.html");
+    let message = refused(&out, "7", "absent.html");
     assert!(
-        words.contains("there is no episode 7 of hit: there are 2, from 0"),
-        "{words}"
+        message.contains("there is no episode 7 of hit: there are 2, from 0"),
+        "{message}"
     );
-    let words = refused(&out, "0", "look.png");
+    let message = refused(&out, "0", "look.png");
     assert!(
-        words.contains("expected a file that ends in .html or .svg"),
-        "{words}"
+        message.contains("expected a file that ends in .html or .svg"),
+        "{message}"
     );
-    let words = refused(&dir.join("bundle"), "0", "none.html");
-    assert!(words.contains("as the dataset of an evaluation"), "{words}");
+    let message = refused(&dir.join("bundle"), "0", "none.html");
+    assert!(message.contains("as the dataset of an evaluation"), "{message}");
 }

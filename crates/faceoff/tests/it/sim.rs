@@ -1,4 +1,4 @@
-//! `faceoff sim`.
+//! `faceoff sim golden`.
 
 use std::process::Command;
 

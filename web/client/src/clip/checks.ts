@@ -1,9 +1,6 @@
 import { ClipError } from "./error";
 
-/**
- * Reads fields of a clip's header, each by the type that it must have. A message names the field by its
- * path, so that whoever writes clips finds the fault at once.
- */
+/** Reads fields of a clip header with type checks. Error messages contain the path of the field. */
 export class Fields {
   private constructor(
     private readonly value: Readonly<Record<string, unknown>>,
@@ -48,7 +45,7 @@ export class Fields {
     return value;
   }
 
-  /** The entries of a list; none where the field is absent. */
+  /** The entries of a list; empty if the field is missing. */
   list(name: string): { at: string; value: unknown }[] {
     if (!this.has(name)) return [];
     const value = this.value[name];
@@ -65,9 +62,9 @@ export class Fields {
   }
 
   wrong(name: string, expected: string): ClipError {
-    const came = JSON.stringify(this.value[name]) as string | undefined;
+    const actual = JSON.stringify(this.value[name]) as string | undefined;
     return new ClipError(
-      `${this.path}.${name} must be ${expected}, but is ${came === undefined ? "missing" : came.slice(0, 40)}`,
+      `${this.path}.${name} must be ${expected}, but is ${actual === undefined ? "missing" : actual.slice(0, 40)}`,
     );
   }
 }

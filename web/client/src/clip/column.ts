@@ -1,7 +1,7 @@
 import { ClipError } from "./error";
 import type { Fields } from "./checks";
 
-/** How one column lies in the payload. */
+/** Encoding of a column in the payload. */
 export interface ColumnPlan {
   readonly name: string;
   readonly unit: string;
@@ -12,14 +12,14 @@ export interface ColumnPlan {
   readonly bytes: number;
 }
 
-/** A column's values by sample of the clip; NaN where it has none. */
+/** Values of a column by sample of the clip; NaN without a value. */
 export interface Column {
   readonly name: string;
   readonly unit: string;
   readonly values: Float64Array;
 }
 
-export function planOf(fields: Fields, samples: number): ColumnPlan {
+export function parsePlan(fields: Fields, samples: number): ColumnPlan {
   const plan = {
     name: fields.text("name"),
     unit: fields.has("unit") ? fields.text("unit") : "",
@@ -37,19 +37,17 @@ export function planOf(fields: Fields, samples: number): ColumnPlan {
   return plan;
 }
 
-/** Decodes a column: unsigned LEB128 of zig-zag of the difference of the plan's order. */
+/** Decodes a column: differences of the plan's order, zig-zag encoded, as unsigned LEB128. */
 export function decodeColumn(plan: ColumnPlan, bytes: Uint8Array, samples: number): Column {
   if (plan.order > 2) {
-    throw new ClipError(
-      `column ${plan.name} is coded by differences of order ${plan.order}; known are 0 to 2`,
-    );
+    throw new ClipError(`column ${plan.name} has differences of order ${plan.order}; expected 0 to 2`);
   }
   const values = new Float64Array(samples).fill(NaN);
   let at = 0;
   let last = 0;
   let beforeLast = 0;
   for (let i = 0; i < plan.count; i++) {
-    // By multiplication: bit operations would cut numbers to 32 bits.
+    // Multiplication instead of bit operations, which would truncate numbers to 32 bits.
     let coded = 0;
     let weight = 1;
     for (;;) {

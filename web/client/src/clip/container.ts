@@ -1,15 +1,15 @@
 import { Fields } from "./checks";
-import { decodeColumn, planOf, type Column } from "./column";
+import { decodeColumn, parsePlan, type Column } from "./column";
 import { ClipError } from "./error";
 
-/** The format that is read; others are refused by name. */
+/** The supported format. */
 export const FORMAT = "faceoff-clip/1";
 
-// Far above what an episode or a game's chunk needs: whatever claims more is not one of our clips.
-const MOST_SAMPLES = 100_000;
-const MOST_HEADER_BYTES = 4 << 20;
+// Far above the needs of an episode or a chunk of a game: a larger file is not a valid clip.
+const MAX_SAMPLES = 100_000;
+const MAX_HEADER_BYTES = 4 << 20;
 
-/** What every kind of clip has: which samples, and the columns by name. */
+/** Common content of all kinds of clips: range of samples, and columns by name. */
 export interface Container {
   readonly kind: string;
   readonly header: Fields;
@@ -23,38 +23,37 @@ export interface Container {
   readonly columns: ReadonlyMap<string, Column>;
 }
 
-/** Takes a clip apart, keeping the columns that `wanted` names; everything is checked before it is believed. */
-export function openContainer(bytes: Uint8Array, wanted: (name: string) => boolean): Container {
-  if (bytes.length < 4)
-    throw new ClipError(`the clip has ${bytes.length} bytes, which is less than its first field`);
+/** Parses and validates a clip. Only columns accepted by `isNeeded` are decoded. */
+export function openContainer(bytes: Uint8Array, isNeeded: (name: string) => boolean): Container {
+  if (bytes.length < 4) throw new ClipError(`the clip has ${bytes.length} bytes, less than its first field`);
   const length = new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength).getUint32(0, true);
-  if (length > MOST_HEADER_BYTES || length > bytes.length - 4) {
+  if (length > MAX_HEADER_BYTES || length > bytes.length - 4) {
     throw new ClipError(
-      `the clip ends inside its header (${length} bytes announced, ${bytes.length - 4} there), or is no clip at all`,
+      `the clip ends inside its header (${length} bytes expected, ${bytes.length - 4} received), or is not a clip`,
     );
   }
   const header = Fields.of(readJson(bytes.subarray(4, 4 + length)), "header");
   const format = header.text("format");
   if (format !== FORMAT) {
     throw new ClipError(
-      `the replay is written as "${format.slice(0, 40)}", and this page reads "${FORMAT}"; reload the page, which may be older than the server`,
+      `the replay has the format "${format.slice(0, 40)}", but this page supports "${FORMAT}"; reload the page, which may be older than the server`,
     );
   }
-  const samples = header.whole("samples", 1, MOST_SAMPLES);
+  const samples = header.whole("samples", 1, MAX_SAMPLES);
   const stepS = header.number("step_s");
   if (stepS <= 0) throw header.wrong("step_s", "above 0");
 
   const columns = new Map<string, Column>();
   let at = 4 + length;
   for (const entry of header.objects("columns")) {
-    const plan = planOf(entry, samples);
+    const plan = parsePlan(entry, samples);
     if (plan.bytes > bytes.length - at) {
       throw new ClipError(
-        `the clip ends inside column ${plan.name} (${plan.bytes} bytes announced, ${bytes.length - at} there)`,
+        `the clip ends inside column ${plan.name} (${plan.bytes} bytes expected, ${bytes.length - at} received)`,
       );
     }
-    if (columns.has(plan.name)) throw new ClipError(`column ${plan.name} is there twice`);
-    if (wanted(plan.name))
+    if (columns.has(plan.name)) throw new ClipError(`column ${plan.name} appears twice`);
+    if (isNeeded(plan.name))
       columns.set(plan.name, decodeColumn(plan, bytes.subarray(at, at + plan.bytes), samples));
     at += plan.bytes;
   }

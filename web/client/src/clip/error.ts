@@ -1,4 +1,4 @@
-/** What was asked for is not a clip that this viewer can draw; the message is shown to the reader as it is. */
+/** The clip cannot be loaded or drawn. The message is shown to the visitor. */
 export class ClipError extends Error {
   override readonly name = "ClipError";
 }

@@ -7,7 +7,7 @@ export type Contest = "hit" | "defend" | "prepare" | "game";
 export type Touched = "rim" | "mallet" | "opponent_mallet";
 export type Group = "ee" | "link" | "joint_pos" | "joint_vel";
 
-/** A contact of the puck; `t` in seconds from sample 0 of the episode or game, place in the table frame. */
+/** A contact of the puck; `t` in seconds from sample 0 of the episode or game, x and y in the table frame. */
 export interface Contact {
   readonly t: number;
   readonly what: Touched;
@@ -15,7 +15,7 @@ export interface Contact {
   readonly y: number;
 }
 
-/** A constraint was broken at samples `from` to `to`, inclusive. */
+/** A violation of a constraint at samples `from` to `to`, inclusive. */
 export interface Violation {
   readonly side: 0 | 1;
   readonly group: Group;
@@ -25,7 +25,7 @@ export interface Violation {
   readonly worst: number;
 }
 
-/** A rally of a game was over at `sample`; the next one starts at the sample after it. */
+/** The end of a rally at `sample`; the next rally starts at the following sample. */
 export interface Break {
   readonly sample: number;
   readonly what: string;
@@ -33,7 +33,7 @@ export interface Break {
   readonly score: readonly [number, number] | null;
 }
 
-/** How it ended. */
+/** The end of the episode or game. */
 export interface End {
   readonly end: string;
   readonly success: boolean | null;
@@ -41,14 +41,14 @@ export interface End {
   readonly steps: number;
 }
 
-/** One arm's joints by sample, rad and rad/s; `dq` and `universal` where they were written. */
+/** Joints of an arm by sample, rad and rad/s; `dq` and `universal` are null if not recorded. */
 export interface ArmMotion {
   readonly q: readonly Float64Array[];
   readonly dq: readonly Float64Array[] | null;
   readonly universal: readonly [Float64Array, Float64Array] | null;
 }
 
-/** What moved: every array is indexed by sample − `first`. */
+/** Recorded motion; all arrays are indexed by sample − `first`. */
 export interface Motion {
   readonly contest: Contest;
   readonly episode: number | null;
@@ -62,15 +62,15 @@ export interface Motion {
     readonly vx: Float64Array | null;
     readonly vy: Float64Array | null;
   };
-  /** Robot 1 (own side, side A), and the opponent where there is one. */
+  /** Robot 1 (side A), and the opponent if there is one. */
   readonly arms: readonly ArmMotion[];
   readonly contacts: readonly Contact[];
   readonly violations: readonly Violation[];
   readonly breaks: readonly Break[];
-  /** How a game stood at the clip's first sample, where that was written. */
+  /** Score at the first sample of a game clip, if recorded. */
   readonly score: readonly [number, number] | null;
   readonly end: End | null;
-  /** Everything that was read, in its order, for the data as a table. */
+  /** All decoded columns in order, for the data table. */
   readonly columns: readonly Column[];
 }
 
@@ -79,13 +79,13 @@ const KNOWN = /^(puck_(x|y|yaw|vx|vy)|(opponent_)?(q|dq)_[1-7]|(opponent_)?unive
 export function decodeMotion(bytes: Uint8Array): Motion {
   const container = openContainer(bytes, (name) => KNOWN.test(name));
   if (container.kind !== "motion") {
-    throw new ClipError(`a clip of kind "motion" was expected, this one is of kind "${container.kind}"`);
+    throw new ClipError(`expected a clip of kind "motion", got "${container.kind}"`);
   }
   const x = valuesOf(container, "puck_x");
   const y = valuesOf(container, "puck_y");
   const own = armOf(container, "");
   if (x === null || y === null || own === null) {
-    throw new ClipError("the clip lacks the puck's place or the arm's joints: there is nothing to draw");
+    throw new ClipError("the clip has no puck position or no joints: there is nothing to draw");
   }
   const opponent = armOf(container, "opponent_");
   const { header } = container;
@@ -135,7 +135,7 @@ function valuesOf(container: Container, name: string): Float64Array | null {
   return container.columns.get(name)?.values ?? null;
 }
 
-/** All of `name_1` … `name_count`, or null: half an arm cannot be drawn. */
+/** The columns `name_1` to `name_count`; null if one is missing. */
 export function family(container: Container, name: string, count: number): Float64Array[] | null {
   const found: Float64Array[] = [];
   for (let i = 1; i <= count; i++) {

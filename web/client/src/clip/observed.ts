@@ -3,13 +3,13 @@ import type { Column } from "./column";
 import { openContainer } from "./container";
 import { family } from "./motion";
 
-/** Samples at which the camera had lost the puck, inclusive. */
+/** Samples without a camera observation of the puck, inclusive. */
 export interface Lost {
   readonly from: number;
   readonly to: number;
 }
 
-/** What the agent was told and what it commanded; every array is indexed by sample − `first`. */
+/** Observations and commands of the agent; all arrays are indexed by sample − `first`. */
 export interface Observed {
   readonly first: number;
   readonly samples: number;
@@ -19,7 +19,7 @@ export interface Observed {
   readonly command: readonly Float64Array[] | null;
   readonly computationTimeS: Float64Array | null;
   readonly hostTimeS: Float64Array | null;
-  /** Samples whose answer came late. */
+  /** Samples with a late answer. */
   readonly late: readonly number[];
   readonly lost: readonly Lost[];
   readonly columns: readonly Column[];
@@ -30,7 +30,7 @@ const KNOWN = /^(seen_(x|y|yaw)|command_[1-7]|computation_time|host_time)$/;
 export function decodeObserved(bytes: Uint8Array): Observed {
   const container = openContainer(bytes, (name) => KNOWN.test(name));
   if (container.kind !== "observed") {
-    throw new ClipError(`a clip of kind "observed" was expected, this one is of kind "${container.kind}"`);
+    throw new ClipError(`expected a clip of kind "observed", got "${container.kind}"`);
   }
   const { header, columns } = container;
   const most = Number.MAX_SAFE_INTEGER;

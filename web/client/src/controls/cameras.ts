@@ -1,6 +1,6 @@
 import { CAMERAS, type Camera } from "../replay/fragment";
 import { button, h } from "./dom";
-import { SIGNS } from "./signs";
+import { ICONS } from "./icons";
 
 const NAMES: Record<Camera, string> = {
   corner: "Corner",
@@ -9,15 +9,15 @@ const NAMES: Record<Camera, string> = {
   above: "Above",
 };
 
-export interface CameraWishes {
+export interface CameraActions {
   readonly preset: (camera: Camera) => void;
-  /** Shares of a small turn. */
+  /** In units of a small turn. */
   readonly orbit: (right: number, up: number) => void;
   readonly closer: (steps: number) => void;
   readonly flat: (flat: boolean) => void;
 }
 
-/** Which view, from where: what dragging does can be done by buttons. */
+/** Choice of view and camera. The buttons offer everything that dragging does. */
 export class Cameras {
   readonly element: HTMLElement;
   private readonly solid: HTMLButtonElement;
@@ -26,14 +26,14 @@ export class Cameras {
   private readonly orbit: HTMLElement;
   private readonly places: HTMLElement;
 
-  constructor(wishes: CameraWishes) {
-    this.solid = button("3-D", () => { wishes.flat(false); }); // prettier-ignore
-    this.flat = button("Flat", () => { wishes.flat(true); }); // prettier-ignore
+  constructor(actions: CameraActions) {
+    this.solid = button("3-D", () => { actions.flat(false); }); // prettier-ignore
+    this.flat = button("Flat", () => { actions.flat(true); }); // prettier-ignore
     for (const camera of CAMERAS) {
-      this.presets.set(camera, button(NAMES[camera], () => { wishes.preset(camera); })); // prettier-ignore
+      this.presets.set(camera, button(NAMES[camera], () => { actions.preset(camera); })); // prettier-ignore
     }
-    const turn = (name: string, right: number, up: number, sign: string): HTMLButtonElement =>
-      button(name, () => { wishes.orbit(right, up); }, sign); // prettier-ignore
+    const turn = (name: string, right: number, up: number, iconPath: string): HTMLButtonElement =>
+      button(name, () => { actions.orbit(right, up); }, iconPath); // prettier-ignore
     this.places = h(
       "span",
       { class: "joined", attributes: { role: "group", "aria-label": "Camera" } },
@@ -42,12 +42,12 @@ export class Cameras {
     this.orbit = h(
       "span",
       { class: "joined", attributes: { role: "group", "aria-label": "Turn the camera" } },
-      turn("Turn left", -1, 0, SIGNS.left),
-      turn("Turn right", 1, 0, SIGNS.right),
-      turn("Higher", 0, 1, SIGNS.up),
-      turn("Lower", 0, -1, SIGNS.down),
-      button("Closer", () => { wishes.closer(1); }, SIGNS.closer),
-      button("Farther", () => { wishes.closer(-1); }, SIGNS.farther),
+      turn("Turn left", -1, 0, ICONS.left),
+      turn("Turn right", 1, 0, ICONS.right),
+      turn("Turn up", 0, 1, ICONS.up),
+      turn("Turn down", 0, -1, ICONS.down),
+      button("Zoom in", () => { actions.closer(1); }, ICONS.closer),
+      button("Zoom out", () => { actions.closer(-1); }, ICONS.farther),
     ); // prettier-ignore
     this.element = h(
       "div",
@@ -63,7 +63,7 @@ export class Cameras {
     );
   }
 
-  /** `camera` null: turned by hand. */
+  /** `camera`: null if turned manually. */
   update(flat: boolean, camera: Camera | null, solidPossible: boolean): void {
     press(this.solid, !flat);
     press(this.flat, flat);

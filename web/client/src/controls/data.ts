@@ -1,12 +1,12 @@
 import { columnName, columnsOf, csvOf } from "../replay/csv";
 import type { Part } from "../replay/source";
 import { button, h } from "./dom";
-import { fixed } from "./words";
+import { fixed } from "./format";
 
 /** Samples before and after the cursor. */
 const AROUND = 5;
 
-/** The samples around the cursor as a table, and all of them as a file. */
+/** A table of samples around the cursor, and a download of all samples. */
 export class DataTable {
   readonly element: HTMLDetailsElement;
   private readonly head = h("tr");
@@ -17,7 +17,7 @@ export class DataTable {
   private step = -1;
 
   constructor(private readonly title: string) {
-    const save = button("Save all as CSV", () => {
+    const save = button("Download all as CSV", () => {
       if (this.part !== null)
         saveFile(
           new Blob([csvOf(this.part)], { type: "text/csv" }),
@@ -75,9 +75,9 @@ export class DataTable {
     const columns = columnsOf(part);
     this.cells.forEach((cells, row) => {
       const k = this.step - first + row - AROUND;
-      const there = k >= 0 && k < samples;
-      this.rows[row].hidden = !there;
-      if (!there) return;
+      const exists = k >= 0 && k < samples;
+      this.rows[row].hidden = !exists;
+      if (!exists) return;
       if (row === AROUND) this.rows[row].setAttribute("aria-current", "step");
       cells[0].textContent = String(first + k);
       cells[1].textContent = fixed((first + k) * stepS, 2);
@@ -90,18 +90,18 @@ export class DataTable {
 }
 
 export function fileName(title: string, part: Part): string {
-  const words = title
+  const slug = title
     .toLowerCase()
     .replaceAll(/[^a-z0-9]+/g, "-")
     .replaceAll(/^-|-$/g, "");
-  return `${words || "replay"}-${part.motion.first}`;
+  return `${slug || "replay"}-${part.motion.first}`;
 }
 
 export function saveFile(content: Blob, name: string): void {
   const address = URL.createObjectURL(content);
   const link = h("a", { attributes: { href: address, download: name } });
   link.click();
-  // The browser has taken it by the next turn of the event loop, or a little later.
+  // The browser reads the blob asynchronously, within a few seconds at most.
   setTimeout(() => {
     URL.revokeObjectURL(address);
   }, 10_000);

@@ -6,7 +6,7 @@ interface Properties {
   readonly on?: Readonly<Record<string, (event: Event) => void>>;
 }
 
-/** An element with its children; text goes in as text, never as markup. */
+/** Creates an element with children; strings are inserted as text, never as markup. */
 export function h<K extends keyof HTMLElementTagNameMap>(
   tag: K,
   properties: Properties = {},
@@ -23,7 +23,7 @@ export function h<K extends keyof HTMLElementTagNameMap>(
 
 const SVG = "http://www.w3.org/2000/svg";
 
-/** A sign of 16 by 16 from one path, beside or instead of a word that the control has in any case. */
+/** An icon of 16 × 16 from one path. The control has an accessible name in any case. */
 export function icon(path: string): SVGSVGElement {
   const svg = document.createElementNS(SVG, "svg");
   svg.setAttribute("viewBox", "0 0 16 16");
@@ -34,13 +34,13 @@ export function icon(path: string): SVGSVGElement {
   return svg;
 }
 
-/** A button named by `name`; with a sign it shows that instead, and the name as its tip. */
-export function button(name: string, pressed: () => void, sign?: string): HTMLButtonElement {
+/** A button with the accessible name `name`. With an icon, the name is shown as tooltip only. */
+export function button(name: string, pressed: () => void, iconPath?: string): HTMLButtonElement {
   const element = h("button", { attributes: { type: "button" }, on: { click: pressed } });
-  if (sign === undefined) {
+  if (iconPath === undefined) {
     element.append(name);
   } else {
-    element.append(icon(sign));
+    element.append(icon(iconPath));
     element.classList.add("sign");
     rename(element, name);
   }
@@ -52,7 +52,7 @@ export function rename(element: HTMLElement, name: string): void {
   element.title = name;
 }
 
-/** Writes only what differs: a text that is set anew is laid out anew. */
-export function say(element: HTMLElement, text: string): void {
+/** Sets the text if it differs; setting an equal text would cause a new layout. */
+export function setText(element: HTMLElement, text: string): void {
   if (element.textContent !== text) element.textContent = text;
 }

@@ -1,8 +1,8 @@
 import type { ReplayEvent } from "../replay/events";
 import { h } from "./dom";
-import { seconds } from "./words";
+import { seconds } from "./format";
 
-/** All events as buttons that lead to them. */
+/** List of events; each is a button that seeks to it. */
 export class EventList {
   readonly element: HTMLDetailsElement;
   private readonly list = h("ol");
@@ -31,16 +31,16 @@ export class EventList {
           },
         },
         h("span", { class: "when" }, seconds(event.position, stepS)),
-        h("span", { class: `mark-sign ${event.kind}`, attributes: { "aria-hidden": "true" } }, event.sign),
+        h("span", { class: `mark-sign ${event.kind}`, attributes: { "aria-hidden": "true" } }, event.symbol),
         h("span", {}, event.text),
       ),
     );
     this.list.replaceChildren(...this.buttons.map((button) => h("li", {}, button)));
   }
 
-  /** Marks the latest event at a position. */
+  /** Marks the last event at or before a position. */
   update(position: number): void {
-    // From where it was: it seldom moves by more than one.
+    // Search from the current event, which usually moves by one at most.
     let current = this.current;
     while (current >= 0 && this.events[current].position > position + 1e-6) current--;
     while (current + 1 < this.events.length && this.events[current + 1].position <= position + 1e-6)

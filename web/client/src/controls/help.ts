@@ -12,7 +12,7 @@ const KEYS: readonly [keys: string, what: string][] = [
   ["?", "this help"],
 ];
 
-/** What the keys do, and what is drawn. */
+/** Dialog with the keyboard shortcuts. */
 export function helpDialog(): HTMLDialogElement {
   const rows = KEYS.map(([keys, what]) => h("div", {}, h("dt", {}, h("kbd", {}, keys)), h("dd", {}, what)));
   const close = button("Close", () => {
@@ -22,16 +22,12 @@ export function helpDialog(): HTMLDialogElement {
     "dialog",
     { class: "help", attributes: { "aria-label": "Keys of the replay" } },
     h("h2", {}, "Keys"),
-    h(
-      "p",
-      {},
-      "They work while the focus is in the replay: click the picture, or reach it with the tab key.",
-    ),
+    h("p", {}, "Click the picture (or tab to it) first."),
     h("dl", {}, ...rows),
     h(
       "p",
       {},
-      "Drag the picture to turn the camera; Ctrl and the wheel go closer. Click or drag in a strip to go to that time.",
+      "Drag the picture to turn the camera; use Ctrl and the mouse wheel to zoom. Click or drag in a chart to go to that time.",
     ),
     close,
   );

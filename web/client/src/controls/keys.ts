@@ -1,6 +1,6 @@
 import { CAMERAS, type Camera } from "../replay/fragment";
 
-export interface KeyWishes {
+export interface KeyActions {
   readonly toggle: () => void;
   readonly step: (by: number) => void;
   readonly event: (direction: 1 | -1) => void;
@@ -10,22 +10,22 @@ export interface KeyWishes {
 }
 
 /**
- * What a key means. `on`: what has the focus. Keys that a control needs for itself are left to it: a slider its
- * arrows, a button its space bar, a field of text everything.
+ * The action of a key; null without one. `on`: the focused control. Keys that the control itself needs are left to it:
+ * arrows of a slider, space of a button, all keys of a text field.
  */
-export function wishOf(
+export function actionFor(
   key: string,
   shift: boolean,
   on: "picture" | "slider" | "button" | "other",
-  wishes: KeyWishes,
+  actions: KeyActions,
 ): (() => void) | null {
   if (on === "other") return null;
   const camera = CAMERAS[Number(key) - 1] as Camera | undefined;
-  if (camera !== undefined) return () => { wishes.camera(camera); }; // prettier-ignore
-  const steps = (by: number): (() => void) => () => { wishes.step(by); }; // prettier-ignore
+  if (camera !== undefined) return () => { actions.camera(camera); }; // prettier-ignore
+  const steps = (by: number): (() => void) => () => { actions.step(by); }; // prettier-ignore
   switch (key) {
     case " ":
-      return on === "button" ? null : wishes.toggle;
+      return on === "button" ? null : actions.toggle;
     case "ArrowLeft":
     case "ArrowRight": {
       const by = key === "ArrowLeft" ? -1 : 1;
@@ -40,26 +40,26 @@ export function wishOf(
     case ".":
       return steps(1);
     case "n":
-      return () => { wishes.event(1); }; // prettier-ignore
+      return () => { actions.event(1); }; // prettier-ignore
     case "p":
-      return () => { wishes.event(-1); }; // prettier-ignore
+      return () => { actions.event(-1); }; // prettier-ignore
     case "f":
-      return wishes.flat;
+      return actions.flat;
     case "?":
-      return wishes.help;
+      return actions.help;
     default:
       return null;
   }
 }
 
-/** Listens inside of a viewer only: elsewhere on the page the keys are the browser's. */
-export function listenForKeys(element: HTMLElement, wishes: KeyWishes): void {
+/** Listens inside the viewer only: elsewhere on the page the keys belong to the browser. */
+export function listenForKeys(element: HTMLElement, actions: KeyActions): void {
   element.addEventListener("keydown", (event) => {
     if (event.ctrlKey || event.metaKey || event.altKey || event.defaultPrevented) return;
-    const wish = wishOf(event.key, event.shiftKey, focusOf(event.target), wishes);
-    if (wish === null) return;
+    const action = actionFor(event.key, event.shiftKey, focusOf(event.target), actions);
+    if (action === null) return;
     event.preventDefault();
-    wish();
+    action();
   });
 }
 

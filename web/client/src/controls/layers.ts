@@ -1,10 +1,10 @@
-import type { Layers } from "../replay/shown";
+import type { Layers } from "../replay/frame-state";
 import { h } from "./dom";
 
 interface Choice {
   readonly layer: Exclude<keyof Layers, "whole">;
   readonly name: string;
-  /** A short line drawn as the picture draws it. */
+  /** CSS class of a line sample in the style of the picture. */
   readonly sample: string;
 }
 
@@ -15,7 +15,7 @@ const CHOICES: readonly Choice[] = [
   { layer: "seen", name: "Observed puck", sample: "seen" },
 ];
 
-/** What is drawn beside table, puck and arms. */
+/** Choice of drawn paths. */
 export class LayerChoice {
   readonly element: HTMLElement;
   private readonly rows = new Map<keyof Layers, HTMLElement>();
@@ -32,7 +32,7 @@ export class LayerChoice {
       this.rows.set(layer, row);
       return row;
     });
-    const span = h("select", {}, h("option", {}, "last second"), h("option", {}, "whole"));
+    const span = h("select", {}, h("option", {}, "last second"), h("option", {}, "everything"));
     span.selectedIndex = layers.whole ? 1 : 0;
     span.addEventListener("change", () => {
       layers.whole = span.selectedIndex === 1;
@@ -40,13 +40,13 @@ export class LayerChoice {
     });
     this.element = h(
       "div",
-      { class: "row layers", attributes: { role: "group", "aria-label": "Drawn" } },
+      { class: "row layers", attributes: { role: "group", "aria-label": "Paths" } },
       ...boxes,
-      h("label", {}, "Paths of the ", span),
+      h("label", {}, "Trail: ", span),
     );
   }
 
-  /** Choices that have nothing to show are not offered. */
+  /** Hides choices without data. */
   update(has: { seen: boolean; commanded: boolean }): void {
     const seen = this.rows.get("seen");
     const commanded = this.rows.get("commanded");

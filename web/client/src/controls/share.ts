@@ -1,44 +1,44 @@
 import { button, h } from "./dom";
-import { SIGNS } from "./signs";
+import { ICONS } from "./icons";
 
-interface Wishes {
-  /** The address of what is on show. */
+interface Actions {
+  /** Address of the current moment and view. */
   readonly link: () => string;
   readonly save: () => void;
   readonly help: () => void;
   readonly announce: (text: string) => void;
 }
 
-/** A link to here, the picture as a file, the whole screen, help. `full`: what fills the screen. */
-export function shareRow(full: HTMLElement, wishes: Wishes): HTMLElement {
+/** Buttons for link, picture, full screen and help. `full`: element shown in full screen. */
+export function shareRow(full: HTMLElement, actions: Actions): HTMLElement {
   const address = h("input", {
     class: "address",
-    attributes: { readonly: "", "aria-label": "Link to here", hidden: "" },
+    attributes: { readonly: "", "aria-label": "Link to this moment", hidden: "" },
   });
-  const copy = button("Copy link here", () => {
-    const link = wishes.link();
+  const copy = button("Copy link to this moment", () => {
+    const link = actions.link();
     copied(link).then(
       () => {
-        wishes.announce("Link copied");
+        actions.announce("Link copied");
         flash(copy, "Link copied");
       },
       () => {
-        // Where the clipboard is not to be had, the reader copies by hand.
+        // Without access to the clipboard the visitor copies the link manually.
         address.hidden = false;
         address.value = link;
         address.select();
-        wishes.announce("The link is in the field beside the button");
+        actions.announce("Copy the link from the field beside the button");
       },
     );
   });
-  const row = h("div", { class: "row share" }, copy, address, button("Save picture", wishes.save));
+  const row = h("div", { class: "row share" }, copy, address, button("Save picture", actions.save));
   if (document.fullscreenEnabled) {
-    const screen = button("Whole screen", () => {
+    const screen = button("Full screen", () => {
       void (document.fullscreenElement === null ? full.requestFullscreen() : document.exitFullscreen());
-    }, SIGNS.full); // prettier-ignore
+    }, ICONS.full); // prettier-ignore
     row.append(screen);
   }
-  const help = button("?", wishes.help);
+  const help = button("?", actions.help);
   help.setAttribute("aria-label", "Keys");
   help.title = "Keys";
   help.classList.add("sign");
@@ -47,7 +47,7 @@ export function shareRow(full: HTMLElement, wishes: Wishes): HTMLElement {
 }
 
 async function copied(text: string): Promise<void> {
-  // Absent outside of secure contexts, whatever the types say.
+  // Undefined outside secure contexts, contrary to its type.
   const clipboard = navigator.clipboard as Clipboard | undefined;
   if (clipboard === undefined) throw new Error("no clipboard");
   await clipboard.writeText(text);

@@ -1,12 +1,12 @@
 import type { Clock } from "../replay/clock";
 import type { ReplayEvent } from "../replay/events";
-import { h, say } from "./dom";
-import { seconds, stepWords } from "./words";
+import { h, setText } from "./dom";
+import { seconds, stepText } from "./format";
 
-/** More marks than this stand so close that they say nothing; the list has them all. */
-const MOST_MARKS = 300;
+/** Largest number of marks; more would overlap. The list has all events. */
+const MAX_MARKS = 300;
 
-/** The slider, and above it a mark for each event. */
+/** The slider with a mark per event above it. */
 export class Timeline {
   readonly element: HTMLElement;
   private readonly slider = h("input", {
@@ -15,7 +15,7 @@ export class Timeline {
   });
   private readonly marks = h("div", {
     class: "marks",
-    attributes: { role: "group", "aria-label": "Events on the time line" },
+    attributes: { role: "group", "aria-label": "Events on the timeline" },
   });
   private readonly tip = h("span", { class: "tip", attributes: { hidden: "" } });
   private events: readonly ReplayEvent[] = [];
@@ -33,7 +33,7 @@ export class Timeline {
       clock.pause();
       clock.seek(Number(this.slider.value));
     });
-    // Arrow keys go from mark to mark, so that all of them take one stop of the tab key.
+    // Arrow keys move between marks, so that all marks are a single tab stop.
     this.marks.addEventListener("keydown", (event) => {
       const by = event.key === "ArrowRight" ? 1 : event.key === "ArrowLeft" ? -1 : 0;
       const from = this.buttons.findIndex((mark) => mark === document.activeElement);
@@ -57,7 +57,7 @@ export class Timeline {
     if (step !== this.step) {
       this.step = step;
       this.slider.value = String(step);
-      this.slider.setAttribute("aria-valuetext", stepWords(step, last, stepS));
+      this.slider.setAttribute("aria-valuetext", stepText(step, last, stepS));
     }
   }
 
@@ -72,30 +72,30 @@ export class Timeline {
       `${(100 * Math.min(Math.max(position / this.last, 0), 1)).toFixed(3)}%`;
     const spans: HTMLElement[] = [];
     this.buttons = [];
-    for (const event of this.events.slice(0, MOST_MARKS)) {
+    for (const event of this.events.slice(0, MAX_MARKS)) {
       if (event.until > event.position) {
         const span = h("span", { class: `span ${event.kind}` });
         span.style.left = share(event.position);
         span.style.width = share(event.until - event.position);
         spans.push(span);
       }
-      const words = `${seconds(event.position, stepS)}: ${event.text}`;
+      const label = `${seconds(event.position, stepS)}: ${event.text}`;
       const mark = h(
         "button",
         {
           class: `mark ${event.kind}`,
-          attributes: { type: "button", tabindex: this.buttons.length === 0 ? "0" : "-1", "aria-label": words },
+          attributes: { type: "button", tabindex: this.buttons.length === 0 ? "0" : "-1", "aria-label": label },
           on: {
             click: () => {
               this.go(event);
             },
-            pointerenter: () => { this.tell(words, event.position); },
-            focus: () => { this.tell(words, event.position); },
+            pointerenter: () => { this.showTip(label, event.position); },
+            focus: () => { this.showTip(label, event.position); },
             pointerleave: () => { this.tip.hidden = true; },
             blur: () => { this.tip.hidden = true; },
           },
         },
-        event.sign,
+        event.symbol,
       ); // prettier-ignore
       mark.style.left = share(event.position);
       this.buttons.push(mark);
@@ -104,9 +104,9 @@ export class Timeline {
     this.marks.hidden = this.buttons.length === 0;
   }
 
-  /** The tip stands over its mark and stays inside of the picture's width. */
-  private tell(words: string, position: number): void {
-    say(this.tip, words);
+  /** Shows the tip above its mark, inside the width of the picture. */
+  private showTip(label: string, position: number): void {
+    setText(this.tip, label);
     this.tip.hidden = false;
     const width = this.marks.clientWidth;
     const half = this.tip.offsetWidth / 2;

@@ -1,18 +1,18 @@
 import { SPEEDS, type Clock } from "../replay/clock";
-import { button, h, rename, say } from "./dom";
-import { SIGNS } from "./signs";
-import { seconds } from "./words";
+import { button, h, rename, setText } from "./dom";
+import { ICONS } from "./icons";
+import { seconds } from "./format";
 
-interface Wishes {
+interface Actions {
   readonly event: (direction: 1 | -1) => void;
 }
 
-/** Play and pause, steps, events, speed. */
+/** Controls for playback, steps, events and speed. */
 export class Transport {
   readonly element: HTMLElement;
   private readonly play: HTMLButtonElement;
-  private readonly pauseSign: Element;
-  private readonly playSign: Element;
+  private readonly pauseIcon: Element;
+  private readonly playIcon: Element;
   private readonly speed: HTMLSelectElement;
   private readonly time = h("span", { class: "time" });
   private readonly step = h("span", { class: "step" });
@@ -20,12 +20,12 @@ export class Transport {
 
   constructor(
     private readonly clock: Clock,
-    wishes: Wishes,
+    actions: Actions,
   ) {
-    this.play = button("Play", () => { clock.toggle(); }, SIGNS.play); // prettier-ignore
+    this.play = button("Play", () => { clock.toggle(); }, ICONS.play); // prettier-ignore
     this.play.classList.add("main");
-    this.playSign = this.play.children[0];
-    this.pauseSign = button("Pause", () => undefined, SIGNS.pause).children[0];
+    this.playIcon = this.play.children[0];
+    this.pauseIcon = button("Pause", () => undefined, ICONS.pause).children[0];
     this.speed = h("select", {
       on: {
         change: () => {
@@ -36,20 +36,20 @@ export class Transport {
     for (const value of SPEEDS) {
       this.speed.append(h("option", { attributes: { value: String(value) } }, `${value} ×`));
     }
-    const by = (name: string, steps: number, sign: string): HTMLButtonElement =>
-      button(name, () => { clock.step(steps); }, sign); // prettier-ignore
+    const by = (name: string, steps: number, iconPath: string): HTMLButtonElement =>
+      button(name, () => { clock.step(steps); }, iconPath); // prettier-ignore
     this.element = h(
       "div",
-      { class: "row transport", attributes: { role: "group", "aria-label": "Playing" } },
-      by("To the start", -Infinity, SIGNS.start),
-      by("One step back", -1, SIGNS.back),
+      { class: "row transport", attributes: { role: "group", "aria-label": "Playback" } },
+      by("To the start", -Infinity, ICONS.start),
+      by("One step back", -1, ICONS.back),
       this.play,
-      by("One step forward", 1, SIGNS.forward),
-      by("To the end", Infinity, SIGNS.end),
+      by("One step forward", 1, ICONS.forward),
+      by("To the end", Infinity, ICONS.end),
       h("span", { class: "clock" }, this.time, this.step),
       h("span", { class: "pair" },
-        button("Previous event", () => { wishes.event(-1); }),
-        button("Next event", () => { wishes.event(1); }),
+        button("Previous event", () => { actions.event(-1); }),
+        button("Next event", () => { actions.event(1); }),
       ),
       h("label", { class: "speed" }, "Speed ", this.speed),
     ); // prettier-ignore
@@ -59,12 +59,12 @@ export class Transport {
     const { playing, speed } = this.clock;
     if (playing !== this.playing) {
       this.playing = playing;
-      this.play.replaceChildren(playing ? this.pauseSign : this.playSign);
+      this.play.replaceChildren(playing ? this.pauseIcon : this.playIcon);
       rename(this.play, playing ? "Pause" : "Play");
     }
     const value = String(speed);
     if (this.speed.value !== value) this.speed.value = value;
-    say(this.time, seconds(step, stepS));
-    say(this.step, `step ${step} of ${last}`);
+    setText(this.time, seconds(step, stepS));
+    setText(this.step, `step ${step} of ${last}`);
   }
 }

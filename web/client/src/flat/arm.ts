@@ -2,7 +2,7 @@ import type { Kinematics } from "../model/kinematics";
 import { MODEL } from "../model/model";
 import type { Projection } from "./projection";
 
-// Thickness of the drawing, m: about that of the arm; it touches nothing.
+// Line widths, m: about the thickness of the arm. They have no effect on contacts.
 const LINK_WIDTH = 0.13;
 const ROD_WIDTH = 0.025;
 
@@ -12,7 +12,7 @@ export interface ArmColours {
   readonly outline: string;
 }
 
-/** The arm from above, see-through, as it covers what it plays with; the mallet to scale. */
+/** Draws the arm from above, semi-transparent because it covers puck and table. */
 export function drawArm(
   context: CanvasRenderingContext2D,
   at: Projection,

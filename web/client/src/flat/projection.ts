@@ -1,6 +1,6 @@
 import { OUTER } from "../model/table";
 
-/** Room around the table for its axes, CSS pixels. */
+/** Margins for the axes, CSS pixels. */
 const LEFT = 46;
 const BOTTOM = 40;
 const RIGHT = 14;

@@ -1,5 +1,5 @@
 import type { Contest } from "../clip/motion";
-import { fixed } from "../controls/words";
+import { fixed } from "../controls/format";
 import { MODEL } from "../model/model";
 import { OUTER, rimOutline, successRegion } from "../model/table";
 import type { Palette } from "../replay/palette";
@@ -11,7 +11,7 @@ const FONT = '12px system-ui, -apple-system, "Segoe UI", Roboto, "Noto Sans", "L
 const DASHES = [5, 4];
 const SOLID: number[] = [];
 
-/** Everything that stands still: drawn once per size and scheme, and copied under each frame. */
+/** Draws everything static. It is drawn once per size and colour scheme, then copied into each frame. */
 export function drawTable(
   context: CanvasRenderingContext2D,
   at: Projection,
@@ -90,7 +90,7 @@ function axes(context: CanvasRenderingContext2D, at: Projection, palette: Palett
   context.stroke();
   context.textAlign = "center";
   context.textBaseline = "top";
-  // On a narrow picture every second figure would touch its neighbour.
+  // On a narrow picture neighbouring labels would overlap: show every second one.
   const everyX = at.length(0.4) < 44 ? 2 : 1;
   const everyY = at.length(0.2) < 18 ? 2 : 1;
   TICKS_X.forEach((x, i) => {

@@ -2,7 +2,7 @@ import type { Contest } from "../clip/motion";
 import { MODEL } from "../model/model";
 import { between, type Path } from "../motion/paths";
 import type { Palette } from "../replay/palette";
-import { trail, type Shown, type View } from "../replay/shown";
+import { trail, type FrameState, type View } from "../replay/frame-state";
 import { drawArm, drawMallet, type ArmColours } from "./arm";
 import { Projection } from "./projection";
 import { drawTable } from "./table";
@@ -24,7 +24,7 @@ export class FlatView implements View {
 
   constructor() {
     const context = this.canvas.getContext("2d");
-    if (context === null) throw new Error("this browser draws no pictures");
+    if (context === null) throw new Error("this browser has no 2-D canvas");
     this.context = context;
   }
 
@@ -47,30 +47,30 @@ export class FlatView implements View {
     this.drawnFor = null;
   }
 
-  draw(shown: Shown): number {
+  draw(frame: FrameState): number {
     const { context, at, palette, arms } = this;
     if (palette === null || arms === null) return 0;
-    const { motion, paths, observed } = shown.part;
+    const { motion, paths, observed } = frame.part;
     this.still(palette, motion.contest);
     context.setTransform(1, 0, 0, 1, 0, 0);
     context.drawImage(this.under, 0, 0);
     context.setTransform(this.ratio, 0, 0, this.ratio, 0, 0);
 
-    for (let i = 0; i < motion.arms.length; i++) drawArm(context, at, shown.arms[i], arms[i]);
-    const [from, to] = trail(shown);
-    if (shown.layers.puck) {
+    for (let i = 0; i < motion.arms.length; i++) drawArm(context, at, frame.arms[i], arms[i]);
+    const [from, to] = trail(frame);
+    if (frame.layers.puck) {
       this.line(paths.puck, from, to, palette["rp-trail"], SOLID);
-      this.contacts(shown, from, to, palette);
+      this.contacts(frame, from, to, palette);
     }
-    for (let i = 0; i < motion.arms.length; i++) drawMallet(context, at, shown.arms[i], arms[i]);
-    if (shown.layers.real) {
+    for (let i = 0; i < motion.arms.length; i++) drawMallet(context, at, frame.arms[i], arms[i]);
+    if (frame.layers.real) {
       for (const path of paths.real) this.line(path, from, to, palette.ink, SOLID);
     }
-    if (shown.layers.commanded && paths.commanded !== null) {
+    if (frame.layers.commanded && paths.commanded !== null) {
       this.line(paths.commanded, from, to, palette["rp-commanded"], COMMANDED);
     }
-    this.puck(shown, palette);
-    if (observed !== null && shown.layers.seen) this.seen(shown, palette);
+    this.puck(frame, palette);
+    if (observed !== null && frame.layers.seen) this.seen(frame, palette);
     return 0;
   }
 
@@ -102,9 +102,9 @@ export class FlatView implements View {
     context.setLineDash(SOLID);
   }
 
-  private contacts(shown: Shown, from: number, to: number, palette: Palette): void {
+  private contacts(frame: FrameState, from: number, to: number, palette: Palette): void {
     const { context, at } = this;
-    const { contacts, stepS } = shown.part.motion;
+    const { contacts, stepS } = frame.part.motion;
     context.strokeStyle = palette["rp-trail"];
     context.lineWidth = 1;
     context.beginPath();
@@ -119,15 +119,15 @@ export class FlatView implements View {
     context.stroke();
   }
 
-  private puck(shown: Shown, palette: Palette): void {
+  private puck(frame: FrameState, palette: Palette): void {
     const { context, at } = this;
-    const { x, y, yaw } = shown.pose;
+    const { x, y, yaw } = frame.pose;
     const radius = at.length(MODEL.puck.radius_m);
     context.fillStyle = palette["rp-puck"];
     context.beginPath();
     context.arc(at.x(x), at.y(y), radius, 0, 2 * Math.PI);
     context.fill();
-    // Which way it is turned.
+    // The line shows the orientation.
     context.strokeStyle = palette["rp-table"];
     context.lineWidth = Math.max(radius * 0.18, 1);
     context.beginPath();
@@ -136,11 +136,11 @@ export class FlatView implements View {
     context.stroke();
   }
 
-  private seen(shown: Shown, palette: Palette): void {
-    if (Number.isNaN(shown.seenX)) return;
+  private seen(frame: FrameState, palette: Palette): void {
+    if (Number.isNaN(frame.seenX)) return;
     const { context, at } = this;
-    const x = at.x(shown.seenX);
-    const y = at.y(shown.seenY);
+    const x = at.x(frame.seenX);
+    const y = at.y(frame.seenY);
     const radius = at.length(MODEL.puck.radius_m);
     context.strokeStyle = palette["rp-seen"];
     context.lineWidth = 2;
@@ -149,7 +149,7 @@ export class FlatView implements View {
     context.arc(x, y, radius, 0, 2 * Math.PI);
     context.stroke();
     context.setLineDash(SOLID);
-    if (!shown.lost) return;
+    if (!frame.lost) return;
     context.beginPath();
     context.moveTo(x - radius, y - radius);
     context.lineTo(x + radius, y + radius);

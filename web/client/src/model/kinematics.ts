@@ -10,22 +10,22 @@ const LINK_FRAMES: readonly Frame[] = MODEL.links.map((link) =>
   fixed(link.orientation_wxyz, link.position_m),
 );
 
-/** A mallet that hangs straight down, as the universal joint's controller keeps it. */
+/** Orientation of a mallet that hangs straight down, the target of the universal joint's controller. */
 const DOWNWARDS = [1, 0, 0, 0, -1, 0, 0, 0, -1];
 
-/** Angles of a universal joint that nobody wrote down: the mallet is taken to hang straight down. */
-export const UNWRITTEN: Angles = [NaN, NaN];
+/** Angles of a universal joint that was not recorded: the mallet is assumed to hang straight down. */
+export const UNRECORDED: Angles = [NaN, NaN];
 
 /**
- * Forward kinematics of one arm in the table frame. The frames belong to the instance and are written anew by
- * each `set`: a replay asks for them sixty times a second, and must not make garbage of them.
+ * Forward kinematics of one arm in the table frame. `set` overwrites the frames of the instance: a replay updates them 60
+ * times a second and must not allocate.
  */
 export class Kinematics {
-  /** Link frames 1 … 7, turned by their joints. */
+  /** Link frames 1 to 7, after the rotation of their joints. */
   readonly links: readonly Frame[] = Array.from({ length: JOINTS }, () => new Float64Array(12));
   /** The end effector ("striker joint link"), fixed on link 7. */
   readonly endEffector: Frame = new Float64Array(12);
-  /** The mallet, on the universal joint; its cylinder lies along its z. */
+  /** The mallet on the universal joint; the axis of its cylinder is z. */
   readonly mallet: Frame = new Float64Array(12);
   /** Centre of the mallet's cylinder. */
   readonly malletCentre = new Float64Array(3);
@@ -38,7 +38,7 @@ export class Kinematics {
     this.base = new Float64Array([cos, 0, 0, 0, cos, 0, 0, 0, 1, base.x_m, base.y_m, base.z_m]);
   }
 
-  set(q: Angles, universal: Angles = UNWRITTEN): void {
+  set(q: Angles, universal: Angles = UNRECORDED): void {
     let parent = this.base;
     for (let i = 0; i < JOINTS; i++) {
       compose(parent, LINK_FRAMES[i], this.links[i]);
@@ -59,7 +59,7 @@ export class Kinematics {
     along(this.mallet, MODEL.mallet.centre_z_m, this.malletCentre, 0);
   }
 
-  /** A height of the table frame in the robot's base frame, in which the constraints are written. */
+  /** Converts a height from the table frame to the base frame of the robot, which the constraints use. */
   heightAboveBase(z: number): number {
     return z - this.base[11];
   }

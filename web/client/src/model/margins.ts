@@ -31,7 +31,7 @@ export function heightMargin(arm: Kinematics): number {
   return LIMITS.ee_height_tolerance_m - Math.abs(height - LIMITS.ee_height_m);
 }
 
-/** Distance of the end effector from the nearest edge of its part of the table, m: the own short side and both long ones. */
+/** Distance of the end effector from the nearest edge of its half of the table, m: the own short side and both long sides. */
 export function tableMargin(arm: Kinematics): number {
   const { half_length_m, half_width_m } = MODEL.table;
   const radius = MODEL.mallet.radius_m;
@@ -39,7 +39,7 @@ export function tableMargin(arm: Kinematics): number {
   return Math.min(forward + (half_length_m - radius), half_width_m - radius - Math.abs(arm.endEffector[10]));
 }
 
-/** Height of the lower of elbow (link 4) and wrist (link 7) above what is allowed, m. */
+/** Height of the lower one of elbow (link 4) and wrist (link 7) above the limit, m. */
 export function linkMargin(arm: Kinematics): number {
   return arm.heightAboveBase(Math.min(arm.links[3][11], arm.links[6][11])) - LIMITS.link_height_m;
 }

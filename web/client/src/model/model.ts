@@ -1,6 +1,6 @@
 import numbers from "./model.json";
 
-/** The robot and the table; every number stands in `model.json`, which a test of the simulator holds to its own. */
+/** Robot and table. All numbers are in `model.json`; a test of the simulator compares them with its own. */
 export const MODEL = numbers;
 
 export const JOINTS = 7;

@@ -9,12 +9,12 @@ export const OUTER = {
   y: MODEL.table.half_width_m + MODEL.table.rim_width_m,
 };
 
-/** As the reference's collision shapes approximate each rounding. */
+/** Number of chords per rounded corner, as in the collision shapes of the reference. */
 const CHORDS = 7;
 
 /**
- * Outline of the rim on the side of positive y, from above; the other one is its mirror image. The goal is open
- * behind its line, and its posts are rounded on both sides.
+ * Outline of the rim at positive y, from above; the other rim is its mirror image. The goal is open behind its line, and
+ * its posts are rounded on both sides.
  */
 export function rimOutline(): Point[] {
   const { half_length_m, half_width_m, goal_edge_from_m, goal_edge_to_m, goal_half_width_m, post_radius_m } =
@@ -36,7 +36,7 @@ export function rimOutline(): Point[] {
   }
 }
 
-/** Where the puck must be at the end for a success; a game has no such place. */
+/** Region in which the puck must end for a success; games have none. */
 export interface Region {
   readonly x_from_m: number;
   readonly x_to_m: number;

@@ -1,4 +1,4 @@
-/** Cubic through p0 with slope v0 and p1 with slope v1, `h` apart, at `tau` from the first. */
+/** Cubic from p0 with slope v0 to p1 with slope v1 over the interval `h`, evaluated at `tau`. */
 export function hermite(p0: number, v0: number, p1: number, v1: number, h: number, tau: number): number {
   const s = tau / h;
   const s2 = s * s;

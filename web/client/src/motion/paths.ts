@@ -9,20 +9,20 @@ export interface Path {
   readonly at: Float64Array;
   /** x, y, z one after the other, table frame. */
   readonly places: Float32Array;
-  /** 1 where no line leads from this point to the next one: a rally was over, or nothing was written. */
+  /** 1: no line from this point to the next one, because a rally ended or data is missing. */
   readonly gap: Uint8Array;
 }
 
-/** The lines that can be drawn of one part of a replay. */
+/** Lines of one part of a replay. */
 export interface Paths {
   readonly puck: Path;
-  /** End effector by the joints as they were, per arm. */
+  /** Actual path of the end effector, per arm. */
   readonly real: readonly Path[];
-  /** End effector by the commanded joints, where the viewer may see them. */
+  /** Commanded path of the end effector; null if the viewer may not see it. */
   readonly commanded: Path | null;
 }
 
-/** Points of the puck's line in each control step, beside its contacts. */
+/** Points of the path of the puck per control step, in addition to contacts. */
 const PUCK_POINTS = 4;
 const MALLET_POINTS = 4;
 const PUCK_Z = 0.002;
@@ -74,7 +74,7 @@ function puckPath(motion: Motion, interpolation: Interpolation): Path {
   return { at: Float64Array.from(at), places, gap };
 }
 
-/** In quarters of steps, so that the line ends where the mallet is while that moves from sample to sample. */
+/** Quarter steps, so that the line ends at the mallet also between samples. */
 function realPath(motion: Motion, interpolation: Interpolation, side: 0 | 1): Path {
   const count = (motion.samples - 1) * MALLET_POINTS + 1;
   const at = new Float64Array(count);
@@ -104,7 +104,7 @@ function commandedPath(observed: Observed, command: readonly Float64Array[]): Pa
     at[k] = first + k;
     for (let i = 0; i < JOINTS; i++) q[i] = command[i][k];
     if (Number.isNaN(q[0])) {
-      // Nothing was commanded for this sample: no line leads to it or from it.
+      // No command for this sample: no line to it or from it.
       gap[k] = 1;
       if (k > 0) gap[k - 1] = 1;
       continue;

@@ -2,13 +2,13 @@ import type { Contact, Motion } from "../clip/motion";
 import { JOINTS } from "../model/model";
 import { arriving, hermite, leaving } from "./hermite";
 
-/** One arm's joints at an instant. */
+/** Joints of an arm at an instant. */
 export interface ArmPose {
   readonly q: Float64Array;
   readonly universal: Float64Array;
 }
 
-/** Everything drawn at an instant; one instance is written again and again. */
+/** Everything drawn at an instant; one instance is reused for all frames. */
 export interface Pose {
   x: number;
   y: number;
@@ -22,11 +22,11 @@ export function newPose(): Pose {
 }
 
 /**
- * Motion between samples. Puck and joints follow cubics by their velocities; where the puck touched something it
- * passes through the recorded place of the contact instead, and where a rally ended nothing moves on to the next.
+ * Interpolates between samples. Puck and joints follow cubics through their velocities. The puck passes through recorded
+ * contacts. Everything is held at the end of a rally.
  */
 export class Interpolation {
-  /** By interval (sample − first): index of its first contact in `contacts`, −1 for none. */
+  /** By interval (sample − first): index of the first contact in `contacts`, −1 for none. */
   private readonly firstContact: Int32Array;
   private readonly held: Uint8Array;
 
@@ -45,7 +45,7 @@ export class Interpolation {
     }
   }
 
-  /** Writes the pose at `position`, in control steps from sample 0; held at the clip's ends outside of it. */
+  /** Writes the pose at `position`, in control steps from sample 0. Outside the clip the nearest end is used. */
   at(position: number, pose: Pose): void {
     const { motion } = this;
     const local = Math.min(Math.max(position - motion.first, 0), motion.samples - 1);
@@ -79,8 +79,8 @@ export class Interpolation {
   }
 
   /**
-   * Through the places of the interval's contacts. Velocities are known at the samples only: the piece before the
-   * first contact starts with its sample's, the piece after the last one ends with its own, those between are straight.
+   * Passes through the contacts of the interval. Velocities are known at samples only: the part before the first contact
+   * starts with the velocity of its sample, the part after the last contact ends with that of the next, others are straight.
    */
   private throughContacts(
     from: number,
@@ -139,7 +139,7 @@ export class Interpolation {
   }
 }
 
-/** The same turn by less than half a revolution. */
+/** The equivalent angle between −π and π. */
 function nearestTurn(angle: number): number {
   return angle - Math.round(angle / (2 * Math.PI)) * 2 * Math.PI;
 }

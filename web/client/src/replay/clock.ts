@@ -2,13 +2,13 @@
 export const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 4] as const;
 
 export interface Ticker {
-  /** Asks for `tick` before the next frame. */
+  /** Schedules `tick` before the next frame. */
   request(tick: (nowMs: number) => void): void;
 }
 
 /**
- * Where a replay is, in control steps from sample 0. One clock may drive several viewers: theirs run in step then.
- * It asks for frames only while it plays.
+ * Position of a replay, in control steps from sample 0. Viewers that share a clock are synchronised. The clock requests
+ * frames only while it plays.
  */
 export class Clock {
   private at = 0;
@@ -28,7 +28,7 @@ export class Clock {
     return this.at;
   }
 
-  /** The last step of the longest replay that runs by this clock. */
+  /** Last step of the longest replay of this clock. */
   get last(): number {
     return this.end;
   }
@@ -41,30 +41,30 @@ export class Clock {
     return this.rate;
   }
 
-  /** Calls `changed` whenever position, speed or playing did. */
+  /** Calls `changed` after each change of position, speed or playback. */
   listen(changed: () => void): void {
     this.listeners.add(changed);
   }
 
-  /** Time stands still while a gate says that there is nothing to show at a position. */
+  /** Time stops while a gate returns false because data for the position is missing. */
   gate(open: (position: number) => boolean): void {
     this.gates.add(open);
   }
 
-  /** Makes room for a replay of so many steps. */
+  /** Extends the clock to a replay with `last` as its last step. */
   cover(last: number): void {
     if (last > this.end) {
       this.end = last;
-      this.tell();
+      this.notify();
     }
   }
 
   seek(position: number): void {
     this.at = Math.min(Math.max(position, 0), this.end);
-    this.tell();
+    this.notify();
   }
 
-  /** To a whole step, `by` steps on; stops playing, as who goes by steps wants to look. */
+  /** Moves by whole steps and stops playback. */
   step(by: number): void {
     this.running = false;
     const whole = by > 0 ? Math.floor(this.at + 1e-6) : Math.ceil(this.at - 1e-6);
@@ -73,22 +73,22 @@ export class Clock {
 
   setSpeed(speed: number): void {
     this.rate = speed;
-    this.tell();
+    this.notify();
   }
 
   pause(): void {
     if (!this.running) return;
     this.running = false;
-    this.tell();
+    this.notify();
   }
 
-  /** Plays on, from the start if it is at the end. */
+  /** Starts playback; from the start if the clock is at the end. */
   play(): void {
     if (this.running || this.end === 0) return;
     if (this.at >= this.end) this.at = 0;
     this.running = true;
     this.before = null;
-    this.tell();
+    this.notify();
     this.ticker.request(this.tick);
   }
 
@@ -99,7 +99,7 @@ export class Clock {
 
   private readonly tick = (nowMs: number): void => {
     if (!this.running) return;
-    // A page that was hidden goes on where it was.
+    // After the page was hidden, playback continues at the same position.
     const passed = this.before === null ? 0 : Math.min(nowMs - this.before, 250);
     this.before = nowMs;
     const next = Math.min(this.at + ((passed / 1000) * this.rate) / this.stepS, this.end);
@@ -108,12 +108,12 @@ export class Clock {
     if (open) {
       this.at = next;
       if (next >= this.end) this.running = false;
-      this.tell();
+      this.notify();
     }
     if (this.running) this.ticker.request(this.tick);
   };
 
-  private tell(): void {
+  private notify(): void {
     for (const changed of this.listeners) changed();
   }
 }

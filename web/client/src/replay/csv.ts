@@ -1,18 +1,18 @@
 import type { Column } from "../clip/column";
 import type { Part } from "./source";
 
-/** Names of columns with their units, as they stand above the data: `puck_x_m`, `dq_1_rad_s`. */
+/** Column name with its unit: `puck_x_m`, `dq_1_rad_s`. */
 export function columnName(column: Column): string {
   const unit = column.unit.replaceAll(/[^a-z0-9]+/gi, "_");
   return unit === "" || unit === "1" ? column.name : `${column.name}_${unit}`;
 }
 
-/** All columns of a part, those of the motion first. */
+/** All columns of a part: motion, then observations. */
 export function columnsOf(part: Part): readonly Column[] {
   return [...part.motion.columns, ...(part.observed?.columns ?? [])];
 }
 
-/** The whole part as comma-separated values, one line per sample; empty where a sample has no value. */
+/** The whole part as CSV, one line per sample; missing values are empty. */
 export function csvOf(part: Part): string {
   const columns = columnsOf(part);
   const lines = [["sample", "time_s", ...columns.map(columnName)].join(",")];
@@ -24,7 +24,7 @@ export function csvOf(part: Part): string {
   return lines.join("\n") + "\n";
 }
 
-/** Without the noise of the last binary digits. */
+/** A number without rounding noise in the last digits. */
 function plain(value: number | undefined): string {
   return value === undefined || Number.isNaN(value) ? "" : String(Number(value.toPrecision(12)));
 }

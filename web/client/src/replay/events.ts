@@ -1,21 +1,21 @@
 import type { Group, Motion, Violation } from "../clip/motion";
 import type { Observed } from "../clip/observed";
-import { fixed } from "../controls/words";
+import { fixed } from "../controls/format";
 
 export type Kind = "contact" | "violation" | "rally" | "lost" | "late" | "end";
 
-/** Something that happened, as it stands on the time line and in the list. */
+/** An event for the timeline and the list. */
 export interface ReplayEvent {
   readonly kind: Kind;
   /** In control steps from sample 0. */
   readonly position: number;
-  /** Where it went on to; the same as `position` for an instant. */
+  /** End of the event; equal to `position` for an instant. */
   readonly until: number;
   readonly text: string;
-  readonly sign: string;
+  readonly symbol: string;
 }
 
-const SIGNS: Record<Kind, string> = {
+const SYMBOLS: Record<Kind, string> = {
   contact: "•",
   violation: "▲",
   rally: "◆",
@@ -24,7 +24,7 @@ const SIGNS: Record<Kind, string> = {
   end: "■",
 };
 
-/** What the reader calls a group of constraints, and its unit. */
+/** Name and unit of a group of constraints. */
 export const GROUPS: Record<Group, { name: string; unit: string; scale: number }> = {
   ee: { name: "end effector out of bounds", unit: "mm", scale: 1000 },
   link: { name: "elbow or wrist too low", unit: "mm", scale: 1000 },
@@ -34,12 +34,12 @@ export const GROUPS: Record<Group, { name: string; unit: string; scale: number }
 
 const TOUCHED = { rim: "the rim", mallet: "the mallet", opponent_mallet: "the opponent's mallet" };
 
-/** Everything that happened in a part, in the order of time. */
+/** All events of a part in order of time. */
 export function eventsOf(motion: Motion, observed: Observed | null): ReplayEvent[] {
   const game = motion.contest === "game";
   const events: ReplayEvent[] = [];
-  const add = (kind: Kind, position: number, until: number, text: string, sign = SIGNS[kind]): void => {
-    events.push({ kind, position, until, text, sign });
+  const add = (kind: Kind, position: number, until: number, text: string, symbol = SYMBOLS[kind]): void => {
+    events.push({ kind, position, until, text, symbol });
   };
 
   for (const contact of motion.contacts) {
@@ -48,15 +48,15 @@ export function eventsOf(motion: Motion, observed: Observed | null): ReplayEvent
       game && contact.what !== "rim"
         ? `mallet ${contact.what === "mallet" ? "A" : "B"}`
         : TOUCHED[contact.what];
-    add("contact", at, at, `puck meets ${what} at (${fixed(contact.x, 2)}, ${fixed(contact.y, 2)}) m`);
+    add("contact", at, at, `puck hits ${what} at (${fixed(contact.x, 2)}, ${fixed(contact.y, 2)}) m`);
   }
   for (const violation of motion.violations) {
-    const whose =
+    const prefix =
       motion.arms.length > 1 && (game || violation.side === 1) ? `${sideName(motion, violation.side)}: ` : "";
-    add("violation", violation.from, violation.to, whose + violationWords(violation));
+    add("violation", violation.from, violation.to, prefix + violationText(violation));
   }
   for (const end of motion.breaks)
-    add("rally", end.sample, end.sample, rallyWords(end.what, end.by, end.score));
+    add("rally", end.sample, end.sample, rallyText(end.what, end.by, end.score));
   for (const lost of observed?.lost ?? []) {
     add("lost", lost.from, lost.to, `camera lost the puck for ${lost.to - lost.from + 1} steps`);
   }
@@ -69,13 +69,13 @@ export function eventsOf(motion: Motion, observed: Observed | null): ReplayEvent
   }
   if (motion.end !== null) {
     const { success, steps } = motion.end;
-    add("end", steps, steps, endWords(motion), success === null ? SIGNS.end : success ? "✓" : "✕");
+    add("end", steps, steps, endText(motion), success === null ? SYMBOLS.end : success ? "✓" : "✕");
   }
   return events.sort((a, b) => a.position - b.position);
 }
 
-/** The sentence that tells how it ended. */
-export function endWords(motion: Motion): string {
+/** How the episode or game ended. */
+export function endText(motion: Motion): string {
   const end = motion.end;
   if (end === null) return "";
   const why = end.why || end.end.replaceAll("_", " ");
@@ -88,27 +88,27 @@ export function sideName(motion: Motion, side: 0 | 1): string {
   return side === 0 ? "robot" : "opponent";
 }
 
-function violationWords(violation: Violation): string {
+function violationText(violation: Violation): string {
   const { name, unit, scale } = GROUPS[violation.group];
   const span =
     violation.from === violation.to ? `step ${violation.from}` : `steps ${violation.from} to ${violation.to}`;
   return `${name}, ${span}, by ${fixed(violation.worst * scale, unit === "mm" ? 1 : 3)} ${unit}`;
 }
 
-function rallyWords(what: string, by: 0 | 1 | null, score: readonly [number, number] | null): string {
-  const whose = by === null ? "" : ` by ${by === 0 ? "A" : "B"}`;
-  const words: Record<string, string> = {
-    goal: `goal${whose}`,
-    foul: `foul${whose}`,
+function rallyText(what: string, by: 0 | 1 | null, score: readonly [number, number] | null): string {
+  const side = by === null ? "" : ` by ${by === 0 ? "A" : "B"}`;
+  const texts: Record<string, string> = {
+    goal: `goal${side}`,
+    foul: `foul${side}`,
     stuck: "puck stuck in the middle",
     left_table: "puck left the table",
-    diverged: `simulation diverged${whose}`,
+    diverged: `simulation diverged${side}`,
   };
-  const stands = score === null ? "" : `, ${score[0]} : ${score[1]}`;
-  return (words[what] ?? what.replaceAll("_", " ") + whose) + stands;
+  const scoreText = score === null ? "" : `, ${score[0]} : ${score[1]}`;
+  return (texts[what] ?? what.replaceAll("_", " ") + side) + scoreText;
 }
 
-/** Neighbouring numbers drawn together. */
+/** Merges consecutive numbers into ranges. */
 function runs(sorted: readonly number[]): [number, number][] {
   const found: [number, number][] = [];
   for (const n of [...sorted].sort((a, b) => a - b)) {

@@ -3,16 +3,16 @@ import { SPEEDS } from "./clock";
 export const CAMERAS = ["corner", "side", "robot", "above"] as const;
 export type Camera = (typeof CAMERAS)[number];
 
-/** What a link to a place in a replay says; what it leaves out stays as it is. */
-export interface Place {
+/** Moment and view of a link into a replay; missing fields keep their current values. */
+export interface LinkTarget {
   readonly step?: number;
   readonly camera?: Camera;
   readonly flat?: boolean;
   readonly speed?: number;
 }
 
-/** Reads `#t=37&cam=side&flat=1&speed=0.5`; what it does not know, it passes over. */
-export function parseFragment(fragment: string): Place {
+/** Parses `#t=37&cam=side&flat=1&speed=0.5`; unknown fields are ignored. */
+export function parseFragment(fragment: string): LinkTarget {
   const fields = new URLSearchParams(fragment.replace(/^#/, ""));
   const step = Number(fields.get("t") ?? NaN);
   const camera = CAMERAS.find((name) => name === fields.get("cam"));
@@ -25,10 +25,10 @@ export function parseFragment(fragment: string): Place {
   };
 }
 
-export function writeFragment(place: Required<Place>): string {
-  const fields = [`t=${place.step}`];
-  if (place.flat) fields.push("flat=1");
-  else fields.push(`cam=${place.camera}`);
-  if (place.speed !== 1) fields.push(`speed=${place.speed}`);
+export function writeFragment(target: Required<LinkTarget>): string {
+  const fields = [`t=${target.step}`];
+  if (target.flat) fields.push("flat=1");
+  else fields.push(`cam=${target.camera}`);
+  if (target.speed !== 1) fields.push(`speed=${target.speed}`);
   return `#${fields.join("&")}`;
 }

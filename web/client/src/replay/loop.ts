@@ -1,16 +1,16 @@
-/** One callback per frame for everything: clocks tick first, then is drawn what they changed. */
+/** One animation frame callback for all viewers: clocks tick first, then viewers draw. */
 export class FrameLoop {
   private ticks: ((nowMs: number) => void)[] = [];
   private draws: ((nowMs: number) => void)[] = [];
   private asked = false;
 
-  /** Before anything is drawn in the next frame. */
+  /** Schedules `tick` before drawing in the next frame. */
   request(tick: (nowMs: number) => void): void {
     this.ticks.push(tick);
     this.ask();
   }
 
-  /** In the next frame, or in this one if a clock asks for it. */
+  /** Schedules `draw` in the next frame, or in the current one if called by a tick. */
   draw(draw: (nowMs: number) => void): void {
     this.draws.push(draw);
     this.ask();
@@ -30,7 +30,7 @@ export class FrameLoop {
     this.draws = [];
     this.asked = false;
     for (const draw of draws) draw(nowMs);
-    // Ticks and draws may have asked for more.
+    // Ticks and draws may have scheduled more.
     if (this.ticks.length > 0 || this.draws.length > 0) this.ask();
   };
 }

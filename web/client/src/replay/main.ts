@@ -8,7 +8,7 @@ const loop = new FrameLoop();
 const together = new Map<string, Clock>();
 const still = matchMedia("(prefers-reduced-motion: reduce)").matches;
 
-/** Replays of one name run by one clock. */
+/** Replays of the same group share a clock. */
 function clockOf(name: string | undefined): Clock {
   const known = name === undefined ? undefined : together.get(name);
   const clock = known ?? new Clock(MODEL.step_s, loop);

@@ -1,4 +1,4 @@
-/** The colours of the pictures. They are custom properties of the style sheet: light and dark are told apart there. */
+/** Colours of the pictures: custom properties of the style sheet, which defines the light and dark scheme. */
 const NAMES = [
   "ground", "card", "ink", "soft", "line", "accent", "good", "fair", "poor",
   "rp-table", "rp-rim", "rp-mark", "rp-puck", "rp-arm", "rp-joint", "rp-other", "rp-other-joint",
@@ -9,7 +9,7 @@ const NAMES = [
 export type ColourName = (typeof NAMES)[number];
 export type Palette = Readonly<Record<ColourName, string>>;
 
-/** Reads the colours that hold for an element now. */
+/** Reads the current colours of an element. */
 export function paletteOf(element: Element): Palette {
   const style = getComputedStyle(element);
   const read = NAMES.map((name) => [name, style.getPropertyValue(`--${name}`).trim() || "#888888"]);

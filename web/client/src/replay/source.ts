@@ -4,17 +4,17 @@ import { decodeObserved, type Observed } from "../clip/observed";
 import { Interpolation } from "../motion/pose";
 import { pathsOf, type Paths } from "../motion/paths";
 
-/** Steps of a game that one of its chunks holds. */
+/** Steps per chunk of a game. */
 export const CHUNK_STEPS = 500;
 
-/** Chunks that are kept: the one on show, the next one, and where one just came from. */
-const KEPT = 6;
+/** Number of cached chunks: the current one, the next one and recent ones. */
+const MAX_CACHED = 6;
 
-/** Where a replay's clips are. A game's addresses have `{chunk}` for the number of the chunk. */
+/** Addresses of the clips of a replay. Addresses of a game contain `{chunk}` for the number of the chunk. */
 export interface Addresses {
   readonly motion: string;
   readonly observed: string | null;
-  /** Samples of a game; null for an episode, whose one clip says it. */
+  /** Samples of a game; null for an episode, whose clip contains the number. */
   readonly samples: number | null;
 }
 
@@ -23,16 +23,16 @@ export interface Part {
   readonly index: number;
   readonly motion: Motion;
   readonly observed: Observed | null;
-  /** Why there is nothing observed although it was asked for. */
-  readonly unobserved: string | null;
+  /** Why observations are missing although an address was given. */
+  readonly observationError: string | null;
   readonly interpolation: Interpolation;
   readonly paths: Paths;
 }
 
-/** Fetches the parts of a replay as they are needed, and keeps a few. */
+/** Fetches the parts of a replay on demand and caches a few. */
 export class Source {
   private readonly parts = new Map<number, Part>();
-  private readonly under = new Map<number, Promise<Part>>();
+  private readonly pending = new Map<number, Promise<Part>>();
 
   constructor(
     private readonly addresses: Addresses,
@@ -54,8 +54,8 @@ export class Source {
     return index >= 0 && index < this.chunks ? index * CHUNK_STEPS : null;
   }
 
-  /** The part at a position if it is here. */
-  here(position: number): Part | null {
+  /** The part at a position if it is loaded. */
+  loaded(position: number): Part | null {
     return this.parts.get(this.indexOf(position)) ?? null;
   }
 
@@ -63,26 +63,26 @@ export class Source {
     return this.part(this.indexOf(position));
   }
 
-  /** Fetches the part after this position, without waiting; a failure shows when the part is needed. */
+  /** Starts to fetch the part after this position. A failure is reported when the part is needed. */
   prefetch(position: number): void {
     const next = this.indexOf(position) + 1;
     if (next < this.chunks) this.part(next).catch(() => undefined);
   }
 
   private async part(index: number): Promise<Part> {
-    const here = this.parts.get(index);
-    if (here !== undefined) {
+    const cached = this.parts.get(index);
+    if (cached !== undefined) {
       // Most recently used last.
       this.parts.delete(index);
-      this.parts.set(index, here);
-      return here;
+      this.parts.set(index, cached);
+      return cached;
     }
-    let coming = this.under.get(index);
-    if (coming === undefined) {
-      coming = this.load(index).finally(() => this.under.delete(index));
-      this.under.set(index, coming);
+    let pending = this.pending.get(index);
+    if (pending === undefined) {
+      pending = this.load(index).finally(() => this.pending.delete(index));
+      this.pending.set(index, pending);
     }
-    return coming;
+    return pending;
   }
 
   private async load(index: number): Promise<Part> {
@@ -98,50 +98,50 @@ export class Source {
       index,
       motion,
       observed: fits ? seen : null,
-      unobserved: fits ? observed.unobserved : "it is of other samples than the motion",
+      observationError: fits ? observed.observationError : "its samples differ from those of the motion",
       interpolation,
       paths: pathsOf(motion, interpolation, fits ? seen : null),
     };
     this.parts.set(index, part);
     for (const oldest of this.parts.keys()) {
-      if (this.parts.size <= KEPT) break;
+      if (this.parts.size <= MAX_CACHED) break;
       this.parts.delete(oldest);
     }
     return part;
   }
 
-  /** The motion is worth showing without what was observed. */
+  /** A failure is not fatal: the motion is shown without observations. */
   private async observed(
     address: string | null,
-  ): Promise<{ observed: Observed | null; unobserved: string | null }> {
-    if (address === null) return { observed: null, unobserved: null };
+  ): Promise<{ observed: Observed | null; observationError: string | null }> {
+    if (address === null) return { observed: null, observationError: null };
     try {
-      return { observed: decodeObserved(await this.bytes(address)), unobserved: null };
+      return { observed: decodeObserved(await this.bytes(address)), observationError: null };
     } catch (error) {
-      return { observed: null, unobserved: wordsOf(error) };
+      return { observed: null, observationError: errorText(error) };
     }
   }
 
   private async bytes(address: string): Promise<Uint8Array> {
-    let answer: Response;
+    let response: Response;
     try {
-      answer = await this.get(address, { headers: { Accept: "application/octet-stream" } });
+      response = await this.get(address, { headers: { Accept: "application/octet-stream" } });
     } catch {
       throw new ClipError("the server could not be reached");
     }
-    if (!answer.ok) throw new ClipError(refusal(answer.status));
-    return new Uint8Array(await answer.arrayBuffer());
+    if (!response.ok) throw new ClipError(statusText(response.status));
+    return new Uint8Array(await response.arrayBuffer());
   }
 }
 
-/** What to tell the reader of a failure. */
-export function wordsOf(error: unknown): string {
+/** Message of an error for the visitor. */
+export function errorText(error: unknown): string {
   return error instanceof Error ? error.message : String(error);
 }
 
-function refusal(status: number): string {
-  if (status === 401 || status === 403) return "you may not see it; sign in with the team that it belongs to";
-  if (status === 404 || status === 410) return "the server has no recording of it (any more)";
-  if (status === 429) return "the server is asked too much at the moment; wait a little";
+function statusText(status: number): string {
+  if (status === 401 || status === 403) return "access denied; sign in as a member of the team";
+  if (status === 404 || status === 410) return "the server has no recording, or it was deleted";
+  if (status === 429) return "too many requests; try again in a moment";
   return `the server answered with status ${status}`;
 }

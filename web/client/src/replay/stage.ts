@@ -1,16 +1,16 @@
-import { h, say } from "../controls/dom";
+import { h, setText } from "../controls/dom";
 import { FlatView } from "../flat/view";
 import { View3D } from "../view3d/view";
 import type { Camera } from "./fragment";
 import type { Palette } from "./palette";
-import type { Shown, View } from "./shown";
+import type { FrameState, View } from "./frame-state";
 
-/** The picture, in space or flat, and the few words that stand in it. */
+/** The picture, in 3-D or flat, with texts on it. */
 export class Stage {
   readonly element: HTMLElement;
   private readonly field: HTMLElement;
   readonly solid: View3D | null;
-  /** Why there is no picture in space; null if there is one. */
+  /** Why 3-D is not available; null if it is. */
   unavailable: string | null = null;
   private readonly plane = new FlatView();
   private readonly note = h("p", { class: "stage-note", attributes: { hidden: "" } });
@@ -20,7 +20,7 @@ export class Stage {
   private wantsFlat = false;
   private ratio = 1;
 
-  /** `changed`: the picture must be drawn anew; `switched`: another view is shown. */
+  /** `changed`: called when the picture must be redrawn; `switched`: called after a change of the view. */
   constructor(
     title: string,
     still: boolean,
@@ -69,23 +69,23 @@ export class Stage {
     this.solid?.paint(palette);
   }
 
-  draw(shown: Shown): number {
-    return this.view().draw(shown);
+  draw(frame: FrameState): number {
+    return this.view().draw(frame);
   }
 
-  /** Words in the picture; empty ones are not there. */
-  tell(words: { state: string; outcome: string; good: boolean; score: string }): void {
-    write(this.state, words.state);
-    write(this.score, words.score);
-    write(this.outcome, words.outcome);
-    this.outcome.classList.toggle("good", words.good);
+  /** Sets the texts on the picture; empty texts are hidden. */
+  setTexts(texts: { state: string; outcome: string; good: boolean; score: string }): void {
+    write(this.state, texts.state);
+    write(this.score, texts.score);
+    write(this.outcome, texts.outcome);
+    this.outcome.classList.toggle("good", texts.good);
   }
 
-  /** The picture as it is now, as PNG. */
-  picture(shown: Shown): Promise<Blob | null> {
+  /** The current picture as PNG. */
+  picture(frame: FrameState): Promise<Blob | null> {
     const view = this.view();
-    // A drawing of WebGL is there until the browser has shown it: draw and read in one go.
-    view.draw(shown);
+    // WebGL keeps the drawing only until the browser has shown it: draw and read in the same task.
+    view.draw(frame);
     return new Promise((resolve) => {
       view.canvas.toBlob(resolve, "image/png");
     });
@@ -100,7 +100,7 @@ export class Stage {
       const view = new View3D(still, changed);
       view.canvas.addEventListener("webglcontextlost", (event) => {
         event.preventDefault();
-        this.unavailable = "The browser took the 3-D drawing away: the flat view is shown.";
+        this.unavailable = "3-D was stopped by the browser: the flat view is shown.";
         this.choose();
       });
       view.canvas.addEventListener("webglcontextrestored", () => {
@@ -109,7 +109,7 @@ export class Stage {
       });
       return view;
     } catch {
-      this.unavailable = "This browser offers no 3-D drawing (WebGL): the flat view is shown.";
+      this.unavailable = "This browser has no 3-D support (WebGL): the flat view is shown.";
       return null;
     }
   }
@@ -131,6 +131,6 @@ export class Stage {
 }
 
 function write(element: HTMLElement, text: string): void {
-  say(element, text);
+  setText(element, text);
   if (element.hidden !== (text === "")) element.hidden = text === "";
 }

@@ -1,6 +1,6 @@
 import { Cameras } from "../controls/cameras";
 import { DataTable, fileName, saveFile } from "../controls/data";
-import { button, h, say } from "../controls/dom";
+import { button, h, setText } from "../controls/dom";
 import { EventList } from "../controls/event-list";
 import { helpDialog } from "../controls/help";
 import { listenForKeys } from "../controls/keys";
@@ -8,36 +8,36 @@ import { LayerChoice } from "../controls/layers";
 import { shareRow } from "../controls/share";
 import { Timeline } from "../controls/timeline";
 import { Transport } from "../controls/transport";
-import { fixed } from "../controls/words";
+import { fixed } from "../controls/format";
 import { Kinematics } from "../model/kinematics";
 import { newPose } from "../motion/pose";
 import { Strips } from "../strips/strips";
 import type { Clock } from "./clock";
-import { endWords, eventsOf, type ReplayEvent } from "./events";
+import { endText, eventsOf, type ReplayEvent } from "./events";
 import { parseFragment, writeFragment, type Camera } from "./fragment";
 import type { FrameLoop } from "./loop";
 import { paletteOf } from "./palette";
 import { Score } from "./score";
-import type { Layers, Shown } from "./shown";
-import { wordsOf, type Part, type Source } from "./source";
+import type { Layers, FrameState } from "./frame-state";
+import { errorText, type Part, type Source } from "./source";
 import { Stage } from "./stage";
 
-/** While it plays, a table of figures is read by nobody more often than this. */
-const FIGURES_MS = 200;
+/** Update interval of the data table during playback. */
+const TABLE_UPDATE_MS = 200;
 
 export interface Setting {
   readonly section: HTMLElement;
   readonly title: string;
   readonly source: Source;
-  /** Steps of a game; null for an episode, whose clip says it. */
+  /** Steps of a game; null for an episode, whose clip contains the number. */
   readonly steps: number | null;
   readonly clock: Clock;
   readonly loop: FrameLoop;
-  /** The reader wants no motion beside the replay's own. */
+  /** The visitor prefers reduced motion: no camera animations. */
   readonly still: boolean;
 }
 
-/** One replay on a page: the picture, what it is steered by, and the figures in step with it. */
+/** One replay on a page: the picture, its controls, and data synchronised with it. */
 export class Viewer {
   private readonly element = h("div", { class: "viewer" });
   private readonly live = h("p", { class: "sr", attributes: { role: "status" } });
@@ -54,12 +54,12 @@ export class Viewer {
   private readonly strips: Strips;
   private readonly list: EventList;
   private readonly data: DataTable;
-  private shown: Shown | null = null;
+  private frame: FrameState | null = null;
   private last = 0;
   private drawing = false;
   private loading: number | null = null;
   private wasPlaying = false;
-  private figuresMs = 0;
+  private tableUpdatedMs = 0;
   private step = -1;
 
   constructor(private readonly setting: Setting) {
@@ -131,21 +131,21 @@ export class Viewer {
     clock.gate((position) => this.ready(position));
   }
 
-  /** Fetches what is to be shown first, and takes the place of the still picture. */
+  /** Loads the first part and replaces the still picture. */
   async open(): Promise<void> {
     const { section, clock, source, steps } = this.setting;
     section.dataset.state = "loading";
     section.classList.add("replay");
     const waiting = h("p", { class: "waiting", attributes: { role: "status" } }, "Loading the replay …");
-    this.beneathStill(waiting);
-    const place = parseFragment(location.hash);
+    this.insertBelowStill(waiting);
+    const target = parseFragment(location.hash);
     try {
-      const part = await source.at(place.step ?? 0);
+      const part = await source.at(target.step ?? 0);
       waiting.remove();
       this.last = steps ?? part.motion.samples - 1;
       this.mount();
       clock.cover(this.last);
-      this.learn(part);
+      this.addPart(part);
       this.show(part);
       this.follow();
     } catch (error) {
@@ -153,18 +153,18 @@ export class Viewer {
       section.dataset.state = "failed";
       const again = h("div", { class: "trouble", attributes: { role: "alert" } });
       again.append(
-        h("p", {}, `The replay could not be loaded: ${wordsOf(error)}.`),
+        h("p", {}, `The replay could not be loaded: ${errorText(error)}.`),
         button("Try again", () => {
           again.remove();
           void this.open();
         }),
       );
-      this.beneathStill(again);
+      this.insertBelowStill(again);
     }
   }
 
-  /** Where the reader looks for the replay. */
-  private beneathStill(element: HTMLElement): void {
+  /** Inserts an element below the still picture. */
+  private insertBelowStill(element: HTMLElement): void {
     const still = this.setting.section.querySelector(".still");
     if (still === null) this.setting.section.prepend(element);
     else still.after(element);
@@ -188,16 +188,16 @@ export class Viewer {
     });
   }
 
-  /** Goes where the address says. */
+  /** Applies the fragment of the address. */
   private follow(): void {
     const { clock } = this.setting;
-    const place = parseFragment(location.hash);
-    if (place.camera !== undefined) this.stage.setCamera(place.camera);
-    if (place.flat !== undefined) this.stage.setFlat(place.flat);
-    if (place.speed !== undefined) clock.setSpeed(place.speed);
-    if (place.step !== undefined) {
+    const target = parseFragment(location.hash);
+    if (target.camera !== undefined) this.stage.setCamera(target.camera);
+    if (target.flat !== undefined) this.stage.setFlat(target.flat);
+    if (target.speed !== undefined) clock.setSpeed(target.speed);
+    if (target.step !== undefined) {
       clock.pause();
-      clock.seek(place.step);
+      clock.seek(target.step);
     }
     this.invalidate();
   }
@@ -229,28 +229,28 @@ export class Viewer {
     const from = clock.position;
     this.findEvent(from, direction).then(
       (event) => {
-        // The reader has gone elsewhere while it was looked for.
+        // The visitor has moved on during the search.
         if (clock.position !== from) return;
         if (event === null) {
-          this.announce(direction === 1 ? "No event after this" : "No event before this");
+          this.announce(direction === 1 ? "No later event" : "No earlier event");
         } else {
           clock.seek(event.position);
           this.announce(`${fixed(event.position * clock.stepS, 2)} s: ${event.text}`);
         }
       },
       (error: unknown) => {
-        this.announce(`Events could not be loaded: ${wordsOf(error)}`);
+        this.announce(`Events could not be loaded: ${errorText(error)}`);
       },
     );
   };
 
-  /** The nearest event in a direction, in part after part of a game until there is one. */
+  /** The nearest event in a direction; searches further parts of a game if necessary. */
   private async findEvent(from: number, direction: 1 | -1): Promise<ReplayEvent | null> {
     const { source } = this.setting;
     for (let index = source.indexOf(Math.min(from, this.last)); ; index += direction) {
       const start = source.startOf(index);
       if (start === null) return null;
-      if (!this.events.has(index)) this.learn(await source.at(start));
+      if (!this.events.has(index)) this.addPart(await source.at(start));
       const events = this.events.get(index) ?? [];
       const found =
         direction === 1
@@ -265,23 +265,23 @@ export class Viewer {
     return chunks.flatMap(([, events]) => events);
   }
 
-  /** Takes over a part that has come: its events, and how the game stood in it. */
-  private learn(part: Part): void {
+  /** Adds the events and scores of a loaded part. */
+  private addPart(part: Part): void {
     if (this.events.has(part.index)) return;
     this.events.set(part.index, eventsOf(part.motion, part.observed));
     this.score.learn(part.index, part.motion.breaks, part.motion.score);
     const events = this.allEvents();
     const { stepS } = part.motion;
-    const note = this.setting.steps === null ? "" : ", of the parts that were loaded";
+    const note = this.setting.steps === null ? "" : ", loaded parts only";
     this.timeline.update(Math.max(this.step, 0), this.last, stepS);
     this.timeline.show(events, stepS);
     this.list.show(events, stepS, note);
   }
 
-  /** Makes a part the one on show. */
+  /** Shows a part. */
   private show(part: Part): void {
     const { section } = this.setting;
-    this.shown ??= {
+    this.frame ??= {
       part,
       position: 0,
       pose: newPose(),
@@ -291,7 +291,7 @@ export class Viewer {
       seenY: NaN,
       lost: false,
     };
-    this.shown.part = part;
+    this.frame.part = part;
     this.strips.show(part);
     this.data.show(part);
     this.choice.update({
@@ -299,9 +299,11 @@ export class Viewer {
       commanded: part.paths.commanded !== null,
     });
     section.dataset.state = "ready";
-    if (part.unobserved !== null) {
+    if (part.observationError !== null) {
       this.trouble.classList.add("minor");
-      this.trouble.replaceChildren(h("p", {}, `What the agent observed is not shown: ${part.unobserved}.`));
+      this.trouble.replaceChildren(
+        h("p", {}, `Observations of the agent are not shown: ${part.observationError}.`),
+      );
       this.trouble.hidden = false;
     } else {
       this.trouble.hidden = true;
@@ -309,19 +311,19 @@ export class Viewer {
     this.invalidate();
   }
 
-  /** Whether a position can be shown; if not, fetches what is missing. */
+  /** Can a position be shown? If not, starts to fetch its part. */
   private ready(position: number): boolean {
     const { source, section } = this.setting;
     const at = Math.min(position, this.last);
-    if (this.shown === null || source.here(at) !== null) return true;
+    if (this.frame === null || source.loaded(at) !== null) return true;
     const index = source.indexOf(at);
     if (this.loading === index) return false;
     this.loading = index;
     section.dataset.state = "loading";
-    this.stage.tell({ state: "Loading …", outcome: "", good: false, score: "" });
+    this.stage.setTexts({ state: "Loading …", outcome: "", good: false, score: "" });
     source.at(at).then(
       (part) => {
-        this.learn(part);
+        this.addPart(part);
         if (this.loading !== index) return;
         this.loading = null;
         this.invalidate();
@@ -330,10 +332,10 @@ export class Viewer {
         if (this.loading !== index) return;
         this.setting.clock.pause();
         section.dataset.state = "failed";
-        this.stage.tell({ state: "Not loaded", outcome: "", good: false, score: "" });
+        this.stage.setTexts({ state: "Not loaded", outcome: "", good: false, score: "" });
         this.trouble.classList.remove("minor");
         this.trouble.replaceChildren(
-          h("p", {}, `This part of the replay could not be loaded: ${wordsOf(error)}.`),
+          h("p", {}, `This part of the replay could not be loaded: ${errorText(error)}.`),
           button("Try again", () => {
             this.loading = null;
             this.trouble.hidden = true;
@@ -355,31 +357,31 @@ export class Viewer {
   private readonly draw = (nowMs: number): void => {
     this.drawing = false;
     const { clock, source } = this.setting;
-    const { shown } = this;
-    if (shown === null) return;
+    const { frame } = this;
+    if (frame === null) return;
     const position = Math.min(clock.position, this.last);
     const step = Math.floor(position + 1e-6);
-    const { stepS } = shown.part.motion;
+    const { stepS } = frame.part.motion;
     this.transport.update(step, this.last, stepS);
     this.timeline.update(step, this.last, stepS);
-    this.tellPlaying(step);
+    this.announcePlayback(step);
     if (!this.ready(position)) return;
     this.recover();
-    const part = source.here(position);
-    if (part !== null && part !== shown.part) {
+    const part = source.loaded(position);
+    if (part !== null && part !== frame.part) {
       this.show(part);
-      this.learn(part);
+      this.addPart(part);
     }
     if (clock.playing) {
       source.prefetch(position);
-      if (!this.stage.flat) this.stage.solid?.pace(nowMs);
+      if (!this.stage.flat) this.stage.solid?.adaptQuality(nowMs);
     }
 
-    this.pose(shown, position, step);
+    this.pose(frame, position, step);
     const orbit = this.stage.solid?.orbit;
     const moving = !this.stage.flat && orbit?.tick(nowMs) === true;
-    const calls = this.stage.draw(shown);
-    this.figures(shown, step, nowMs);
+    const calls = this.stage.draw(frame);
+    this.figures(frame, step, nowMs);
     this.cameras.update(this.stage.flat, this.camera(), this.stage.unavailable === null);
     const { section } = this.setting;
     mark(section, "step", String(step));
@@ -388,74 +390,74 @@ export class Viewer {
     if (moving) this.invalidate();
   };
 
-  /** The reader went on from a part that could not be loaded: that one is tried again when it is needed again. */
+  /** Clears an error after the visitor has moved to another part; the failed part is retried when needed again. */
   private recover(): void {
     if (this.trouble.hidden || this.trouble.classList.contains("minor")) return;
     this.trouble.hidden = true;
     this.loading = null;
   }
 
-  private pose(shown: Shown, position: number, step: number): void {
-    const { interpolation, motion, observed } = shown.part;
-    shown.position = position;
-    interpolation.at(position, shown.pose);
+  private pose(frame: FrameState, position: number, step: number): void {
+    const { interpolation, motion, observed } = frame.part;
+    frame.position = position;
+    interpolation.at(position, frame.pose);
     for (let i = 0; i < motion.arms.length; i++)
-      shown.arms[i].set(shown.pose.arms[i].q, shown.pose.arms[i].universal);
-    // What the agent was told holds until it is told anew.
+      frame.arms[i].set(frame.pose.arms[i].q, frame.pose.arms[i].universal);
+    // An observation holds until the next one.
     const k = step - motion.first;
-    shown.seenX = observed?.seenX?.[k] ?? NaN;
-    shown.seenY = observed?.seenY?.[k] ?? NaN;
-    shown.lost = observed?.lost.some(({ from, to }) => from <= step && step <= to) === true;
+    frame.seenX = observed?.seenX?.[k] ?? NaN;
+    frame.seenY = observed?.seenY?.[k] ?? NaN;
+    frame.lost = observed?.lost.some(({ from, to }) => from <= step && step <= to) === true;
   }
 
-  private figures(shown: Shown, step: number, nowMs: number): void {
-    const { motion } = shown.part;
-    const { x, y } = shown.pose;
-    this.strips.update(shown.position);
-    this.list.update(shown.position);
-    if (!this.setting.clock.playing || nowMs - this.figuresMs > FIGURES_MS) {
-      this.figuresMs = nowMs;
+  private figures(frame: FrameState, step: number, nowMs: number): void {
+    const { motion } = frame.part;
+    const { x, y } = frame.pose;
+    this.strips.update(frame.position);
+    this.list.update(frame.position);
+    if (!this.setting.clock.playing || nowMs - this.tableUpdatedMs > TABLE_UPDATE_MS) {
+      this.tableUpdatedMs = nowMs;
       this.data.update(step);
     }
-    // Figures that change sixty times a second are read by nobody.
+    // Update the numbers only once per step during playback.
     if (step === this.step && this.setting.clock.playing) return;
     const k = step - motion.first;
     const speed = Math.hypot(motion.puck.vx?.[k] ?? NaN, motion.puck.vy?.[k] ?? NaN);
-    const seen = shown.lost ? ", the camera has lost it" : "";
-    say(
+    const seen = frame.lost ? ", not seen by the camera" : "";
+    setText(
       this.facts,
       `Puck at x ${fixed(x, 3)} m, y ${fixed(y, 3)} m, ${Number.isNaN(speed) ? "" : `${fixed(speed, 2)} m/s`}${seen}`,
     );
     const over = motion.end !== null && step >= motion.end.steps;
-    const score = motion.contest === "game" ? this.score.at(shown.position) : null;
-    const sign = motion.end?.success === true ? "✓ " : motion.end?.success === false ? "✕ " : "";
-    this.stage.tell({
-      state: this.last === 0 ? "No step was played" : shown.lost ? "○ Camera lost the puck" : "",
-      outcome: over ? sign + endWords(motion) : "",
+    const score = motion.contest === "game" ? this.score.at(frame.position) : null;
+    const symbol = motion.end?.success === true ? "✓ " : motion.end?.success === false ? "✕ " : "";
+    this.stage.setTexts({
+      state: this.last === 0 ? "No steps" : frame.lost ? "○ Puck not seen by the camera" : "",
+      outcome: over ? symbol + endText(motion) : "",
       good: motion.end?.success === true,
       score: score === null ? "" : `A ${score[0]} : ${score[1]} B`,
     });
     this.step = step;
   }
 
-  /** Says what changed of itself; never what changes with each frame. */
-  private tellPlaying(step: number): void {
+  /** Announces start and end of playback to screen readers; never changes of each frame. */
+  private announcePlayback(step: number): void {
     const { clock } = this.setting;
     if (clock.playing === this.wasPlaying) return;
     this.wasPlaying = clock.playing;
-    const motion = this.shown?.part.motion;
+    const motion = this.frame?.part.motion;
     if (clock.playing) this.announce("Playing");
-    else if (step >= this.last && motion !== undefined) this.announce(endWords(motion) || "End");
+    else if (step >= this.last && motion !== undefined) this.announce(endText(motion) || "End");
     else this.announce(`Paused at step ${step}`);
   }
 
   private viewSwitched(): void {
     const { section } = this.setting;
-    // Called by the stage while it is being made, too.
+    // Also called during the construction of the stage.
     const stage = this.stage as Stage | undefined;
     if (stage === undefined) return;
     section.dataset.view = stage.flat ? "flat" : "3d";
-    if (this.shown !== null) this.announce(stage.unavailable ?? (stage.flat ? "Flat view" : "3-D view"));
+    if (this.frame !== null) this.announce(stage.unavailable ?? (stage.flat ? "Flat view" : "3-D view"));
     this.invalidate();
   }
 
@@ -464,10 +466,10 @@ export class Viewer {
   }
 
   private async save(): Promise<void> {
-    if (this.shown === null) return;
-    const picture = await this.stage.picture(this.shown);
-    if (picture === null) this.announce("The picture could not be made");
-    else saveFile(picture, `${fileName(this.setting.title, this.shown.part)}-step-${this.step}.png`);
+    if (this.frame === null) return;
+    const picture = await this.stage.picture(this.frame);
+    if (picture === null) this.announce("The picture could not be saved");
+    else saveFile(picture, `${fileName(this.setting.title, this.frame.part)}-step-${this.step}.png`);
   }
 }
 

@@ -5,7 +5,7 @@ const DASHES = [4, 3];
 const SOLID: number[] = [];
 const PAD = 4;
 
-/** Least and greatest value to draw: all of the series, and the limit. */
+/** Range of values to draw, including the limit. */
 export function rangeOf(series: Series): [number, number] {
   let low = series.limit;
   let high = series.limit;
@@ -19,7 +19,7 @@ export function rangeOf(series: Series): [number, number] {
   return high > low ? [low, high] : [low, low + 1];
 }
 
-/** Draws a strip in CSS pixels: what is not allowed as a ground, the limit dashed, what was recorded as broken as bars. */
+/** Draws a chart in CSS pixels: forbidden range tinted, limit dashed, recorded violations as bars. */
 export function plot(
   context: CanvasRenderingContext2D,
   width: number,
@@ -40,7 +40,7 @@ export function plot(
   if (series.allowed === "above") context.fillRect(0, limit, width, height - limit);
   else context.fillRect(0, 0, width, limit);
   context.globalAlpha = 0.28;
-  for (const { from, to } of series.broken) {
+  for (const { from, to } of series.violations) {
     const left = x(from - first - 0.5);
     context.fillRect(left, 0, Math.max(x(to - first + 0.5) - left, 2), height);
   }

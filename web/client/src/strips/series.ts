@@ -1,5 +1,5 @@
 import type { Group, Violation } from "../clip/motion";
-import { fixed } from "../controls/words";
+import { fixed } from "../controls/format";
 import { Kinematics } from "../model/kinematics";
 import {
   heightMargin,
@@ -18,27 +18,27 @@ export interface Line {
   readonly colour: ColourName;
 }
 
-/** One strip: lines over the samples of a part, and where its limit is. */
+/** A chart: lines over the samples of a part, with a limit. */
 export interface Series {
   readonly title: string;
   readonly unit: string;
   readonly lines: readonly Line[];
   readonly limit: number;
-  /** Values on this side of the limit are allowed. */
+  /** The allowed side of the limit. */
   readonly allowed: "above" | "below";
-  /** Samples, inclusive, that were recorded as broken. */
-  readonly broken: readonly { readonly from: number; readonly to: number }[];
-  /** What holds at a sample of the part, with its unit. */
-  readonly words: (k: number) => string;
+  /** Recorded violations as ranges of samples, inclusive. */
+  readonly violations: readonly { readonly from: number; readonly to: number }[];
+  /** Text of the value at a sample, with its unit. */
+  readonly valueText: (k: number) => string;
   readonly digits: number;
 }
 
-/** The strips of one arm of a part; those of which nothing was written are left out. */
+/** Charts of one arm; charts without data are omitted. */
 export function seriesOf(part: Part, side: 0 | 1): Series[] {
   const { motion, observed } = part;
   const arm = motion.arms[side];
   const margins = marginsOf(part, side);
-  const broken = (group: Group): Violation[] =>
+  const violations = (group: Group): Violation[] =>
     motion.violations.filter((violation) => violation.side === side && violation.group === group);
 
   const margin = (
@@ -53,20 +53,20 @@ export function seriesOf(part: Part, side: 0 | 1): Series[] {
     lines: [{ values, colour: "accent" }],
     limit: 0,
     allowed: "above",
-    broken: broken(group),
+    violations: violations(group),
     digits,
-    words: (k) => `${fixed(values[k], digits)} ${unit}${values[k] <= 0 ? " ▲ beyond" : ""}`,
+    valueText: (k) => `${fixed(values[k], digits)} ${unit}${values[k] <= 0 ? " ▲ beyond" : ""}`,
   });
 
   const all = [
     margin("End effector height: margin", margins.height, "mm", 1, "ee"),
     margin("Edge of the table: margin", margins.table, "mm", 0, "ee"),
     margin("Elbow and wrist height: margin", margins.link, "mm", 0, "link"),
-    margin("Joint positions: least margin", margins.position, "rad", 3, "joint_pos"),
+    margin("Joint positions: smallest margin", margins.position, "rad", 3, "joint_pos"),
   ];
   if (arm.dq !== null) {
-    all.push(margin("Joint velocities: least margin", margins.velocity, "rad/s", 2, "joint_vel"));
-    all.push(shares(arm.dq, broken("joint_vel")));
+    all.push(margin("Joint velocities: smallest margin", margins.velocity, "rad/s", 2, "joint_vel"));
+    all.push(shares(arm.dq, violations("joint_vel")));
   }
   if (observed !== null && observed.side === side && observed.computationTimeS !== null) {
     all.push(computation(observed.computationTimeS, observed.hostTimeS, observed.late));
@@ -100,7 +100,7 @@ function marginsOf(
   return found;
 }
 
-function shares(dq: readonly Float64Array[], broken: readonly Violation[]): Series {
+function shares(dq: readonly Float64Array[], violations: readonly Violation[]): Series {
   const lines = dq.map((values, joint) => ({
     values: values.map((velocity) => 100 * velocityShare(joint, velocity)),
     colour: `rp-${joint + 1}` as ColourName,
@@ -111,9 +111,9 @@ function shares(dq: readonly Float64Array[], broken: readonly Violation[]): Seri
     lines,
     limit: 100 * MODEL.constraints.limit_fraction,
     allowed: "below",
-    broken,
+    violations,
     digits: 0,
-    words: (k) => {
+    valueText: (k) => {
       const fastest = lines.reduce(
         (best, line, joint) => (line.values[k] > lines[best].values[k] ? joint : best),
         0,
@@ -131,9 +131,9 @@ function computation(times: Float64Array, host: Float64Array | null, late: reado
     lines: [{ values, colour: "accent" }],
     limit: 1000 * MODEL.constraints.computation_time_s,
     allowed: "below",
-    broken: late.map((sample) => ({ from: sample, to: sample })),
+    violations: late.map((sample) => ({ from: sample, to: sample })),
     digits: 1,
-    words: (k) => {
+    valueText: (k) => {
       if (Number.isNaN(values[k])) return "–";
       const hosts = host === null || !(host[k] > 0) ? "" : `, host ${fixed(1000 * host[k], 1)} ms`;
       return `${fixed(values[k], 1)} ms${hosts}`;

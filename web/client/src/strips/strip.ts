@@ -1,10 +1,10 @@
-import { h, say } from "../controls/dom";
-import { fixed } from "../controls/words";
+import { h, setText } from "../controls/dom";
+import { fixed } from "../controls/format";
 import type { Palette } from "../replay/palette";
 import { plot, rangeOf } from "./plot";
 import type { Series } from "./series";
 
-/** One small plot with its value at the cursor. */
+/** A small chart with the value at the cursor. */
 export class Strip {
   readonly element: HTMLElement;
   private readonly canvas = h("canvas", { attributes: { role: "img" } });
@@ -12,7 +12,7 @@ export class Strip {
   private readonly value = h("span", { class: "value" });
   private readonly field: HTMLElement;
   private width = 0;
-  private told = -1;
+  private shownSample = -1;
 
   constructor(
     private readonly series: Series,
@@ -23,8 +23,9 @@ export class Strip {
     const [low, high] = rangeOf(series);
     const scale = `from ${fixed(low, series.digits)} to ${fixed(high, series.digits)} ${series.unit}`;
     const limit = `limit ${fixed(series.limit, series.digits)} ${series.unit}`;
-    const broken = series.broken.length === 0 ? "" : `; ${series.broken.length} times recorded as broken`;
-    this.canvas.setAttribute("aria-label", `${series.title}, ${scale}, ${limit}${broken}`);
+    const violations =
+      series.violations.length === 0 ? "" : `; ${series.violations.length} violations recorded`;
+    this.canvas.setAttribute("aria-label", `${series.title}, ${scale}, ${limit}${violations}`);
     this.field = h("div", { class: "field" }, this.canvas, this.cursor);
     this.element = h(
       "div",
@@ -73,8 +74,8 @@ export class Strip {
     const x = Math.min(Math.max(share, 0), 1) * this.width;
     this.cursor.style.transform = `translateX(${x.toFixed(1)}px)`;
     const k = Math.min(Math.max(Math.floor(position + 1e-6) - this.first, 0), this.samples - 1);
-    if (k === this.told) return;
-    this.told = k;
-    say(this.value, this.series.words(k));
+    if (k === this.shownSample) return;
+    this.shownSample = k;
+    setText(this.value, this.series.valueText(k));
   }
 }

@@ -1,12 +1,12 @@
 import { h } from "../controls/dom";
-import { fixed } from "../controls/words";
+import { fixed } from "../controls/format";
 import { sideName } from "../replay/events";
 import type { Palette } from "../replay/palette";
 import type { Part } from "../replay/source";
 import { seriesOf } from "./series";
 import { Strip } from "./strip";
 
-/** The strips under the picture, all of the part on show; in a game of one side at a time. */
+/** Charts below the picture for the current part; in a game for one side at a time. */
 export class Strips {
   readonly element: HTMLElement;
   private readonly body = h("div");
@@ -35,7 +35,7 @@ export class Strips {
       h(
         "p",
         { class: "legend-note" },
-        "Dashed: the limit; tinted: beyond it; bars: recorded as broken. Click or drag to go there.",
+        "Dashed: limit. Tinted: beyond the limit. Bars: recorded violations. Click or drag to go to a time.",
       ),
       this.body,
     );

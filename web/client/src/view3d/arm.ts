@@ -2,10 +2,10 @@ import { Group, Mesh, MeshStandardMaterial, Vector3 } from "three";
 import type { Frame, Kinematics } from "../model/kinematics";
 import { MODEL } from "../model/model";
 import type { ColourName, Palette } from "../replay/palette";
-import { Painted, type Piece } from "./painted";
+import { ColouredGeometry, type Piece } from "./coloured-geometry";
 import { ball, bar, drum } from "./shapes";
 
-// The arm's looks, m: what it is drawn with, not what it is simulated with.
+// Dimensions for drawing, m. The simulation does not use them.
 const LINK_RADII = [0.088, 0.083, 0.078, 0.074, 0.066, 0.06, 0.047];
 const JOINT_HALF_LENGTH = 0.07;
 const FLANGE_LENGTH = 0.06;
@@ -22,10 +22,10 @@ const COLOURS: readonly [Colours, Colours] = [
   { link: "rp-other", joint: "rp-other-joint", mallet: "rp-other-mallet" },
 ];
 
-/** One arm: a body per link between its joint and the next one, the mallet, and the base. */
+/** An arm: a body per link, the mallet and the base. */
 export class ArmModel {
   readonly group = new Group();
-  private readonly painted: Painted[] = [];
+  private readonly painted: ColouredGeometry[] = [];
   private readonly links: Mesh[];
   private readonly mallet: Mesh;
   private readonly material = new MeshStandardMaterial({
@@ -59,7 +59,7 @@ export class ArmModel {
   }
 
   private mesh(pieces: Piece[]): Mesh {
-    const painted = new Painted(pieces);
+    const painted = new ColouredGeometry(pieces);
     this.painted.push(painted);
     const mesh = new Mesh(painted.geometry, this.material);
     mesh.castShadow = true;
@@ -83,7 +83,7 @@ function linkPieces(i: number, colours: Colours): Piece[] {
   }
   const next = new Vector3(...MODEL.links[i + 1].position_m);
   const body: Piece = [bar(origin, next, radius, LINK_RADII[i + 1]), colours.link];
-  // Odd joints turn about the arm's own direction: a collar; even ones across it: a drum through the elbow.
+  // Odd joints turn about the axis of the arm (drawn as a collar), even joints across it (a drum).
   if (i % 2 === 0) return [body, [drum(radius + 0.003, -0.012, 0.012, 0.004), colours.joint]];
   const half = JOINT_HALF_LENGTH * (radius / LINK_RADII[1]);
   return [

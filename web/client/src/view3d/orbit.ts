@@ -1,7 +1,7 @@
 import type { Camera } from "../replay/fragment";
 
-/** A camera's place: it looks at a target from a distance, in angles about it. */
-interface Seat {
+/** Camera position: a target, and angles and distance around it. */
+interface CameraPosition {
   readonly x: number;
   readonly y: number;
   readonly z: number;
@@ -12,7 +12,7 @@ interface Seat {
 
 const DEG = Math.PI / 180;
 
-const SEATS: Record<Camera, Seat> = {
+const PRESETS: Record<Camera, CameraPosition> = {
   corner: { x: -0.27, y: 0, z: 0.08, azimuth: -58 * DEG, elevation: 30 * DEG, distance: 4.0 },
   side: { x: -0.3, y: 0, z: 0.2, azimuth: -90 * DEG, elevation: 14 * DEG, distance: 3.6 },
   robot: { x: -0.16, y: 0, z: 0, azimuth: 180 * DEG, elevation: 62 * DEG, distance: 3.6 },
@@ -26,7 +26,7 @@ const TURN_MS = 350;
 const ELEVATION = [2 * DEG, 89.5 * DEG] as const;
 const DISTANCE = [0.6, 9] as const;
 
-/** Where the camera is, and how it gets from place to place. */
+/** The camera with its animated movements. */
 export class Orbit {
   x = 0;
   y = 0;
@@ -34,34 +34,34 @@ export class Orbit {
   azimuth = 0;
   elevation = 0;
   distance = 1;
-  /** The chosen place; null once it was turned by hand. */
+  /** The selected preset; null after manual turning. */
   camera: Camera | null = "corner";
-  private from: Seat | null = null;
-  private to: Seat = SEATS.corner;
+  private from: CameraPosition | null = null;
+  private to: CameraPosition = PRESETS.corner;
   private startedMs = 0;
   private wide = false;
 
-  /** `still`: the reader wants no motion beside the replay's own. */
+  /** `still`: the visitor prefers reduced motion. */
   constructor(
     private readonly still: boolean,
     private readonly changed: () => void,
   ) {
-    this.settle(SEATS.corner);
+    this.moveTo(PRESETS.corner);
   }
 
   preset(camera: Camera): void {
     this.camera = camera;
-    this.go(this.seat(camera));
+    this.go(this.position(camera));
   }
 
-  /** Makes room for a second arm; the camera goes there at once if it stands at a chosen place. */
+  /** Widens the view for a second arm; moves the camera at once if it is at a preset. */
   widen(): void {
     if (this.wide) return;
     this.wide = true;
     if (this.camera === null) return;
     this.from = null;
-    this.to = this.seat(this.camera);
-    this.settle(this.to);
+    this.to = this.position(this.camera);
+    this.moveTo(this.to);
   }
 
   turn(right: number, up: number): void {
@@ -74,16 +74,16 @@ export class Orbit {
     this.go(this.turned(this.to, 0, 0, 0.85 ** steps));
   }
 
-  /** By a pointer that moved so many pixels: at once. */
+  /** Turns by pointer movement in pixels, without animation. */
   drag(dx: number, dy: number): void {
     this.camera = null;
     this.from = null;
     this.to = this.turned(this, -dx * RADIANS_PER_PIXEL, dy * RADIANS_PER_PIXEL, 1);
-    this.settle(this.to);
+    this.moveTo(this.to);
     this.changed();
   }
 
-  /** Moves on towards the chosen place; true while it is under way. */
+  /** Continues the animation; true until it is finished. */
   tick(nowMs: number): boolean {
     const { from, to } = this;
     if (from === null) return false;
@@ -100,19 +100,19 @@ export class Orbit {
     return share < 1;
   }
 
-  private seat(camera: Camera): Seat {
-    const seat = SEATS[camera];
-    if (!this.wide || camera === "robot") return seat;
-    return { ...seat, x: 0, distance: seat.distance * WIDER };
+  private position(camera: Camera): CameraPosition {
+    const position = PRESETS[camera];
+    if (!this.wide || camera === "robot") return position;
+    return { ...position, x: 0, distance: position.distance * WIDER };
   }
 
-  private go(seat: Seat): void {
-    // The short way round.
-    const turns = Math.round((this.azimuth - seat.azimuth) / (2 * Math.PI));
-    this.to = { ...seat, azimuth: seat.azimuth + turns * 2 * Math.PI };
+  private go(position: CameraPosition): void {
+    // Turn the shorter way.
+    const turns = Math.round((this.azimuth - position.azimuth) / (2 * Math.PI));
+    this.to = { ...position, azimuth: position.azimuth + turns * 2 * Math.PI };
     if (this.still) {
       this.from = null;
-      this.settle(this.to);
+      this.moveTo(this.to);
     } else {
       const { x, y, z, azimuth, elevation, distance } = this;
       this.from = { x, y, z, azimuth, elevation, distance };
@@ -121,24 +121,29 @@ export class Orbit {
     this.changed();
   }
 
-  private turned(seat: Seat, azimuth: number, elevation: number, distance: number): Seat {
+  private turned(
+    position: CameraPosition,
+    azimuth: number,
+    elevation: number,
+    distance: number,
+  ): CameraPosition {
     return {
-      x: seat.x,
-      y: seat.y,
-      z: seat.z,
-      azimuth: seat.azimuth + azimuth,
-      elevation: clamp(seat.elevation + elevation, ELEVATION),
-      distance: clamp(seat.distance * distance, DISTANCE),
+      x: position.x,
+      y: position.y,
+      z: position.z,
+      azimuth: position.azimuth + azimuth,
+      elevation: clamp(position.elevation + elevation, ELEVATION),
+      distance: clamp(position.distance * distance, DISTANCE),
     };
   }
 
-  private settle(seat: Seat): void {
-    this.x = seat.x;
-    this.y = seat.y;
-    this.z = seat.z;
-    this.azimuth = seat.azimuth;
-    this.elevation = seat.elevation;
-    this.distance = seat.distance;
+  private moveTo(position: CameraPosition): void {
+    this.x = position.x;
+    this.y = position.y;
+    this.z = position.z;
+    this.azimuth = position.azimuth;
+    this.elevation = position.elevation;
+    this.distance = position.distance;
   }
 }
 

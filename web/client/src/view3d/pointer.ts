@@ -1,9 +1,6 @@
 import type { Orbit } from "./orbit";
 
-/**
- * Dragging turns the camera. With a finger only sideways: a drag along the page scrolls it, as everywhere else, and
- * the buttons turn the camera up and down.
- */
+/** Dragging turns the camera. Touch turns sideways only: a vertical drag scrolls the page; buttons turn up and down. */
 export function followPointer(canvas: HTMLCanvasElement, orbit: Orbit): void {
   let x = 0;
   let y = 0;
@@ -22,7 +19,7 @@ export function followPointer(canvas: HTMLCanvasElement, orbit: Orbit): void {
   canvas.addEventListener(
     "wheel",
     (event) => {
-      // The bare wheel scrolls the page.
+      // Without Ctrl the wheel scrolls the page.
       if (!event.ctrlKey) return;
       event.preventDefault();
       orbit.closer(event.deltaY < 0 ? 1 : -1);

@@ -1,18 +1,18 @@
 import { BoxGeometry, Group, Mesh, MeshBasicMaterial, MeshStandardMaterial, TorusGeometry } from "three";
 import { MODEL } from "../model/model";
 import type { Palette } from "../replay/palette";
-import type { Shown } from "../replay/shown";
-import { Painted } from "./painted";
+import type { FrameState } from "../replay/frame-state";
+import { ColouredGeometry } from "./coloured-geometry";
 import { drum, mark } from "./shapes";
 
 const { radius_m: RADIUS, height_m: HEIGHT } = MODEL.puck;
 
-/** The puck as it was, and where the agent was told that it is. */
+/** The puck, and its observed position. */
 export class PuckModel {
   readonly group = new Group();
-  private readonly painted = new Painted([
+  private readonly painted = new ColouredGeometry([
     [drum(RADIUS, 0, HEIGHT, 0.003), "rp-puck"],
-    // Which way it is turned.
+    // The line shows the orientation.
     [new BoxGeometry(RADIUS * 0.8, 0.005, 0.001).translate(RADIUS * 0.4, 0, HEIGHT), "rp-table"],
   ]);
   private readonly puck: Mesh;
@@ -28,7 +28,7 @@ export class PuckModel {
     this.puck.castShadow = true;
     this.seen = new Mesh(new TorusGeometry(RADIUS, 0.0022, 8, 48), this.seenColour);
     const r = RADIUS * 0.8;
-    const cross = new Painted([
+    const cross = new ColouredGeometry([
       [mark(-r, -r, r, r, 0.005, 0), "rp-seen"],
       [mark(-r, r, r, -r, 0.005, 0), "rp-seen"],
     ]);
@@ -36,16 +36,16 @@ export class PuckModel {
     this.group.add(this.puck, this.seen, this.lost);
   }
 
-  set(shown: Shown): void {
-    const { pose } = shown;
+  set(frame: FrameState): void {
+    const { pose } = frame;
     this.puck.position.set(pose.x, pose.y, 0);
     this.puck.rotation.z = pose.yaw;
-    const seen = shown.layers.seen && !Number.isNaN(shown.seenX);
+    const seen = frame.layers.seen && !Number.isNaN(frame.seenX);
     this.seen.visible = seen;
-    this.lost.visible = seen && shown.lost;
+    this.lost.visible = seen && frame.lost;
     if (!seen) return;
-    // Above the puck: an outline inside of it would not be seen when both are at the same place.
-    this.seen.position.set(shown.seenX, shown.seenY, HEIGHT + 0.002);
+    // Above the puck, else the outline would be hidden when both positions are equal.
+    this.seen.position.set(frame.seenX, frame.seenY, HEIGHT + 0.002);
     this.lost.position.copy(this.seen.position);
   }
 

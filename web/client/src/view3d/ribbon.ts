@@ -2,10 +2,10 @@ import { BufferAttribute, BufferGeometry, DoubleSide, Mesh, MeshBasicMaterial } 
 import { between, type Path } from "../motion/paths";
 
 const WIDTH = 0.006;
-/** A dash and its gap are one segment of the path, which for what was commanded is a control step. */
+/** A dash with its gap is one segment of the path: a control step of the commanded path. */
 const DASH_SHARE = 0.55;
 
-/** A path as a flat band: thin lines of the graphics interface are a pixel wide on every screen. */
+/** A path as a flat band, because WebGL lines are always one pixel wide. */
 export class Ribbon {
   readonly mesh: Mesh<BufferGeometry, MeshBasicMaterial>;
   private path: Path | null = null;
@@ -16,7 +16,7 @@ export class Ribbon {
     this.mesh.visible = false;
   }
 
-  /** Shows the path between two positions, or nothing. */
+  /** Shows the path between two positions; hides it without a path. */
   set(path: Path | null, from: number, to: number): void {
     if (path !== null && path !== this.path) {
       this.path = path;

@@ -27,7 +27,7 @@ export function bar(
   return geometry.translate(middle.x, middle.y, middle.z);
 }
 
-/** A round body about z with its corners broken: radius, from z to z. */
+/** A cylinder about z with bevelled edges, between two heights. */
 export function drum(radius: number, from: number, to: number, corner: number): BufferGeometry {
   const profile = [
     [0, from],
@@ -39,7 +39,7 @@ export function drum(radius: number, from: number, to: number, corner: number): 
     [radius - corner, to],
     [0, to],
   ].map(([x, y]) => new Vector2(x, y));
-  // The lathe turns about y; z is to be the axis.
+  // The lathe rotates about y; rotate the axis to z.
   return new LatheGeometry(profile, 40).rotateX(Math.PI / 2);
 }
 

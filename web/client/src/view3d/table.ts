@@ -15,21 +15,21 @@ import type { Contest } from "../clip/motion";
 import { MODEL } from "../model/model";
 import { OUTER, rimOutline, successRegion } from "../model/table";
 import type { Palette } from "../replay/palette";
-import { Painted, type Piece } from "./painted";
+import { ColouredGeometry, type Piece } from "./coloured-geometry";
 import { mark } from "./shapes";
 
-/** Looks only, m: rims high enough to be seen as such and low enough to see the puck behind them. */
+/** Height for drawing only, m: high enough to be visible, low enough not to hide the puck. */
 const RIM_HEIGHT = 0.028;
 const FLOOR_Z = MODEL.bases[0].z_m;
 const LINE_WIDTH = 0.006;
 const DASH = 0.04;
 
-/** What stands still: table, rims, lines, the place where the puck has to end, and the floor for shadows. */
+/** Static objects: table, rims, lines, success region, and the floor for shadows. */
 export class TableModel {
   readonly group = new Group();
   private readonly surface = new MeshLambertMaterial();
   private readonly rims = new MeshLambertMaterial();
-  private readonly lines: Painted;
+  private readonly lines: ColouredGeometry;
   private readonly region = new MeshBasicMaterial({
     transparent: true,
     opacity: 0.1,
@@ -51,7 +51,7 @@ export class TableModel {
     floor.position.z = FLOOR_Z;
     floor.receiveShadow = true;
 
-    this.lines = new Painted(linePieces(contest));
+    this.lines = new ColouredGeometry(linePieces(contest));
     this.group.add(
       slab,
       rims,

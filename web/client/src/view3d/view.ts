@@ -9,9 +9,9 @@ import {
 } from "three";
 import type { Contest } from "../clip/motion";
 import type { Palette } from "../replay/palette";
-import { trail, type Shown, type View } from "../replay/shown";
+import { trail, type FrameState, type View } from "../replay/frame-state";
 import { ArmModel } from "./arm";
-import { Effort } from "./effort";
+import { RenderQuality } from "./quality";
 import { Orbit } from "./orbit";
 import { followPointer } from "./pointer";
 import { PuckModel } from "./puck";
@@ -19,16 +19,16 @@ import { Ribbon } from "./ribbon";
 import { TableModel } from "./table";
 
 const FIELD_OF_VIEW = 30;
-/** The camera's places fit a picture of this shape; on a narrower one it stands farther off. */
-const SHAPE = 1.6;
+/** Aspect ratio for which the presets are made; on a narrower picture the camera moves back. */
+const REFERENCE_ASPECT = 1.6;
 
-/** The table, the puck and the arms in space. Fails to be made where there is no WebGL. */
+/** Table, puck and arms in 3-D. The constructor throws without WebGL 2. */
 export class View3D implements View {
   readonly canvas: HTMLCanvasElement;
   readonly orbit: Orbit;
   private readonly renderer: WebGLRenderer;
   private readonly scene = new Scene();
-  private readonly camera = new PerspectiveCamera(FIELD_OF_VIEW, SHAPE, 0.05, 30);
+  private readonly camera = new PerspectiveCamera(FIELD_OF_VIEW, REFERENCE_ASPECT, 0.05, 30);
   private readonly puck = new PuckModel();
   private readonly puckPath = new Ribbon(false);
   private readonly real = [new Ribbon(false), new Ribbon(false)];
@@ -36,13 +36,13 @@ export class View3D implements View {
   private readonly arms: ArmModel[] = [];
   private table: TableModel | null = null;
   private palette: Palette | null = null;
-  private farther = 1;
-  private readonly effort = new Effort();
+  private distanceFactor = 1;
+  private readonly quality = new RenderQuality();
   private ratio = 1;
 
   constructor(still: boolean, changed: () => void) {
     this.canvas = document.createElement("canvas");
-    // Asked for here, as the library reports a browser without it in the console, where it alarms for nothing.
+    // Created here, because the library would log an error on browsers without WebGL 2.
     const context = this.canvas.getContext("webgl2", {
       alpha: false,
       antialias: true,
@@ -52,7 +52,7 @@ export class View3D implements View {
     this.renderer = new WebGLRenderer({ canvas: this.canvas, context });
     this.renderer.shadowMap.enabled = true;
     this.renderer.shadowMap.type = PCFShadowMap;
-    // What is reported as draw calls is to include those of the shadows.
+    // Draw calls of shadows must be counted, too.
     this.renderer.info.autoReset = false;
     this.orbit = new Orbit(still, changed);
     followPointer(this.canvas, this.orbit);
@@ -70,11 +70,11 @@ export class View3D implements View {
   resize(width: number, height: number, ratio: number): void {
     if (width === 0 || height === 0) return;
     this.ratio = ratio;
-    this.renderer.setPixelRatio(Math.min(ratio, this.effort.ratio));
+    this.renderer.setPixelRatio(Math.min(ratio, this.quality.ratio));
     this.renderer.setSize(width, height, false);
     this.camera.aspect = width / height;
     this.camera.updateProjectionMatrix();
-    this.farther = Math.max(SHAPE / this.camera.aspect, 1);
+    this.distanceFactor = Math.max(REFERENCE_ASPECT / this.camera.aspect, 1);
   }
 
   paint(palette: Palette): void {
@@ -88,44 +88,44 @@ export class View3D implements View {
     this.commanded.mesh.material.color.set(palette["rp-commanded"]);
   }
 
-  draw(shown: Shown): number {
-    const { motion, paths } = shown.part;
-    this.furnish(shown, motion.contest);
-    for (let i = 0; i < this.arms.length; i++) this.arms[i].set(shown.arms[i]);
-    this.puck.set(shown);
-    const [from, to] = trail(shown);
-    this.puckPath.set(shown.layers.puck ? paths.puck : null, from, to);
+  draw(frame: FrameState): number {
+    const { motion, paths } = frame.part;
+    this.addObjects(frame, motion.contest);
+    for (let i = 0; i < this.arms.length; i++) this.arms[i].set(frame.arms[i]);
+    this.puck.set(frame);
+    const [from, to] = trail(frame);
+    this.puckPath.set(frame.layers.puck ? paths.puck : null, from, to);
     for (let i = 0; i < this.real.length; i++) {
-      this.real[i].set(shown.layers.real && i < paths.real.length ? paths.real[i] : null, from, to);
+      this.real[i].set(frame.layers.real && i < paths.real.length ? paths.real[i] : null, from, to);
     }
-    this.commanded.set(shown.layers.commanded ? paths.commanded : null, from, to);
-    this.seat();
+    this.commanded.set(frame.layers.commanded ? paths.commanded : null, from, to);
+    this.placeCamera();
     this.renderer.info.reset();
     this.renderer.render(this.scene, this.camera);
     return this.renderer.info.render.calls;
   }
 
-  /** To be told of each frame while it plays: a machine that cannot keep up gets a plainer picture. */
-  pace(nowMs: number): void {
-    if (!this.effort.tooSlow(nowMs)) return;
-    this.renderer.shadowMap.enabled = this.effort.shadows;
-    // Materials know at their making whether there are shadows.
+  /** Call once per frame during playback: reduces the quality on slow machines. */
+  adaptQuality(nowMs: number): void {
+    if (!this.quality.recordFrame(nowMs)) return;
+    this.renderer.shadowMap.enabled = this.quality.shadows;
+    // Materials are compiled with shadows: only the lights are switched.
     this.scene.traverse((object) => {
-      if (object instanceof DirectionalLight) object.castShadow = this.effort.shadows;
+      if (object instanceof DirectionalLight) object.castShadow = this.quality.shadows;
     });
-    this.renderer.setPixelRatio(Math.min(this.ratio, this.effort.ratio));
+    this.renderer.setPixelRatio(Math.min(this.ratio, this.quality.ratio));
   }
 
-  /** Table and arms, once it is known what is played. */
-  private furnish(shown: Shown, contest: Contest): void {
-    const count = shown.part.motion.arms.length;
+  /** Adds table and arms when the content is known. */
+  private addObjects(frame: FrameState, contest: Contest): void {
+    const count = frame.part.motion.arms.length;
     if (this.table !== null && this.arms.length === count) return;
     if (this.table === null) {
       this.table = new TableModel(contest);
       this.scene.add(this.table.group);
     }
     while (this.arms.length < count) {
-      const arm = new ArmModel(shown.arms[this.arms.length]);
+      const arm = new ArmModel(frame.arms[this.arms.length]);
       this.arms.push(arm);
       this.scene.add(arm.group);
     }
@@ -133,19 +133,19 @@ export class View3D implements View {
     if (this.palette !== null) this.paint(this.palette);
   }
 
-  private seat(): void {
+  private placeCamera(): void {
     const { x, y, z, azimuth, elevation, distance } = this.orbit;
-    const flat = Math.cos(elevation) * distance * this.farther;
+    const flat = Math.cos(elevation) * distance * this.distanceFactor;
     this.camera.position.set(
       x + flat * Math.cos(azimuth),
       y + flat * Math.sin(azimuth),
-      z + Math.sin(elevation) * distance * this.farther,
+      z + Math.sin(elevation) * distance * this.distanceFactor,
     );
     this.camera.lookAt(x, y, z);
   }
 }
 
-/** From above and aside, so that a mallet's shadow shows how high it is. */
+/** Light from above and the side, so that the shadow of a mallet shows its height. */
 function sun(): DirectionalLight {
   const light = new DirectionalLight(0xffffff, 1.7);
   light.position.set(-0.8, -1.4, 3);

@@ -1,29 +1,29 @@
-//! Which strike, when: contact times and aims compared by the chance of a goal.
+//! Plans strikes: compares contact times and aims by the chance of a goal.
 
-use super::shot::{Aim, aims, chance};
+use super::shot::{Aim, candidate_aims, goal_chance};
 use crate::arm::Side;
 use crate::field::{Field, Vec2};
 use crate::keeper::Keeper;
 use crate::motion::{Pace, Target};
 use crate::puck::{DRAG, MALLET_RESTITUTION};
-use crate::scene::{Scene, around, lean};
+use crate::scene::{Scene, waypoint, lean_side};
 use crate::skills::aim::strike_towards;
 
 /// Duration of the run-up, seconds.
 const RUN_UP: f64 = 0.32;
-/// What speed² a run-up of one metre could reach: bounds the accelerations of short run-ups, m/s².
+/// Limit of the accelerations of short run-ups, as speed² per metre of run-up, m/s².
 const RUN_ACCELERATION: f64 = 30.0;
-/// Latest contact that is considered, seconds from now.
+/// Latest contact considered, seconds from now.
 const HORIZON: f64 = 2.2;
-/// Chance that a second of waiting costs.
-const IMPATIENCE: f64 = 0.02;
-/// Shots with less chance are not taken while the puck can be nudged to a better place.
-pub const WORTH_A_NUDGE: f64 = 0.45;
-/// The same in a game, where another shot may follow and the other side stands in the way.
-pub const WORTH_A_NUDGE_IN_GAME: f64 = 0.06;
-/// Pucks nearer to our goal are worth a nudge.
+/// Decrease of a plan's chance per second of waiting.
+const WAITING_COST: f64 = 0.02;
+/// A shot with a lower chance is replaced by a nudge to a better position, if one is possible.
+pub const NUDGE_THRESHOLD: f64 = 0.45;
+/// The same threshold in a game, where another shot may follow and the opponent is in the way.
+pub const NUDGE_THRESHOLD_IN_GAME: f64 = 0.06;
+/// Pucks nearer to the own goal than this x may be nudged.
 const NUDGE_FROM_X: f64 = -0.5;
-/// Where a nudged puck shall be …
+/// Target x of a nudged puck …
 const NUDGE_TO_X: f64 = -0.36;
 /// … this long after the nudge, seconds.
 const NUDGE_TIME: f64 = 2.6;
@@ -33,41 +33,41 @@ const NUDGE_TIME: f64 = 2.6;
 pub struct Plan {
     /// Time of contact since the episode's start, seconds.
     pub contact_time: f64,
-    /// Where on the goal line the puck shall arrive, and by which way.
+    /// Target on the goal line, and the way there.
     pub aim: Aim,
     pub mallet: Vec2,
     /// Direction of the mallet's motion and of the contact.
     pub normal: Vec2,
     /// Speed of the mallet at contact.
     pub speed: f64,
-    /// To which side the arm leans.
+    /// Side of the arm's elbow.
     pub side: Side,
-    /// Moves the puck forward to be struck again, instead of shooting.
+    /// Whether this is a nudge, which moves the puck forward for a later strike.
     pub nudge: bool,
     /// Chance of a goal.
     pub chance: f64,
 }
 
 impl Plan {
-    /// Where the run-up starts, and how long it takes in seconds.
+    /// Start of the run-up, and its duration in seconds.
     pub fn run_up(&self, field: &Field) -> (Vec2, f64) {
-        let wish = self.mallet - 0.5 * self.speed * RUN_UP * self.normal;
-        let start = field.clamp_mallet(wish);
+        let desired = self.mallet - 0.5 * self.speed * RUN_UP * self.normal;
+        let start = field.clamp_mallet(desired);
         let room = (self.mallet - start).dot(&self.normal).max(0.02);
         (start, (2.0 * room / self.speed).min(RUN_UP))
     }
 }
 
-/// The same plan with the present estimate of the puck, if there is still time to change it.
+/// Updates a plan with the present estimate of the puck; `None` if it is too late or impossible.
 pub fn refresh(scene: &Scene<'_>, plan: &Plan) -> Option<Plan> {
     let left = plan.contact_time - scene.time;
     (left > scene.dt)
-        .then(|| again(scene, plan, left, None))
+        .then(|| replan(scene, plan, left, None))
         .flatten()
 }
 
-/// The same plan, `left` seconds before the contact.
-pub fn again(scene: &Scene<'_>, plan: &Plan, left: f64, speed: Option<f64>) -> Option<Plan> {
+/// Plans the same strike again for a contact in `left` seconds.
+pub fn replan(scene: &Scene<'_>, plan: &Plan, left: f64, speed: Option<f64>) -> Option<Plan> {
     if plan.nudge {
         nudge_at(scene, left, plan.side)
     } else {
@@ -75,15 +75,15 @@ pub fn again(scene: &Scene<'_>, plan: &Plan, left: f64, speed: Option<f64>) -> O
     }
 }
 
-/// The earliest nudge that can be made.
+/// The earliest possible nudge.
 pub fn best_nudge(scene: &Scene<'_>) -> Option<Plan> {
-    let side = lean(scene.puck.pos);
+    let side = lean_side(scene.puck.pos);
     (0..20)
         .map(|k| 0.2 + 0.06 * f64::from(k))
         .find_map(|left| nudge_at(scene, left, side).filter(|plan| reachable(scene, plan, left)))
 }
 
-/// A gentle strike in `left` seconds after which the puck drifts to where shots are best.
+/// A gentle strike in `left` seconds that moves the puck to the best area for shots.
 fn nudge_at(scene: &Scene<'_>, left: f64, side: Side) -> Option<Plan> {
     let field = scene.field;
     let mut puck = scene.puck;
@@ -92,9 +92,9 @@ fn nudge_at(scene: &Scene<'_>, left: f64, side: Side) -> Option<Plan> {
     }
     let way = Vec2::new(NUDGE_TO_X, 0.8 * puck.pos.y) - puck.pos;
     let direction = way.normalize();
-    let wanted = way.norm() * DRAG / (1.0 - (-DRAG * NUDGE_TIME).exp());
+    let desired = way.norm() * DRAG / (1.0 - (-DRAG * NUDGE_TIME).exp());
     let speed =
-        (wanted + MALLET_RESTITUTION * puck.vel.dot(&direction)) / (1.0 + MALLET_RESTITUTION);
+        (desired + MALLET_RESTITUTION * puck.vel.dot(&direction)) / (1.0 + MALLET_RESTITUTION);
     if speed < 0.1 {
         return None;
     }
@@ -114,20 +114,20 @@ fn nudge_at(scene: &Scene<'_>, left: f64, side: Side) -> Option<Plan> {
         speed,
         side,
         nudge: true,
-        chance: WORTH_A_NUDGE,
+        chance: NUDGE_THRESHOLD,
     })
 }
 
-/// The strike with the best chance among contact times and aims.
+/// The strike with the highest chance of a goal over contact times and aims.
 pub fn best_plan(scene: &Scene<'_>) -> Option<Plan> {
     let mut best: Option<Plan> = None;
-    let side = lean(scene.puck.pos);
+    let side = lean_side(scene.puck.pos);
     let mut left = RUN_UP + 0.1;
-    let aims = aims(scene.keeper);
-    // A game has four times as many aims, and another shot soon.
+    let aims = candidate_aims(scene.keeper);
+    // In a game there are four times as many aims, and another shot soon.
     let step = match scene.keeper {
         Keeper::Rival(_) => 0.12,
-        Keeper::Nobody | Keeper::Pendulum(_) => 0.06,
+        Keeper::Unseen | Keeper::Pendulum(_) => 0.06,
     };
     while left < HORIZON {
         for &aim in &aims {
@@ -143,10 +143,10 @@ pub fn best_plan(scene: &Scene<'_>) -> Option<Plan> {
     best
 }
 
-/// Can the mallet be behind the puck in time without haste?
+/// Whether the mallet can reach the start of the run-up in time, without haste.
 fn reachable(scene: &Scene<'_>, plan: &Plan, left: f64) -> bool {
     let (start, run_up) = plan.run_up(scene.field);
-    let way = around(scene, start, scene.field.contact() + 0.015);
+    let way = waypoint(scene, start, scene.field.contact() + 0.015);
     let mut time = Target::stop(&scene.mallet, way, Pace::CALM).time;
     if way != start {
         time += 0.4;
@@ -157,7 +157,7 @@ fn reachable(scene: &Scene<'_>, plan: &Plan, left: f64) -> bool {
     time <= left - run_up
 }
 
-/// Length of the run-up that the table allows, metres.
+/// Length of the run-up that fits on the table, metres.
 fn room_behind(field: &Field, contact: Vec2, direction: Vec2) -> f64 {
     let limit = |pos: f64, step: f64, lo: f64, hi: f64| {
         if step > 1e-6 {
@@ -194,7 +194,7 @@ fn aim_at(scene: &Scene<'_>, left: f64, aim: Aim, side: Side, speed: Option<f64>
     if (mallet - field.clamp_mallet(mallet)).norm() > 1e-9 || mallet.x > -0.25 {
         return None;
     }
-    let chance = chance(field, scene.keeper, scene.time + left, &struck, aim) - IMPATIENCE * left;
+    let chance = goal_chance(field, scene.keeper, scene.time + left, &struck, aim) - WAITING_COST * left;
     Some(Plan {
         contact_time: scene.time + left,
         aim,

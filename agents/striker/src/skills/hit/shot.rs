@@ -1,4 +1,4 @@
-//! Ways to the other goal, straight or by one of the long rims, and the chance that a puck gets there.
+//! Shots at the opponent's goal, straight or by a long rim, and their chance of a goal.
 
 use crate::estimator::{FLOW_PER_SPEED, FLOW_TIME};
 use crate::field::{Field, Vec2};
@@ -9,33 +9,33 @@ use crate::skills::aim::{normal_cdf, strike_towards};
 
 /// Standard deviation of a shot's direction without air flow, radians.
 const AIM_ERROR: f64 = 0.012;
-/// What a bounce leaves of a path's slope against the rim, on average.
-const SLOPE_KEPT: f64 = 0.855;
-/// Standard deviation of that share: where in the millisecond the puck meets the rim is chance.
+/// Mean factor of a bounce on the slope of a path against the rim.
+const SLOPE_RESTITUTION: f64 = 0.855;
+/// Standard deviation of that factor: the time of contact within the millisecond is random.
 const SLOPE_ERROR: f64 = 0.08;
-/// Straight goal-line points that are tried against the pendulum of `hit`, metres.
+/// Goal-line points of straight shots against the pendulum of `hit`, metres.
 const AIMS: [f64; 5] = [-0.05, -0.025, 0.0, 0.025, 0.05];
-/// The same in a game, where the other side may stand still before the middle.
+/// Goal-line points of straight shots in a game, where the opponent may stay in front of the centre, metres.
 const GAME_AIMS: [f64; 9] = [
     -0.084, -0.063, -0.042, -0.021, 0.0, 0.021, 0.042, 0.063, 0.084,
 ];
 /// Goal-line points of shots by a rim, metres.
 const BANK_AIMS: [f64; 6] = [-0.09, -0.06, -0.03, 0.03, 0.06, 0.09];
 
-/// Where on the goal line a shot shall arrive, and how.
+/// Target of a shot on the goal line, and the way there.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Aim {
     /// y on the goal line, metres.
     pub y: f64,
-    /// By the long rim of this sign of y; 0 straight.
+    /// Sign of y of the long rim for a bank shot; 0 for a straight shot.
     pub via: f64,
 }
 
-/// The aims worth a try.
-pub fn aims(keeper: &Keeper) -> Vec<Aim> {
+/// The aims to compare.
+pub fn candidate_aims(keeper: &Keeper) -> Vec<Aim> {
     let straight = |y: &f64| Aim { y: *y, via: 0.0 };
     match keeper {
-        Keeper::Nobody | Keeper::Pendulum(_) => AIMS.iter().map(straight).collect(),
+        Keeper::Unseen | Keeper::Pendulum(_) => AIMS.iter().map(straight).collect(),
         Keeper::Rival(_) => {
             let bank = BANK_AIMS
                 .iter()
@@ -46,7 +46,7 @@ pub fn aims(keeper: &Keeper) -> Vec<Aim> {
 }
 
 impl Aim {
-    /// Unit direction in which a puck without spin must leave `from`.
+    /// Initial direction (unit vector) of a puck without spin from `from`.
     pub fn direction(&self, field: &Field, from: Vec2) -> Vec2 {
         let way = field.half_length - from.x;
         if self.via == 0.0 {
@@ -54,16 +54,16 @@ impl Aim {
         }
         let before = (field.puck_y() - self.via * from.y).max(0.0);
         let after = field.puck_y() - self.via * self.y;
-        Vec2::new(way, self.via * (before + after / SLOPE_KEPT)).normalize()
+        Vec2::new(way, self.via * (before + after / SLOPE_RESTITUTION)).normalize()
     }
 
-    /// The contact normal with which a mallet of speed `speed` sends the puck there, the puck just
-    /// after, and where it was told to go.
+    /// The contact normal with which a mallet of speed `speed` sends the puck to this aim, and the puck
+    /// just after the strike.
     pub fn strike(&self, field: &Field, puck: &Puck, speed: f64) -> (Vec2, Puck) {
-        let mut told = *self;
+        let mut adjusted = *self;
         let mut result = strike_towards(
             puck,
-            told.direction(field, puck.pos),
+            adjusted.direction(field, puck.pos),
             speed,
             field.contact(),
         );
@@ -73,10 +73,10 @@ impl Aim {
                 let Some(y) = arrival(field, result.1) else {
                     break;
                 };
-                told.y += (self.y - y).clamp(-0.2, 0.2);
+                adjusted.y += (self.y - y).clamp(-0.2, 0.2);
                 result = strike_towards(
                     puck,
-                    told.direction(field, puck.pos),
+                    adjusted.direction(field, puck.pos),
                     speed,
                     field.contact(),
                 );
@@ -86,7 +86,7 @@ impl Aim {
     }
 }
 
-/// Where a puck crosses the goal line after one bounce off a long rim.
+/// y at which a puck crosses the goal line after one bounce off a long rim.
 fn arrival(field: &Field, mut puck: Puck) -> Option<f64> {
     let (time, rim) = puck.next_rim(field)?;
     if rim != Rim::Long {
@@ -98,18 +98,18 @@ fn arrival(field: &Field, mut puck: Puck) -> Option<f64> {
     (puck.vel.x > 1e-3).then(|| puck.pos.y + way * puck.vel.y / puck.vel.x)
 }
 
-/// The chance that the puck, struck at `time`, passes the keeper and enters the goal.
-pub fn chance(field: &Field, keeper: &Keeper, time: f64, struck: &Puck, aim: Aim) -> f64 {
+/// Probability that a puck struck at `time` passes the keeper and enters the goal.
+pub fn goal_chance(field: &Field, keeper: &Keeper, time: f64, struck: &Puck, aim: Aim) -> f64 {
     match keeper {
-        Keeper::Rival(rival) => past_rival(field, rival, struck, aim),
-        Keeper::Nobody => straight(field, None, time, struck, aim.y),
-        Keeper::Pendulum(opponent) => straight(field, Some(opponent), time, struck, aim.y),
+        Keeper::Rival(rival) => chance_past_rival(field, rival, struck, aim),
+        Keeper::Unseen => straight_chance(field, None, time, struck, aim.y),
+        Keeper::Pendulum(opponent) => straight_chance(field, Some(opponent), time, struck, aim.y),
     }
 }
 
-/// Standard deviation across the way that the air flow causes on a way of `length` that takes
-/// `flight`: its random, correlated acceleration, proportional to the speed, twice integrated.
-/// Aiming errors add to it.
+/// Standard deviation across a path of `length` with duration `flight`. The air flow contributes the
+/// double integral of its random, correlated acceleration, which is proportional to the speed; aiming
+/// errors add to it.
 fn spread_across(length: f64, flight: f64) -> f64 {
     let tau = FLOW_TIME;
     let integral = 2.0 * tau * flight.powi(3) / 3.0 - (tau * flight).powi(2) + 2.0 * tau.powi(4)
@@ -117,19 +117,19 @@ fn spread_across(length: f64, flight: f64) -> f64 {
     (FLOW_PER_SPEED * length / flight * integral.max(0.0).sqrt()).hypot(AIM_ERROR * length)
 }
 
-/// Time of a way of `length` at first `speed`; none if the puck would hardly get there.
+/// Duration of a path of `length` with initial `speed`; `None` if the puck would barely arrive.
 fn flight(length: f64, speed: f64) -> Option<f64> {
     let share = DRAG * length / speed.max(1e-3);
     (share <= 0.9).then(|| -(1.0 - share).ln() / DRAG)
 }
 
-fn straight(field: &Field, opponent: Option<&Opponent>, time: f64, struck: &Puck, aim: f64) -> f64 {
+fn straight_chance(field: &Field, opponent: Option<&Opponent>, time: f64, struck: &Puck, aim: f64) -> f64 {
     let length = (Vec2::new(field.half_length, aim) - struck.pos).norm();
     let Some(flight) = flight(length, struck.vel.norm()) else {
         return 0.0;
     };
     let spread = spread_across(length, flight);
-    let within = |lo: f64, hi: f64| within(lo, hi, aim, spread);
+    let within = |lo: f64, hi: f64| probability_within(lo, hi, aim, spread);
     let half = field.half_goal - 0.7 * field.puck;
     let open = within(-half, half);
     let Some(opponent) = opponent else {
@@ -141,8 +141,8 @@ fn straight(field: &Field, opponent: Option<&Opponent>, time: f64, struck: &Puck
     open - within((y - block).max(-half), (y + block).min(half))
 }
 
-/// Chance of a value between `lo` and `hi`.
-fn within(lo: f64, hi: f64, mean: f64, deviation: f64) -> f64 {
+/// Probability of a value between `lo` and `hi`.
+fn probability_within(lo: f64, hi: f64, mean: f64, deviation: f64) -> f64 {
     if hi <= lo {
         0.0
     } else {
@@ -150,15 +150,15 @@ fn within(lo: f64, hi: f64, mean: f64, deviation: f64) -> f64 {
     }
 }
 
-fn past_rival(field: &Field, rival: &Rival, struck: &Puck, aim: Aim) -> f64 {
+fn chance_past_rival(field: &Field, rival: &Rival, struck: &Puck, aim: Aim) -> f64 {
     let goal = Vec2::new(field.half_length, aim.y);
     let from = struck.pos;
-    // The last stretch starts at the puck or where it leaves the rim.
+    // The last segment starts at the puck or where it leaves the rim.
     let (corner, first) = if aim.via == 0.0 {
         (from, 0.0)
     } else {
         let before = (field.puck_y() - aim.via * from.y).max(0.0);
-        let after = (field.puck_y() - aim.via * aim.y) / SLOPE_KEPT;
+        let after = (field.puck_y() - aim.via * aim.y) / SLOPE_RESTITUTION;
         let x = from.x + (field.half_length - from.x) * before / (before + after);
         let corner = Vec2::new(x, aim.via * field.puck_y());
         (corner, (corner - from).norm())
@@ -185,8 +185,8 @@ fn past_rival(field: &Field, rival: &Rival, struck: &Puck, aim: Aim) -> f64 {
     let across = spread_across(length, flight) / heading.x.max(0.1);
     let spread = across.hypot(bounce);
     let half = field.half_goal - 0.7 * field.puck / heading.x.max(0.1);
-    let open = within(-half, half, aim.y, spread);
-    // The keeper's shadow on the goal line, seen from where the last stretch starts.
+    let open = probability_within(-half, half, aim.y, spread);
+    // The keeper's shadow on the goal line, seen from the start of the last segment.
     let way = rival.pos - corner;
     let distance = way.norm();
     let radius = field.contact() + 0.004;
@@ -202,14 +202,14 @@ fn past_rival(field: &Field, rival: &Rival, struck: &Puck, aim: Aim) -> f64 {
     let (lo, hi) = (on_line(middle - half_angle), on_line(middle + half_angle));
     let shadow_deviation = rival.deviation() * (last / distance).max(1.0);
     let blurred = spread.hypot(shadow_deviation);
-    let stopped = within(lo.max(-half), hi.min(half), aim.y, blurred);
+    let stopped = probability_within(lo.max(-half), hi.min(half), aim.y, blurred);
     let first_hit = if first > 0.0 {
         let to_rival = rival.pos - from;
         let heading = (corner - from) / first;
         let along = to_rival.dot(&heading).clamp(0.0, first);
         let miss = (to_rival - along * heading).norm();
         let deviation = (AIM_ERROR * along).hypot(rival.deviation()).max(1e-3);
-        within(-radius, radius, miss, deviation)
+        probability_within(-radius, radius, miss, deviation)
     } else {
         0.0
     };

@@ -1,4 +1,4 @@
-//! Trying strikes at a puck near the rim against the puck model.
+//! Simulates strikes at a puck near the rim with the puck model.
 
 use crate::contact::{SUBSTEP, substep};
 use crate::field::{Field, Vec2};
@@ -6,20 +6,20 @@ use crate::puck::{DRAG, Puck, Rim};
 
 /// Half width of the strip in which a puck counts as prepared, with a margin.
 const SAFE_Y: f64 = 0.365;
-/// The area along x, with a margin.
+/// Range of x in which a puck counts as prepared, with a margin.
 const SAFE_X: (f64, f64) = (-0.78, -0.22);
-/// Line at which the episode ends.
+/// |y| at which the episode ends.
 const CENTRE_Y: f64 = 0.01;
 /// Deceleration of the mallet after a strike, m/s².
 pub const BRAKE: f64 = 7.0;
-/// Directions of the contact normal that are tried.
+/// Number of directions of the contact normal.
 pub const NORMALS: usize = 60;
-/// Mallet speeds that are tried, m/s.
+/// Mallet speeds to compare, m/s.
 const SPEEDS: [f64; 7] = [0.12, 0.2, 0.3, 0.42, 0.55, 0.7, 0.9];
-/// Angles between contact normal and mallet motion that are tried, radians.
+/// Angles between contact normal and mallet motion to compare, radians.
 const SLANTS: [f64; 3] = [0.0, -0.5, 0.5];
 
-/// A strike: contact normal (mallet to puck), mallet velocity, and what it promises.
+/// A strike: contact normal (mallet to puck), mallet velocity, and expected value.
 #[derive(Debug, Clone, Copy)]
 pub struct Strike {
     pub normal: Vec2,
@@ -27,26 +27,26 @@ pub struct Strike {
     pub value: f64,
 }
 
-/// From the start of the run-up to the contact.
+/// Displacement from the start of the run-up to the contact.
 pub fn run_up(velocity: &Vec2) -> Vec2 {
     let time = (0.16 + 0.15 * velocity.norm()).min(0.3);
     0.5 * time * velocity
 }
 
-/// Will it do as it is?
-pub fn prepared(puck: &Puck) -> bool {
+/// Whether the puck will come to rest in the prepared area.
+pub fn is_prepared(puck: &Puck) -> bool {
     let rest = puck.pos + puck.vel / DRAG;
     rest.y.abs() < SAFE_Y && rest.x > SAFE_X.0 && rest.x < SAFE_X.1 && puck.vel.x < 0.05
 }
 
-fn turned(v: Vec2, angle: f64) -> Vec2 {
+fn rotate(v: Vec2, angle: f64) -> Vec2 {
     let (sin, cos) = angle.sin_cos();
     Vec2::new(cos * v.x - sin * v.y, sin * v.x + cos * v.y)
 }
 
-/// Tries the strikes of one contact normal.
+/// Evaluates the strikes of one contact normal, and stores a better one in `best`.
 pub fn try_normal(field: &Field, puck: &Puck, index: usize, best: &mut Option<Strike>) {
-    let normal = turned(
+    let normal = rotate(
         Vec2::x(),
         std::f64::consts::TAU * index as f64 / NORMALS as f64,
     );
@@ -56,7 +56,7 @@ pub fn try_normal(field: &Field, puck: &Puck, index: usize, best: &mut Option<St
     }
     for slant in SLANTS {
         for speed in SPEEDS {
-            let velocity = speed * turned(normal, slant);
+            let velocity = speed * rotate(normal, slant);
             let start = contact - run_up(&velocity);
             let end = contact + 0.5 * speed / BRAKE * velocity;
             let shortened = (start - field.clamp_mallet(start)).norm();
@@ -66,7 +66,7 @@ pub fn try_normal(field: &Field, puck: &Puck, index: usize, best: &mut Option<St
                 continue;
             }
             let least = best.map_or(0.05, |b| b.value + 1e-9);
-            if let Some(value) = value(field, puck, normal, velocity, least) {
+            if let Some(value) = strike_value(field, puck, normal, velocity, least) {
                 *best = Some(Strike {
                     normal,
                     velocity,
@@ -77,9 +77,9 @@ pub fn try_normal(field: &Field, puck: &Puck, index: usize, best: &mut Option<St
     }
 }
 
-/// Mean worth of a strike over variations of what is uncertain (contact normal, speed), if it exceeds
-/// `least`. Gentler strikes are preferred a little.
-fn value(field: &Field, puck: &Puck, normal: Vec2, velocity: Vec2, least: f64) -> Option<f64> {
+/// Mean value of a strike over variations of uncertain parameters (contact normal, speed), if it
+/// exceeds `least`. Gentler strikes have a small advantage.
+fn strike_value(field: &Field, puck: &Puck, normal: Vec2, velocity: Vec2, least: f64) -> Option<f64> {
     const VARIATIONS: [(f64, f64); 7] = [
         (0.0, 1.0),
         (0.05, 1.0),
@@ -93,7 +93,7 @@ fn value(field: &Field, puck: &Puck, normal: Vec2, velocity: Vec2, least: f64) -
     let cost = 0.03 * velocity.norm();
     let mut sum = 0.0;
     for (k, (turn, factor)) in VARIATIONS.iter().enumerate() {
-        sum += outcome(field, *puck, turned(normal, *turn), *factor * velocity);
+        sum += strike_outcome(field, *puck, rotate(normal, *turn), *factor * velocity);
         let possible = (sum + count - 1.0 - k as f64) / count - cost;
         if possible < least {
             return None;
@@ -102,11 +102,11 @@ fn value(field: &Field, puck: &Puck, normal: Vec2, velocity: Vec2, least: f64) -
     Some(sum / count - cost)
 }
 
-/// How a strike ends: 1 prepared, less if nearer to it than before, 0 spoilt.
-fn outcome(field: &Field, mut puck: Puck, normal: Vec2, velocity: Vec2) -> f64 {
+/// Value of a strike's result: 1 for a prepared puck, less for an easier next strike, 0 for a failure.
+fn strike_outcome(field: &Field, mut puck: Puck, normal: Vec2, velocity: Vec2) -> f64 {
     let speed = velocity.norm();
     let direction = velocity / speed;
-    // Contact, braking and a moment's rest of the mallet, at the scale of the contact.
+    // Contact, braking and a short rest of the mallet, in substeps.
     let mut mallet = puck.pos - (field.contact() + 1e-4) * normal;
     let mut v = speed;
     let mut time = 0.0;
@@ -114,11 +114,11 @@ fn outcome(field: &Field, mut puck: Puck, normal: Vec2, velocity: Vec2) -> f64 {
         substep(&mut puck, field, mallet, v * direction);
         mallet += SUBSTEP * v * direction;
         time += SUBSTEP;
-        // The reference brakes after the planned contact, which takes a control step to notice.
+        // The reference brakes in the control step after the planned contact.
         if time > 0.01 {
             v = (v - BRAKE * SUBSTEP).max(0.0);
         }
-        if let Some(end) = ended(&puck) {
+        if let Some(end) = end_value(&puck) {
             return end;
         }
         let gap = (puck.pos - mallet).norm() - field.contact();
@@ -131,37 +131,37 @@ fn outcome(field: &Field, mut puck: Puck, normal: Vec2, velocity: Vec2) -> f64 {
             break;
         }
     }
-    slide_out(field, puck)
+    slide_value(field, puck)
 }
 
-/// The task's end, if the puck is there.
-fn ended(puck: &Puck) -> Option<f64> {
+/// Value of the episode's end, if the puck has reached it.
+fn end_value(puck: &Puck) -> Option<f64> {
     if puck.pos.x > -0.01 {
         return Some(0.0);
     }
-    (puck.pos.y.abs() < CENTRE_Y).then(|| crossing(puck.pos.x, puck.vel.x))
+    (puck.pos.y.abs() < CENTRE_Y).then(|| crossing_value(puck.pos.x, puck.vel.x))
 }
 
-/// Worth of crossing the middle at `x` with `vx`: less near the borders of what is asked for.
-fn crossing(x: f64, vx: f64) -> f64 {
+/// Value of crossing the middle at `x` with `vx`: less near the limits of a success.
+fn crossing_value(x: f64, vx: f64) -> f64 {
     let along = ((x - SAFE_X.0).min(SAFE_X.1 - x) / 0.06).clamp(0.0, 1.0);
     let slow = ((0.09 - vx) / 0.06).clamp(0.0, 1.0);
     along * slow
 }
 
-/// Where the puck comes to rest or crosses the middle, the mallet out of its way.
-pub fn slide_out(field: &Field, mut puck: Puck) -> f64 {
+/// Value of the position where the puck comes to rest or crosses the middle without another contact.
+pub fn slide_value(field: &Field, mut puck: Puck) -> f64 {
     for _ in 0..8 {
         let (span, rim) = puck
             .next_rim(field)
             .map_or((8.0, None), |(t, r)| (t.min(8.0), Some(r)));
         let end = puck.pos + puck.vel * ((1.0 - (-DRAG * span).exp()) / DRAG);
         if end.y * puck.pos.y < 0.0 || end.y.abs() < CENTRE_Y {
-            // Somewhere on this segment it crosses the middle.
+            // The puck crosses the middle on this segment.
             let share = (puck.pos.y.abs() - CENTRE_Y) / (puck.pos.y - end.y).abs().max(1e-9);
             let x = puck.pos.x + share * (end.x - puck.pos.x);
             let vx = puck.vel.x - DRAG * (x - puck.pos.x);
-            return crossing(x, vx);
+            return crossing_value(x, vx);
         }
         if end.x > -0.01 {
             return 0.0;
@@ -182,7 +182,7 @@ pub fn slide_out(field: &Field, mut puck: Puck) -> f64 {
     if p.x > SAFE_X.0 && p.x < SAFE_X.1 && p.y.abs() < SAFE_Y {
         return 0.97;
     }
-    // Not yet, but is the next strike easier?
+    // Not prepared, but the next strike may be easier.
     let off_rim = ((field.puck_y() - p.y.abs()) / 0.12).clamp(0.0, 1.0);
     let off_end = ((p.x + field.puck_x()) / 0.2).clamp(0.0, 1.0);
     if p.x < -0.2 {

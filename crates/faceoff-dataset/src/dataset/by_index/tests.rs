@@ -1,7 +1,7 @@
 use super::*;
 use crate::table::{ShardTable, StepRows, TableWriter, join};
 use bytes::Bytes;
-use faceoff_episode::{Answered, StepRow};
+use faceoff_episode::{AnswerTiming, StepRow};
 use faceoff_sim::{Episode, Interpolation, PerturbationSettings, Plant};
 use faceoff_types::{Profile, Seed};
 use parquet::file::reader::Length;
@@ -100,7 +100,7 @@ fn joined(dir: &Path, task: Task, shards: u32, episodes: u32, steps: u32) -> Vec
                     rows.push(&StepRow {
                         step,
                         action: &state.q.repeat(2),
-                        answered: Answered {
+                        timing: AnswerTiming {
                             computation_time_s: 1e-3,
                             host_time_s: 0.0,
                             cpu_time_s: None,

@@ -1,14 +1,14 @@
-//! A tournament on a site.
+//! A site with a tournament.
 
-use super::slot::{self, Went};
-use crate::site::{ADMIN, Answer, Site, TestTeam, text};
-use faceoff_store::{Claim, Game};
+use super::fake_slot::{self, GameOutcome};
+use crate::site::{ADMIN, Answer, Site, TestTeam, string};
+use faceoff_store::{JobClaim, Game};
 use faceoff_types::Seed;
 use reqwest::Method;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 
-/// A tournament of teams that all have a valid agent.
+/// A site with a tournament, whose teams all have a valid submission.
 pub struct Cup {
     pub site: Site,
     pub teams: BTreeMap<String, TestTeam>,
@@ -16,7 +16,7 @@ pub struct Cup {
 }
 
 impl Cup {
-    /// Teams with agents, and a tournament of them.
+    /// Creates teams with valid submissions, and a tournament of them.
     pub async fn open(names: &[&str], body: Value) -> Self {
         Self::open_on(Site::start().await, names, body).await
     }
@@ -46,9 +46,9 @@ impl Cup {
         &self.teams[team].token
     }
 
-    /// What the organiser asks of the tournament.
-    pub async fn post(&self, what: &str, body: Value) -> Answer {
-        let path = format!("{}/{what}", self.path);
+    /// A request of the organiser below the tournament's path.
+    pub async fn post(&self, resource: &str, body: Value) -> Answer {
+        let path = format!("{}/{resource}", self.path);
         self.site.post(&path, Some(ADMIN), &body).await
     }
 
@@ -57,12 +57,12 @@ impl Cup {
         Answer::of(request.json(&body).send().await.unwrap()).await
     }
 
-    /// As everybody sees it.
+    /// The tournament's public view.
     pub async fn view(&self) -> Value {
         self.site.get(&self.path, None).await.json(200)
     }
 
-    /// Its games, as everybody sees them.
+    /// The public list of games, all pages of it.
     pub async fn games(&self) -> Vec<Value> {
         let mut games = Vec::new();
         let mut page = format!("{}/games", self.path);
@@ -81,8 +81,8 @@ impl Cup {
         self.post("rounds", json!({})).await.json(201)
     }
 
-    /// A team's newest upload becomes an agent of the season later.
-    pub async fn late_team(&mut self, name: &str) {
+    /// Adds a team with a valid submission, without entering it in the tournament.
+    pub async fn add_team(&mut self, name: &str) {
         let team = self.site.team(name).await;
         self.site
             .valid_submission(&team, &format!("{name}-agent"))
@@ -90,30 +90,30 @@ impl Cup {
         self.teams.insert(name.to_owned(), team);
     }
 
-    /// The next game, as a slot gets it; none: nothing is to be done.
-    pub async fn claim(&self) -> Option<(Claim, Game, Seed)> {
-        slot::claim(&self.site).await
+    /// Claims the next game as a slot does; `None` if no game is queued.
+    pub async fn claim(&self) -> Option<(JobClaim, Game, Seed)> {
+        fake_slot::claim(&self.site).await
     }
 
-    /// The names of both sides.
+    /// The names of both teams of a game.
     pub async fn names(&self, game: &Game) -> [String; 2] {
-        slot::names(&self.site, game).await
+        fake_slot::names(&self.site, game).await
     }
 
-    /// Commits a result with its files.
-    pub async fn commit(&self, claim: &Claim, game: &Game, seed: Seed, went: Went) {
-        slot::commit(&self.site, (claim, game, seed), went).await;
+    /// Commits the result of a game with its files.
+    pub async fn commit(&self, claim: &JobClaim, game: &Game, seed: Seed, outcome: GameOutcome) {
+        fake_slot::commit(&self.site, (claim, game, seed), outcome).await;
     }
 
-    /// Plays the next game; none: nothing is to be done.
-    pub async fn play_next(&self, went: impl Fn(&Game, [&str; 2]) -> Went) -> Option<Game> {
-        slot::play_next(&self.site, went).await
+    /// Plays the next game; `None` if no game is queued.
+    pub async fn play_next(&self, outcome: impl Fn(&Game, [&str; 2]) -> GameOutcome) -> Option<Game> {
+        fake_slot::play_next(&self.site, outcome).await
     }
 
-    /// Plays until nothing is left; how many.
-    pub async fn play(&self, went: impl Fn(&Game, [&str; 2]) -> Went) -> u32 {
+    /// Plays all queued games. Returns their number.
+    pub async fn play(&self, outcome: impl Fn(&Game, [&str; 2]) -> GameOutcome) -> u32 {
         let mut played = 0;
-        while self.play_next(&went).await.is_some() {
+        while self.play_next(&outcome).await.is_some() {
             played += 1;
         }
         played
@@ -121,15 +121,16 @@ impl Cup {
 }
 
 /// The team whose name comes first wins 2 : 1.
-pub fn first_by_name_wins(_: &Game, [home, away]: [&str; 2]) -> Went {
+pub fn first_by_name_wins(_: &Game, [home, away]: [&str; 2]) -> GameOutcome {
     if home < away {
-        Went::goals(2, 1)
+        GameOutcome::goals(2, 1)
     } else {
-        Went::goals(1, 2)
+        GameOutcome::goals(1, 2)
     }
 }
 
-pub fn by_tournament(game: &Value) -> (String, String) {
-    let name = |side: usize| text(&game["sides"][side]["team_name"]);
+/// The names of both teams, from the view of a game.
+pub fn team_names(game: &Value) -> (String, String) {
+    let name = |side: usize| string(&game["sides"][side]["team_name"]);
     (name(0), name(1))
 }

@@ -1,16 +1,16 @@
-//! Who meets whom: round robins with byes, groups with a final, Swiss, mirrored pairs.
+//! Tournament formats: round robin with byes, groups with a final, Swiss, and mirrored pairs.
 
 use super::{
-    cup::{Cup, by_tournament, first_by_name_wins},
-    slot::Went,
+    cup::{Cup, team_names, first_by_name_wins},
+    fake_slot::GameOutcome,
 };
-use crate::site::{ADMIN, Site, result, text};
+use crate::site::{ADMIN, Site, result, string};
 use serde_json::{Value, json};
 use std::collections::{BTreeMap, BTreeSet};
 
 fn meetings(games: &[Value], round: u32) -> BTreeSet<(String, String)> {
-    let of_round = games.iter().filter(|game| game["round"] == round);
-    of_round.map(by_tournament).collect()
+    let round_games = games.iter().filter(|game| game["round"] == round);
+    round_games.map(team_names).collect()
 }
 
 fn turned(pairs: &BTreeSet<(String, String)>) -> BTreeSet<(String, String)> {
@@ -19,19 +19,19 @@ fn turned(pairs: &BTreeSet<(String, String)>) -> BTreeSet<(String, String)> {
 }
 
 #[tokio::test]
-async fn a_round_robin_twice_of_an_odd_number_has_byes_and_swaps_sides() {
+async fn double_round_robin_has_byes_and_swaps_sides() {
     let names = ["A", "B", "C", "D", "E"];
     let cup = Cup::open(&names, json!({})).await;
     for round in 1..=2 {
         let started = cup.start_round().await;
         let byes = started["byes"].as_array().unwrap();
-        let with_bye: BTreeSet<String> = byes.iter().map(|bye| text(&bye["team_name"])).collect();
+        let with_bye: BTreeSet<String> = byes.iter().map(|bye| string(&bye["team_name"])).collect();
         assert_eq!(with_bye, names.map(str::to_owned).into());
         assert_eq!(started["number"], round);
-        // Matchday by matchday.
+        // Games are played in the order of matchdays.
         let mut last = 0;
         while let Some(game) = cup.play_next(first_by_name_wins).await {
-            let matchday = game.purpose.meeting().unwrap().matchday;
+            let matchday = game.purpose.schedule_entry().unwrap().matchday;
             assert!(matchday >= last, "{matchday} after {last}");
             last = matchday;
         }
@@ -64,11 +64,11 @@ async fn a_round_robin_twice_of_an_odd_number_has_byes_and_swaps_sides() {
 }
 
 #[tokio::test]
-async fn a_game_tells_what_its_seed_follows_from_and_not_the_seed() {
+async fn game_shows_its_seed_label_but_not_the_seed() {
     let cup = Cup::open(&["A", "B", "C", "D"], json!({})).await;
     cup.start_round().await;
     let games = cup.games().await;
-    let labels: Vec<String> = games.iter().map(|game| text(&game["seed_label"])).collect();
+    let labels: Vec<String> = games.iter().map(|game| string(&game["seed_label"])).collect();
     assert_eq!(labels[0], "tournament/1/round/1/meeting/1");
     let distinct: BTreeSet<&String> = labels.iter().collect();
     assert_eq!(distinct.len(), 6);
@@ -77,13 +77,13 @@ async fn a_game_tells_what_its_seed_follows_from_and_not_the_seed() {
     let organisers = cup.site.get(&path, Some(ADMIN)).await.json(200);
     let public = cup.site.get(&path, Some(cup.token("A"))).await.body;
     for game in organisers.as_array().unwrap() {
-        let seed = text(&game["result"]["recording"]["seed"]);
+        let seed = string(&game["result"]["recording"]["seed"]);
         assert!(!public.contains(&seed), "{seed} is in {public}");
     }
 }
 
 #[tokio::test]
-async fn groups_send_their_best_to_a_final_that_counts_alone() {
+async fn groups_send_their_best_to_a_final() {
     let names = ["A", "B", "C", "D", "E", "F"];
     let format = json!({ "kind": "groups", "groups": 2, "advance": 1 });
     let cup = Cup::open(&names, json!({ "rules": { "format": format } })).await;
@@ -99,30 +99,30 @@ async fn groups_send_their_best_to_a_final_that_counts_alone() {
     assert_eq!(cup.play(first_by_name_wins).await, 6);
     let best_of = |group: &Value| {
         let names = group.as_array().unwrap().iter();
-        names.map(text).min().unwrap()
+        names.map(string).min().unwrap()
     };
     let finalists: BTreeSet<String> = groups.iter().map(best_of).collect();
     let last = cup.start_round().await;
-    let of_final: BTreeSet<String> = last["submissions"]
+    let entrants_of_final: BTreeSet<String> = last["submissions"]
         .as_array()
         .unwrap()
         .iter()
-        .map(|one| text(&one["team_name"]))
+        .map(|one| string(&one["team_name"]))
         .collect();
-    assert_eq!(of_final, finalists);
-    // In the final the other one wins.
+    assert_eq!(entrants_of_final, finalists);
+    // In the final the other team wins.
     let upset =
-        |game: &faceoff_store::Game, names: [&str; 2]| first_by_name_wins(game, names).turned();
+        |game: &faceoff_store::Game, names: [&str; 2]| first_by_name_wins(game, names).swapped();
     assert_eq!(cup.play(upset).await, 1);
     let view = cup.view().await;
-    let of: Vec<&Value> = view["tables"]
+    let titles: Vec<&Value> = view["tables"]
         .as_array()
         .unwrap()
         .iter()
         .map(|table| &table["of"])
         .collect();
     assert_eq!(
-        of,
+        titles,
         [&json!("final"), &json!({"group": 1}), &json!({"group": 2})]
     );
     assert_eq!(view["champion"], json!(finalists.last().unwrap()));
@@ -132,7 +132,7 @@ async fn groups_send_their_best_to_a_final_that_counts_alone() {
 }
 
 #[tokio::test]
-async fn a_swiss_tournament_pairs_neighbours_and_gives_points_for_a_bye() {
+async fn swiss_pairs_neighbours_and_gives_points_for_a_bye() {
     let names = ["A", "B", "C", "D", "E"];
     let format = json!({ "kind": "swiss", "rounds": 3 });
     let cup = Cup::open(&names, json!({ "rules": { "format": format } })).await;
@@ -144,7 +144,7 @@ async fn a_swiss_tournament_pairs_neighbours_and_gives_points_for_a_bye() {
         cup.play(first_by_name_wins).await;
     }
     for game in cup.games().await {
-        let (home, away) = by_tournament(&game);
+        let (home, away) = team_names(&game);
         *met.entry([home, away].into()).or_default() += 1;
     }
     assert!(met.values().all(|times| *times == 1), "{met:?}");
@@ -160,16 +160,16 @@ async fn a_swiss_tournament_pairs_neighbours_and_gives_points_for_a_bye() {
         .map(|row| row["points"].as_u64().unwrap())
         .sum();
     assert_eq!(points, 3 * (2 * 3 + 3), "three for each win and each bye");
-    // Who lost no game stands first. With a bye for one of them the two best may not meet, where that
-    // would make others meet again, and then goals decide: by the draw it is not always A.
-    let of = |team: &str| standings.iter().find(|row| row["team"] == team).unwrap();
-    assert_eq!(of("A")["points"], 9);
+    // A wins all its games. But if another team has a bye, the two best teams may not meet, since others would meet
+    // twice. Then goals decide between them, so the champion is not always A.
+    let row_of = |team: &str| standings.iter().find(|row| row["team"] == team).unwrap();
+    assert_eq!(row_of("A")["points"], 9);
     assert_eq!(standings[0]["points"], 9);
     assert_eq!(view["champion"], standings[0]["team"]);
 }
 
 #[tokio::test]
-async fn a_mirrored_meeting_is_two_games_of_one_seed_with_sides_swapped() {
+async fn mirrored_meeting_is_two_games_with_the_same_seed() {
     let rules = json!({ "mirrored": true, "format": { "kind": "round_robin", "rounds": 1 } });
     let cup = Cup::open(&["A", "B", "C"], json!({ "rules": rules })).await;
     cup.start_round().await;
@@ -183,10 +183,10 @@ async fn a_mirrored_meeting_is_two_games_of_one_seed_with_sides_swapped() {
             [&halves[0]["second_half"], &halves[1]["second_half"]],
             [false, true]
         );
-        let (home, away) = by_tournament(&halves[0]);
-        assert_eq!(by_tournament(&halves[1]), (away, home));
+        let (home, away) = team_names(&halves[0]);
+        assert_eq!(team_names(&halves[1]), (away, home));
     }
-    assert_eq!(one.purpose.meeting().unwrap().meeting, 1);
+    assert_eq!(one.purpose.schedule_entry().unwrap().pairing, 1);
     let standings = cup.view().await["tables"][0]["standings"].clone();
     assert_eq!(standings[0]["points"], 12, "each half counts");
     let ratings = cup
@@ -196,12 +196,12 @@ async fn a_mirrored_meeting_is_two_games_of_one_seed_with_sides_swapped() {
         .json(200);
     assert_eq!(
         ratings["results"][0]["units"], 3,
-        "the pair is the piece of evidence"
+        "a mirrored pair counts as one observation"
     );
 }
 
 #[tokio::test]
-async fn who_enters_by_default_stands_on_the_board_and_is_safe_enough() {
+async fn default_entrants_are_ranked_and_deployable_or_improvable() {
     let site = Site::start().await;
     site.ranked_teams(&[
         ("Deployable", result([0.5; 3], 10.0)),
@@ -225,7 +225,7 @@ async fn who_enters_by_default_stands_on_the_board_and_is_safe_enough() {
             .as_array()
             .unwrap()
             .iter()
-            .map(|one| text(&one["team_name"]))
+            .map(|one| string(&one["team_name"]))
             .collect();
         assert_eq!(names, ["Deployable", "Improvable"]);
         assert_eq!(opened["stage"], json!(site.stage().await));
@@ -241,7 +241,7 @@ async fn who_enters_by_default_stands_on_the_board_and_is_safe_enough() {
 }
 
 #[tokio::test]
-async fn a_team_without_a_valid_agent_holds_a_round_up_by_name() {
+async fn team_without_valid_submission_blocks_the_round() {
     let mut cup = Cup::open(&["A", "B"], json!({})).await;
     let late = cup.site.team("Late").await;
     cup.teams.insert("Late".to_owned(), late);
@@ -252,16 +252,16 @@ async fn a_team_without_a_valid_agent_holds_a_round_up_by_name() {
         .await
         .problem(409, "conflict", &["Late", "Wait for them"]);
     assert_eq!(cup.view().await["phase"], "open", "nothing was done");
-    // Withdrawn it holds nothing up.
+    // After its withdrawal the round can start.
     let out = json!({ "team": "Late", "as": "withdrawn", "reason": "no agent", "confirm": "Late" });
     let view = cup.post("departures", out).await.json(200);
     assert_eq!(view["entrants"].as_array().unwrap().len(), 2);
     cup.start_round().await;
-    assert_eq!(cup.play(|_, _| Went::goals(1, 1)).await, 1);
+    assert_eq!(cup.play(|_, _| GameOutcome::goals(1, 1)).await, 1);
 }
 
 #[tokio::test]
-async fn of_two_rounds_started_at_once_one_is() {
+async fn concurrent_round_starts_create_one_round() {
     let cup = Cup::open(&["A", "B", "C"], json!({})).await;
     let (one, other) = tokio::join!(cup.post("rounds", json!({})), cup.post("rounds", json!({})));
     let mut statuses = [one.status.as_u16(), other.status.as_u16()];

@@ -1,12 +1,12 @@
-//! A game followed while it is played, over a real connection. The slot is the test.
+//! Live streams of games over real connections. The test acts as the slot.
 
-use super::{cup::Cup, slot::Went};
+use super::{cup::Cup, fake_slot::GameOutcome};
 use crate::{
     site::{Answer, Site},
     sse::{Event, Stream},
 };
 use faceoff_http::HttpLimits;
-use faceoff_types::{GameHappening, GameId, LiveHappening, LivePosition, Side};
+use faceoff_types::{GameEvent, GameId, LiveEvent, LivePosition, Side};
 use reqwest::Method;
 use serde_json::json;
 
@@ -15,8 +15,8 @@ async fn open(cup: &Cup, game: GameId, last: Option<&str>) -> Stream {
     Stream::open(&cup.site, &path, None, last).await
 }
 
-/// The next event that is no position.
-async fn next_told(stream: &mut Stream) -> Option<Event> {
+/// The next event other than a position.
+async fn next_event(stream: &mut Stream) -> Option<Event> {
     loop {
         let event = stream.next().await?;
         if event.name != "position" {
@@ -25,20 +25,20 @@ async fn next_told(stream: &mut Stream) -> Option<Event> {
     }
 }
 
-fn goal(step: u32, score: [u32; 2]) -> LiveHappening {
-    LiveHappening {
+fn goal(step: u32, score: [u32; 2]) -> LiveEvent {
+    LiveEvent {
         step,
-        what: GameHappening::Goal {
+        event: GameEvent::Goal {
             by: Side::First,
             score,
         },
     }
 }
 
-fn ended(step: u32, score: [u32; 2]) -> LiveHappening {
-    LiveHappening {
+fn ended(step: u32, score: [u32; 2]) -> LiveEvent {
+    LiveEvent {
         step,
-        what: GameHappening::Ended {
+        event: GameEvent::Ended {
             score,
             winner: Some(Side::First),
             forfeits: [None, None],
@@ -54,9 +54,9 @@ fn position(step: u32) -> LivePosition {
     }
 }
 
-async fn under_way() -> (
+async fn running_game() -> (
     Cup,
-    faceoff_store::Claim,
+    faceoff_store::JobClaim,
     faceoff_store::Game,
     faceoff_types::Seed,
 ) {
@@ -67,8 +67,8 @@ async fn under_way() -> (
 }
 
 #[tokio::test]
-async fn a_game_is_followed_to_its_end_and_resumed_without_a_gap() {
-    let (cup, claim, game, seed) = under_way().await;
+async fn live_stream_is_resumed_without_a_gap() {
+    let (cup, claim, game, seed) = running_game().await;
     let live = cup.site.store.live_games();
     live.begin(game.id, 1, 45_000);
     let mut stream = open(&cup, game.id, None).await;
@@ -78,21 +78,21 @@ async fn a_game_is_followed_to_its_end_and_resumed_without_a_gap() {
         ("snapshot", &json!(1))
     );
     live.advance(game.id, 1, vec![goal(300, [1, 0])], Some(position(301)));
-    let told = stream.next().await.unwrap();
+    let event = stream.next().await.unwrap();
     assert_eq!(
-        (told.name.as_str(), told.id.as_deref(), &told.data["kind"]),
+        (event.name.as_str(), event.id.as_deref(), &event.data["kind"]),
         ("happening", Some("1.1"), &json!("goal"))
     );
     assert_eq!(stream.next().await.unwrap().name, "position");
     drop(stream);
 
-    // Meanwhile two more goals fall, and then many positions of which the newest is told.
+    // Meanwhile there are two more goals and many positions, of which only the newest is sent.
     live.advance(game.id, 1, vec![goal(600, [2, 0])], None);
     live.advance(game.id, 1, vec![goal(900, [3, 0])], None);
     for step in 901..1000 {
         live.advance(game.id, 1, Vec::new(), Some(position(step)));
     }
-    let mut resumed = open(&cup, game.id, told.id.as_deref()).await;
+    let mut resumed = open(&cup, game.id, event.id.as_deref()).await;
     let snapshot = resumed.next().await.unwrap();
     assert_eq!(
         (
@@ -108,20 +108,20 @@ async fn a_game_is_followed_to_its_end_and_resumed_without_a_gap() {
     ];
     assert_eq!(ids, [Some("1.2".to_owned()), Some("1.3".to_owned())]);
     live.advance(game.id, 1, vec![ended(45_000, [3, 0])], None);
-    let end = next_told(&mut resumed).await.unwrap();
+    let end = next_event(&mut resumed).await.unwrap();
     assert_eq!(
         (end.id.as_deref(), &end.data["kind"]),
         (Some("1.4"), &json!("ended"))
     );
-    let over = next_told(&mut resumed).await.unwrap();
+    let over = next_event(&mut resumed).await.unwrap();
     assert_eq!(
         (over.name.as_str(), &over.data),
         ("over", &json!({ "game": game.id, "state": "played" }))
     );
     assert_eq!(resumed.next().await, None, "the stream ends with the game");
 
-    // Who comes when it is over gets all of it at once, and the end.
-    cup.commit(&claim, &game, seed, Went::goals(3, 0)).await;
+    // A stream that is opened after the end has all events at once, and ends.
+    cup.commit(&claim, &game, seed, GameOutcome::goals(3, 0)).await;
     let mut late = open(&cup, game.id, None).await;
     let mut names = Vec::new();
     while let Some(event) = late.next().await {
@@ -141,8 +141,8 @@ async fn a_game_is_followed_to_its_end_and_resumed_without_a_gap() {
 }
 
 #[tokio::test]
-async fn a_game_that_waits_is_waited_for_and_one_of_another_attempt_begins_anew() {
-    let (cup, claim, game, _) = under_way().await;
+async fn live_stream_waits_for_the_start_and_restarts_on_retry() {
+    let (cup, claim, game, _) = running_game().await;
     let live = cup.site.store.live_games();
     let mut stream = open(&cup, game.id, None).await;
     assert_eq!(stream.next().await.unwrap().name, "waiting");
@@ -150,36 +150,36 @@ async fn a_game_that_waits_is_waited_for_and_one_of_another_attempt_begins_anew(
     assert_eq!(stream.next().await.unwrap().name, "snapshot");
     live.advance(game.id, 1, vec![goal(5, [1, 0])], None);
     assert_eq!(stream.next().await.unwrap().id.as_deref(), Some("1.1"));
-    // The slot is asked to end: what was told of this attempt is worth nothing.
+    // The slot shuts down, so this attempt is void.
     cup.site
         .store
         .release(&claim, cup.site.now())
         .await
         .unwrap();
-    live.over(game.id, 1);
+    live.end_attempt(game.id, 1);
     let broken = stream.next().await.unwrap();
     assert_eq!(broken.data["kind"], "broken_off");
     assert_eq!(stream.next().await.unwrap().name, "waiting");
     let (_, again, _) = cup.claim().await.unwrap();
     assert_eq!(again.id, game.id);
     live.begin(game.id, 2, 45_000);
-    let anew = stream.next().await.unwrap();
+    let restarted = stream.next().await.unwrap();
     assert_eq!(
-        (anew.name.as_str(), &anew.data["attempt"]),
+        (restarted.name.as_str(), &restarted.data["attempt"]),
         ("snapshot", &json!(2))
     );
     live.advance(game.id, 2, vec![goal(7, [1, 0])], None);
     assert_eq!(stream.next().await.unwrap().id.as_deref(), Some("2.1"));
-    // An id of the attempt before is worth nothing: all of this one is told.
+    // An event id of the previous attempt is ignored: all events of this attempt are sent.
     let mut other = open(&cup, game.id, Some("1.2")).await;
     assert_eq!(other.next().await.unwrap().name, "snapshot");
     assert_eq!(other.next().await.unwrap().id.as_deref(), Some("2.1"));
 }
 
 #[tokio::test]
-async fn a_game_that_nobody_watched_is_told_by_its_result_alone() {
-    let (cup, claim, game, seed) = under_way().await;
-    cup.commit(&claim, &game, seed, Went::goals(4, 1)).await;
+async fn live_stream_of_a_finished_game_has_its_result() {
+    let (cup, claim, game, seed) = running_game().await;
+    cup.commit(&claim, &game, seed, GameOutcome::goals(4, 1)).await;
     let mut stream = open(&cup, game.id, None).await;
     let snapshot = stream.next().await.unwrap();
     assert_eq!(
@@ -204,14 +204,14 @@ async fn a_game_that_nobody_watched_is_told_by_its_result_alone() {
 }
 
 #[tokio::test]
-async fn so_many_follow_games_at_a_time() {
+async fn number_of_live_readers_is_limited() {
     let limits = HttpLimits {
         live_readers: 1,
-        ..crate::site::patient()
+        ..crate::site::generous_limits()
     };
     let cup = Cup::open_on(Site::start_with(limits).await, &["A", "B"], json!({})).await;
     cup.start_round().await;
-    let game: GameId = crate::site::text(&cup.games().await[0]["id"])
+    let game: GameId = crate::site::string(&cup.games().await[0]["id"])
         .parse()
         .unwrap();
     let mut stream = open(&cup, game, None).await;
@@ -220,7 +220,7 @@ async fn so_many_follow_games_at_a_time() {
     let busy = cup.site.get(&path, None).await;
     busy.problem(503, "busy", &["1 readers"]);
     assert_eq!(busy.header("retry-after"), "2");
-    // A game that is called off is over for whoever follows it.
+    // The stream of a cancelled game ends.
     let out = json!({ "team": "A", "as": "withdrawn", "reason": "x", "confirm": "A" });
     cup.post("departures", out).await.json(200);
     assert_eq!(stream.next().await.unwrap().data["state"], "cancelled");
@@ -228,11 +228,11 @@ async fn so_many_follow_games_at_a_time() {
 }
 
 #[tokio::test]
-async fn a_server_that_ends_does_not_wait_for_the_end_of_games() {
-    let (mut cup, _, game, _) = under_way().await;
+async fn shutdown_does_not_wait_for_the_end_of_games() {
+    let (mut cup, _, game, _) = running_game().await;
     cup.site.store.live_games().begin(game.id, 1, 45_000);
     let mut stream = open(&cup, game.id, None).await;
     assert_eq!(stream.next().await.unwrap().name, "snapshot");
-    cup.site.end().await;
-    assert_eq!(stream.next().await, None, "whole, and not cut off");
+    cup.site.shut_down().await;
+    assert_eq!(stream.next().await, None, "the stream ends without an error");
 }

@@ -1,20 +1,20 @@
-//! The pages of tournaments: what they show, and what they do not show who has not watched yet.
+//! The pages of tournaments, with and without results.
 
 use super::{
     cup::{Cup, first_by_name_wins},
-    slot::Went,
+    fake_slot::GameOutcome,
 };
 use crate::{
     browser::Browser,
     html::{page, rows, texts},
-    site::{ADMIN, Answer, Site, text},
+    site::{ADMIN, Answer, Site, string},
 };
 use faceoff_store::Game;
-use faceoff_types::{GameHappening, LiveHappening, LivePosition, Side};
+use faceoff_types::{GameEvent, LiveEvent, LivePosition, Side};
 use scraper::{Html, Selector};
 use serde_json::{Value, json};
 
-/// Once everybody against everybody.
+/// A round robin of one round.
 fn one_round() -> Value {
     json!({ "rules": { "format": { "kind": "round_robin", "rounds": 1 } } })
 }
@@ -30,8 +30,8 @@ fn links(html: &Html, selector: &str) -> Vec<String> {
         .collect()
 }
 
-/// The page as somebody gets it who has chosen to see no results.
-async fn hidden(site: &Site, path: &str) -> Answer {
+/// Opens a page as a visitor who has chosen to hide results.
+async fn open_without_results(site: &Site, path: &str) -> Answer {
     let mut browser = Browser::new(site);
     browser.cookie = Some("spoilers=hidden".to_owned());
     let answer = browser.open(path).await;
@@ -41,29 +41,29 @@ async fn hidden(site: &Site, path: &str) -> Answer {
     answer
 }
 
-/// A page's bytes without its ids and assets, in whose digits anything may be found.
+/// The page without ids and hashes, whose digits may contain any number.
 fn without_ids(body: &str) -> String {
     body.split(|letter: char| !letter.is_ascii_hexdigit() && letter != '-')
         .filter(|word| word.len() >= 32)
         .fold(body.to_owned(), |text, id| text.replace(id, "ID"))
 }
 
-/// Two goals that nothing else on a page has.
-const SCORED: [u32; 2] = [7913, 4421];
+/// Numbers of goals that appear nowhere else on a page.
+const UNUSUAL_SCORE: [u32; 2] = [7913, 4421];
 
-fn strikingly(_: &Game, [home, away]: [&str; 2]) -> Went {
-    let went = Went {
+fn unusual_outcome(_: &Game, [home, away]: [&str; 2]) -> GameOutcome {
+    let outcome = GameOutcome {
         penalty_points: [1.25, 2.5],
-        ..Went::goals(SCORED[0], SCORED[1])
+        ..GameOutcome::goals(UNUSUAL_SCORE[0], UNUSUAL_SCORE[1])
     };
-    if home > away { went } else { went.turned() }
+    if home > away { outcome } else { outcome.swapped() }
 }
 
-/// Nothing of how the games of [`strikingly`] ended is anywhere in a page.
+/// Asserts that a page reveals no result of games that end by [`unusual_outcome`].
 #[track_caller]
-fn check_tells_nothing(body: &str) {
+fn check_reveals_nothing(body: &str) {
     let body = without_ids(body);
-    for telling in [
+    for revealing in [
         "7913",
         "4421",
         "3492",
@@ -81,8 +81,8 @@ fn check_tells_nothing(body: &str) {
         "95&nbsp;%",
         "the-end-was-odd",
     ] {
-        let found = body.find(telling);
-        let around = found.map(|at| {
+        let found = body.find(revealing);
+        let context = found.map(|at| {
             let from = body[..at]
                 .char_indices()
                 .rev()
@@ -90,15 +90,15 @@ fn check_tells_nothing(body: &str) {
                 .map_or(0, |(at, _)| at);
             body[from..].chars().take(200).collect::<String>()
         });
-        assert_eq!(around, None, "{telling:?} is told");
+        assert_eq!(context, None, "{revealing:?} is on the page");
     }
 }
 
 #[tokio::test]
-async fn without_a_tournament_the_list_says_so_and_nothing_leads_there() {
+async fn empty_tournament_list_is_not_linked() {
     let site = Site::start().await;
     let list = page(&site, "/tournaments").await;
-    assert_eq!(texts(&list, "h2"), ["There is no tournament yet"]);
+    assert_eq!(texts(&list, "h2"), ["No tournament yet"]);
     assert!(!links(&list, "header a").contains(&"/tournaments".to_owned()));
     let none = site
         .get(&format!("/tournaments/{}", uuid::Uuid::now_v7()), None)
@@ -107,16 +107,16 @@ async fn without_a_tournament_the_list_says_so_and_nothing_leads_there() {
 }
 
 #[tokio::test]
-async fn a_tournaments_page_has_standings_cross_table_schedule_ratings_and_submissions() {
+async fn tournament_page_shows_tables_schedule_and_ratings() {
     let cup = Cup::open(&["A", "B", "C"], one_round()).await;
     let path = path(&cup);
     let open = page(&cup.site, &path).await;
-    assert!(texts(&open, "h2").contains(&"No round was started yet".to_owned()));
+    assert!(texts(&open, "h2").contains(&"No round has started yet".to_owned()));
     cup.start_round().await;
     cup.play_next(first_by_name_wins).await.unwrap();
     let between = page(&cup.site, &path).await;
     assert!(texts(&between, ".standings caption")[0].starts_with("Provisional"));
-    assert!(texts(&between, ".games td").contains(&"waits for a slot".to_owned()));
+    assert!(texts(&between, ".games td").contains(&"waiting for a free slot".to_owned()));
     cup.play(first_by_name_wins).await;
 
     let html = page(&cup.site, &path).await;
@@ -130,12 +130,12 @@ async fn a_tournaments_page_has_standings_cross_table_schedule_ratings_and_submi
             "2 B 3 1 0 1 3 : 3 0 30.0".to_owned(),
             "3 C 0 0 0 2 2 : 4 −2 40.0".to_owned(),
         ]
-        .map(|row| rewritten(&row, &found)),
+        .map(|row| matching_row(&row, &found)),
     );
-    // Each game once in its row and once in the other's, from both sides, and linked.
+    // The cross table links each game twice: in the rows of both teams.
     let mut games: Vec<String> = Vec::new();
     for game in cup.games().await {
-        games.push(format!("/games/{}", text(&game["id"])));
+        games.push(format!("/games/{}", string(&game["id"])));
     }
     games.sort();
     let mut linked = links(&html, ".cross td a");
@@ -155,10 +155,10 @@ async fn a_tournaments_page_has_standings_cross_table_schedule_ratings_and_submi
     let mut listed = links(&html, ".games th a");
     listed.sort();
     assert_eq!(listed, games);
-    let told = texts(&html, ".games td:last-child");
+    let results = texts(&html, ".games td:last-child");
     assert!(
-        told.contains(&"A wins: higher score".to_owned()),
-        "{told:?}"
+        results.contains(&"A wins: higher score".to_owned()),
+        "{results:?}"
     );
     let ratings = rows(&html, "[data-live-region=ratings] tbody tr");
     assert_eq!(ratings.len(), 6, "by results and by goals: {ratings:?}");
@@ -170,54 +170,54 @@ async fn a_tournaments_page_has_standings_cross_table_schedule_ratings_and_submi
             .unwrap(),
     ) {
         assert!(
-            entrant.contains(&text(&submission["submission"])),
+            entrant.contains(&string(&submission["submission"])),
             "{entrant}"
         );
     }
 
-    for from in [
+    for linking_page in [
         "/season",
         "/tournaments",
         &format!("/teams/{}", cup.teams["A"].id),
     ] {
-        let html = page(&cup.site, from).await;
-        assert!(links(&html, "main a").contains(&path), "{from}");
+        let html = page(&cup.site, linking_page).await;
+        assert!(links(&html, "main a").contains(&path), "{linking_page}");
         assert!(
             links(&html, "header a").contains(&"/tournaments".to_owned()),
-            "{from}"
+            "{linking_page}"
         );
     }
 }
 
-/// Penalty points follow from who was at home; the rest of a row is what counts here.
-fn rewritten(row: &str, rows: &[String]) -> String {
+/// The row among `rows` with the same cells except for the last one. The penalty points in it depend on the home side.
+fn matching_row(row: &str, rows: &[String]) -> String {
     let head = row.rsplit_once(' ').unwrap().0;
     let found = rows.iter().find(|found| found.starts_with(head));
     found.map_or_else(|| row.to_owned(), Clone::clone)
 }
 
 #[tokio::test]
-async fn what_was_voided_and_who_left_stand_in_the_schedule_with_the_reason() {
+async fn schedule_shows_voided_games_with_their_reason() {
     let cup = Cup::open(&["A", "B", "C"], one_round()).await;
     cup.start_round().await;
     let game = cup.play_next(first_by_name_wins).await.unwrap();
     let [home, away] = cup.names(&game).await;
     let voided = json!({ "reason": "a <b>lamp</b> fell", "confirm": format!("{home} - {away}") });
-    let path_of = format!("/api/v1/games/{}/void", game.id);
-    let answer = cup.site.post(&path_of, Some(ADMIN), &voided).await;
+    let void_path = format!("/api/v1/games/{}/void", game.id);
+    let answer = cup.site.post(&void_path, Some(ADMIN), &voided).await;
     assert_eq!(answer.status, 200, "{}", answer.body);
     let html = page(&cup.site, &path(&cup)).await;
-    let told = texts(&html, ".games td:last-child");
+    let results = texts(&html, ".games td:last-child");
     assert!(
-        told.contains(&"voided, to be played again: a <b>lamp</b> fell".to_owned()),
-        "{told:?}"
+        results.contains(&"voided, to be played again: a <b>lamp</b> fell".to_owned()),
+        "{results:?}"
     );
-    let hidden = hidden(&cup.site, &path(&cup)).await;
-    assert!(!hidden.body.contains("lamp"), "a reason may tell");
+    let hidden = open_without_results(&cup.site, &path(&cup)).await;
+    assert!(!hidden.body.contains("lamp"), "a reason may reveal the result");
 }
 
 #[tokio::test]
-async fn a_game_that_was_taken_out_says_by_whose_leaving() {
+async fn excluded_game_names_the_team_that_left() {
     let cup = Cup::open(&["A", "B", "C"], one_round()).await;
     cup.start_round().await;
     let game = cup.play_next(first_by_name_wins).await.unwrap();
@@ -225,29 +225,29 @@ async fn a_game_that_was_taken_out_says_by_whose_leaving() {
     let out =
         json!({ "team": home, "as": "withdrawn", "reason": "the arm is sold", "confirm": home });
     cup.post("departures", out).await.json(200);
-    let words = format!("since {home} left");
-    let of_game = page(&cup.site, &format!("/games/{}", game.id)).await;
-    assert!(texts(&of_game, ".lead")[0].contains(&words));
+    let words = format!("because {home} left");
+    let game_page = page(&cup.site, &format!("/games/{}", game.id)).await;
+    assert!(texts(&game_page, ".lead")[0].contains(&words));
     let html = page(&cup.site, &path(&cup)).await;
     assert_eq!(
         links(&html, ".cross a.out").len(),
         4,
-        "its two games are struck through, from both sides"
+        "its two games are struck through in both rows"
     );
-    let told = texts(&html, ".games td:last-child");
-    assert!(told.iter().any(|told| told.ends_with(&words)), "{told:?}");
+    let results = texts(&html, ".games td:last-child");
+    assert!(results.iter().any(|result| result.ends_with(&words)), "{results:?}");
     let teams = texts(&html, "[data-live-region=entrants] th");
-    let left = format!("{home} withdrawn from round 1 on: the arm is sold");
+    let left = format!("{home} withdrawn from round 1: the arm is sold");
     assert!(teams.contains(&left), "{teams:?}");
 }
 
 #[tokio::test]
-async fn who_wants_no_spoilers_finds_no_result_anywhere_and_can_ask_for_one() {
+async fn hidden_results_are_on_no_page_until_requested() {
     let cup = Cup::open(&["Ant", "Bee", "Cat"], one_round()).await;
     cup.start_round().await;
-    cup.play(strikingly).await;
+    cup.play(unusual_outcome).await;
     let games = cup.games().await;
-    let game = format!("/games/{}", text(&games[0]["id"]));
+    let game = format!("/games/{}", string(&games[0]["id"]));
     let [ant, bee] = ["Ant", "Bee"].map(|name| cup.teams[name].id.clone());
     let pages = [
         path(&cup),
@@ -258,30 +258,30 @@ async fn who_wants_no_spoilers_finds_no_result_anywhere_and_can_ask_for_one() {
     for path in &pages {
         let open = cup.site.get(path, None).await;
         assert_eq!(open.status, 200, "{}", open.body);
-        check_tells_nothing(&hidden(&cup.site, path).await.body);
+        check_reveals_nothing(&open_without_results(&cup.site, path).await.body);
     }
     let shown = without_ids(&cup.site.get(&pages[0], None).await.body);
     assert!(
         shown.contains("7913") && shown.contains("Champion"),
-        "else nothing was hidden"
+        "the page shows results without the setting"
     );
-    let teams = Html::parse_document(&hidden(&cup.site, &pages[0]).await.body);
-    let order = texts(&teams, ".cross th[scope=row]");
+    let teams = Html::parse_document(&open_without_results(&cup.site, &pages[0]).await.body);
+    let team_names = texts(&teams, ".cross th[scope=row]");
     assert_eq!(
-        order,
+        team_names,
         ["1 Ant", "2 Bee", "3 Cat"],
-        "by name, the champion last"
+        "sorted by name, not by rank"
     );
 
-    let html = Html::parse_document(&hidden(&cup.site, &game).await.body);
-    let asked = format!("{game}?show=result");
-    assert!(links(&html, "#result ~ p a").contains(&asked));
-    let told = hidden(&cup.site, &asked).await.body;
-    assert!(told.contains("7913"), "{told}");
+    let html = Html::parse_document(&open_without_results(&cup.site, &game).await.body);
+    let with_result = format!("{game}?show=result");
+    assert!(links(&html, "#result ~ p a").contains(&with_result));
+    let body = open_without_results(&cup.site, &with_result).await.body;
+    assert!(body.contains("7913"), "{body}");
 }
 
 #[tokio::test]
-async fn the_choice_is_a_form_of_our_own_pages_and_leads_back() {
+async fn spoiler_setting_is_a_form_that_redirects_back() {
     let cup = Cup::open(&["A", "B"], one_round()).await;
     let path = path(&cup);
     let mut browser = Browser::new(&cup.site);
@@ -299,13 +299,13 @@ async fn the_choice_is_a_form_of_our_own_pages_and_leads_back() {
     );
     let page = browser.open(&path).await;
     assert!(page.body.contains("Results are hidden"), "{}", page.body);
-    let away = browser
+    let redirected = browser
         .submit(
             "/spoilers",
             &[("results", "shown"), ("next", "https://evil.example/games")],
         )
         .await;
-    assert_eq!(away.header("location"), "/tournaments");
+    assert_eq!(redirected.header("location"), "/tournaments");
     assert_eq!(browser.cookie, None);
 
     let request = browser.http.post(format!("{}/spoilers", cup.site.url));
@@ -319,51 +319,51 @@ async fn the_choice_is_a_form_of_our_own_pages_and_leads_back() {
 }
 
 #[tokio::test]
-async fn who_reached_the_final_is_a_result_too() {
+async fn finalists_are_hidden_like_results() {
     let rules = json!({ "format": { "kind": "groups", "groups": 2, "advance": 1 } });
     let cup = Cup::open(&["A", "B", "C", "D"], json!({ "rules": rules })).await;
     cup.start_round().await;
-    cup.play(strikingly).await;
+    cup.play(unusual_outcome).await;
     cup.start_round().await;
-    cup.play(strikingly).await;
+    cup.play(unusual_outcome).await;
     let games = cup.games().await;
-    let last = games.iter().find(|game| game["round"] == 2).unwrap();
-    let last = format!("/games/{}", text(&last["id"]));
+    let final_game = games.iter().find(|game| game["round"] == 2).unwrap();
+    let final_game = format!("/games/{}", string(&final_game["id"]));
     let open = page(&cup.site, &path(&cup)).await;
-    assert!(links(&open, "main a").contains(&last));
-    let own = hidden(&cup.site, &path(&cup)).await;
-    check_tells_nothing(&own.body);
-    let own = Html::parse_document(&own.body);
-    assert!(!links(&own, "main a").contains(&last));
-    let rounds = texts(&own, "[data-live-region=entrants] tbody td");
+    assert!(links(&open, "main a").contains(&final_game));
+    let hidden_page = open_without_results(&cup.site, &path(&cup)).await;
+    check_reveals_nothing(&hidden_page.body);
+    let hidden_page = Html::parse_document(&hidden_page.body);
+    assert!(!links(&hidden_page, "main a").contains(&final_game));
+    let rounds = texts(&hidden_page, "[data-live-region=entrants] tbody td");
     assert!(
-        rounds.iter().all(|plays| !plays.contains("rounds 1, 2")),
+        rounds.iter().all(|cell| !cell.contains("rounds 1, 2")),
         "{rounds:?}"
     );
-    let asked = format!("{}?show=round-2", path(&cup));
-    let asked = hidden(&cup.site, &asked).await;
-    check_tells_nothing(&asked.body);
-    assert!(links(&Html::parse_document(&asked.body), "main a").contains(&last));
+    let with_result = format!("{}?show=round-2", path(&cup));
+    let with_result = open_without_results(&cup.site, &with_result).await;
+    check_reveals_nothing(&with_result.body);
+    assert!(links(&Html::parse_document(&with_result.body), "main a").contains(&final_game));
 }
 
 #[tokio::test]
-async fn two_teams_stand_side_by_side_whoever_was_at_home() {
+async fn pair_page_compares_two_teams_independent_of_sides() {
     let cup = Cup::open(&["A", "B", "C"], json!({})).await;
     for _ in 0..2 {
         cup.start_round().await;
-        cup.play(|_, [home, _]| Went {
+        cup.play(|_, [home, _]| GameOutcome {
             fouls: if home == "A" { [1, 4] } else { [4, 1] },
             ..if home == "A" {
-                Went::goals(5, 2)
+                GameOutcome::goals(5, 2)
             } else {
-                Went::goals(2, 5)
+                GameOutcome::goals(2, 5)
             }
         })
         .await;
     }
     let [a, b] = ["A", "B"].map(|name| cup.teams[name].id.clone());
-    let two = format!("{}/teams/{a}/{b}", path(&cup));
-    let html = page(&cup.site, &two).await;
+    let pair_path = format!("{}/teams/{a}/{b}", path(&cup));
+    let html = page(&cup.site, &pair_path).await;
     let found = rows(&html, "[aria-labelledby=side-by-side] tbody tr");
     for row in [
         "Games won 2 0",
@@ -375,11 +375,11 @@ async fn two_teams_stand_side_by_side_whoever_was_at_home() {
     }
     let games = texts(&html, "[aria-labelledby=numbers] tbody td:nth-of-type(1)");
     assert_eq!(games, ["5 : 2", "5 : 2"], "the page's first team first");
-    let turned = page(&cup.site, &format!("{}/teams/{b}/{a}", path(&cup))).await;
-    let games = texts(&turned, "[aria-labelledby=numbers] tbody td:nth-of-type(1)");
+    let swapped = page(&cup.site, &format!("{}/teams/{b}/{a}", path(&cup))).await;
+    let games = texts(&swapped, "[aria-labelledby=numbers] tbody td:nth-of-type(1)");
     assert_eq!(games, ["2 : 5", "2 : 5"]);
     let tournament = page(&cup.site, &path(&cup)).await;
-    assert!(links(&tournament, "main a").contains(&two));
+    assert!(links(&tournament, "main a").contains(&pair_path));
     for wrong in [
         format!("{}/teams/{a}/{a}", path(&cup)),
         format!("{}/teams/{a}/x", path(&cup)),
@@ -389,16 +389,16 @@ async fn two_teams_stand_side_by_side_whoever_was_at_home() {
 }
 
 #[tokio::test]
-async fn a_game_under_way_tells_its_score_without_a_script_and_names_its_stream() {
+async fn running_game_page_shows_score_and_live_stream() {
     let cup = Cup::open(&["A", "B"], one_round()).await;
     cup.start_round().await;
     let (claim, game, seed) = cup.claim().await.unwrap();
     let [home, _] = cup.names(&game).await;
     let live = cup.site.store.live_games();
     live.begin(game.id, 1, 45_000);
-    let goal = LiveHappening {
+    let goal = LiveEvent {
         step: 3000,
-        what: GameHappening::Goal {
+        event: GameEvent::Goal {
             by: Side::First,
             score: [1, 0],
         },
@@ -409,15 +409,15 @@ async fn a_game_under_way_tells_its_score_without_a_script_and_names_its_stream(
         mallets: [[-0.8, 0.0], [0.8, 0.0]],
     };
     live.advance(game.id, 1, vec![goal], Some(position));
-    let path_of = format!("/games/{}", game.id);
-    let html = page(&cup.site, &path_of).await;
+    let game_path = format!("/games/{}", game.id);
+    let html = page(&cup.site, &game_path).await;
     let verdict = texts(&html, ".verdict").remove(0);
     assert!(
         verdict.starts_with("1 : 0 after 1.0 of 15.0 minutes"),
         "{verdict}"
     );
-    let happened = rows(&html, "[data-live-region=live] tbody tr");
-    assert_eq!(happened, [format!("1:00.0 Goal by {home}: 1 : 0")]);
+    let events = rows(&html, "[data-live-region=live] tbody tr");
+    assert_eq!(events, [format!("1:00.0 Goal by {home}: 1 : 0")]);
     let main = Selector::parse("main").unwrap();
     let stream = |html: &Html| {
         let main = html.select(&main).next().unwrap();
@@ -435,16 +435,16 @@ async fn a_game_under_way_tells_its_score_without_a_script_and_names_its_stream(
     );
     let running = page(&cup.site, &path(&cup)).await;
     assert!(
-        links(&running, ".lead a").contains(&path_of),
-        "what is being played"
+        links(&running, ".lead a").contains(&game_path),
+        "the running game is linked"
     );
 
-    let own = hidden(&cup.site, &path_of).await;
-    let own = Html::parse_document(&own.body);
-    assert_eq!(stream(&own), None, "its stream tells the score");
-    assert!(texts(&own, ".verdict").is_empty());
-    cup.commit(&claim, &game, seed, Went::goals(3, 0)).await;
-    let over = page(&cup.site, &path_of).await;
-    assert_eq!(stream(&over), None);
-    assert!(texts(&over, ".verdict")[0].starts_with("3 : 0"));
+    let hidden_page = open_without_results(&cup.site, &game_path).await;
+    let hidden_page = Html::parse_document(&hidden_page.body);
+    assert_eq!(stream(&hidden_page), None, "the stream would reveal the score");
+    assert!(texts(&hidden_page, ".verdict").is_empty());
+    cup.commit(&claim, &game, seed, GameOutcome::goals(3, 0)).await;
+    let finished = page(&cup.site, &game_path).await;
+    assert_eq!(stream(&finished), None);
+    assert!(texts(&finished, ".verdict")[0].starts_with("3 : 0"));
 }

@@ -1,10 +1,10 @@
-//! How sure the champion is: the schedule played again.
+//! Certainty of the champion: repetitions of the whole schedule.
 
 use super::{
     cup::{Cup, first_by_name_wins},
-    slot::Went,
+    fake_slot::GameOutcome,
 };
-use crate::site::{ADMIN, Answer, text};
+use crate::site::{ADMIN, Answer, string};
 use faceoff_store::GamePurpose;
 use reqwest::Method;
 use serde_json::{Value, json};
@@ -17,7 +17,7 @@ async fn certainty(cup: &Cup) -> Value {
 }
 
 #[tokio::test]
-async fn the_schedule_played_again_says_how_often_each_team_would_have_been_champion() {
+async fn repeated_schedules_give_the_champion_probabilities() {
     let rules = json!({ "format": { "kind": "round_robin", "rounds": 1 } });
     let cup = Cup::open(&["A", "B", "C"], json!({ "rules": rules })).await;
     let none = certainty(&cup).await;
@@ -28,33 +28,33 @@ async fn the_schedule_played_again_says_how_often_each_team_would_have_been_cham
     cup.post("replays", json!({ "times": 1 })).await.problem(
         409,
         "conflict",
-        &["0 of 1 rounds were started"],
+        &["0 of 1 rounds started"],
     );
     cup.start_round().await;
     cup.play(first_by_name_wins).await;
     let before = cup.view().await;
-    let ordered = cup.post("replays", json!({ "times": 5 })).await.json(201);
+    let started = cup.post("replays", json!({ "times": 5 })).await.json(201);
     assert_eq!(
-        (&ordered["replays"], &ordered["complete"], &ordered["games"]),
+        (&started["replays"], &started["complete"], &started["games"]),
         (&json!(5), &json!(0), &json!(15))
     );
-    // In every other of them B wins everything.
-    let went = |game: &faceoff_store::Game, names: [&str; 2]| {
+    // In every second repetition B wins all its games.
+    let outcome = |game: &faceoff_store::Game, names: [&str; 2]| {
         let GamePurpose::Replay { replay, .. } = game.purpose else {
             panic!("expected a replay");
         };
         match names {
-            ["B", _] if replay % 2 == 0 => Went::goals(9, 0),
-            [_, "B"] if replay % 2 == 0 => Went::goals(0, 9),
+            ["B", _] if replay % 2 == 0 => GameOutcome::goals(9, 0),
+            [_, "B"] if replay % 2 == 0 => GameOutcome::goals(0, 9),
             _ => first_by_name_wins(game, names),
         }
     };
     for _ in 0..12 {
-        cup.play_next(went).await.unwrap();
+        cup.play_next(outcome).await.unwrap();
     }
-    let most = certainty(&cup).await;
+    let partial = certainty(&cup).await;
     assert_eq!(
-        (&most["complete"], &most["games_played"]),
+        (&partial["complete"], &partial["games_played"]),
         (&json!(4), &json!(12))
     );
     let request = cup.site.request(
@@ -62,15 +62,15 @@ async fn the_schedule_played_again_says_how_often_each_team_would_have_been_cham
         &format!("{}/replays", cup.path),
         Some(ADMIN),
     );
-    let off = Answer::of(request.send().await.unwrap()).await.json(200);
-    assert_eq!((&off["given_up"], &off["games"]), (&json!(1), &json!(12)));
+    let cancelled = Answer::of(request.send().await.unwrap()).await.json(200);
+    assert_eq!((&cancelled["given_up"], &cancelled["games"]), (&json!(1), &json!(12)));
     assert!(cup.claim().await.is_none());
     let all = certainty(&cup).await;
     let shares: Vec<(String, &Value)> = all["champions"]
         .as_array()
         .unwrap()
         .iter()
-        .map(|one| (text(&one["team"]), &one["first_places"]))
+        .map(|one| (string(&one["team"]), &one["first_places"]))
         .collect();
     assert_eq!(
         shares,
@@ -78,7 +78,7 @@ async fn the_schedule_played_again_says_how_often_each_team_would_have_been_cham
     );
     let interval = &all["champions"][0]["share_ci95"];
     assert!(interval[0].as_f64().unwrap() < 0.5 && interval[1].as_f64().unwrap() > 0.5);
-    // Nothing of it counts, and no file of it is kept.
+    // Repetitions do not count.
     assert_eq!(cup.view().await["tables"], before["tables"]);
     assert_eq!(cup.games().await.len(), 3);
     for wrong in [0, 1001] {
@@ -92,7 +92,7 @@ async fn the_schedule_played_again_says_how_often_each_team_would_have_been_cham
 }
 
 #[tokio::test]
-async fn a_game_of_a_replay_is_public_and_has_no_recording() {
+async fn repeated_game_is_public_and_has_no_recording() {
     let rules = json!({ "format": { "kind": "round_robin", "rounds": 1 } });
     let cup = Cup::open(&["A", "B"], json!({ "rules": rules })).await;
     cup.start_round().await;
@@ -113,5 +113,5 @@ async fn a_game_of_a_replay_is_public_and_has_no_recording() {
     cup.site
         .get(&format!("{path}/recording"), Some(ADMIN))
         .await
-        .problem(409, "conflict", &["no recording is kept"]);
+        .problem(409, "conflict", &["not recorded"]);
 }

@@ -1,9 +1,9 @@
-//! The season's days: who joins and uploads in the morning, the cut and what is played of it in the evening, and the
-//! night, in which the server tidies.
+//! The days of the season: new teams and uploads in the morning, the cutoff and its evaluations in the evening, and the
+//! server's clean-up at night.
 
-use super::stand_in::StandIn;
-use crate::site::{ADMIN, Answer, GZIP, Site, TestTeam, text};
-use faceoff_worker::{start_due, tidy};
+use super::fake_worker::FakeWorker;
+use crate::site::{ADMIN, Answer, GZIP, Site, TestTeam, string};
+use faceoff_worker::{start_due, clean_up};
 use jiff::{SignedDuration, Timestamp, ToSpan, civil::Date, tz::TimeZone};
 use reqwest::Method;
 use serde_json::{Value, json};
@@ -14,36 +14,36 @@ use std::{
 
 pub const DAYS: i32 = 90;
 const TEAMS: usize = 40;
-/// So many are there on the first day; of the others one joins each day.
+/// The number of teams on the first day. Of the others, one joins each day.
 const FIRST_TEAMS: usize = 30;
 const DAYS_PER_SUBMISSION: usize = 10;
-/// A tenth of a real stage's; so is the bound of the database.
+/// A tenth of a real stage's, and the bound of the database is scaled likewise.
 const EPISODES: u32 = 100;
-/// Of two tasks' episodes; a real stage cuts finer, which no row that stays depends on.
+/// One shard per task. A real stage has smaller shards, but the rows that stay do not depend on that.
 const EPISODES_PER_SHARD: u32 = EPISODES;
-/// The clocks change on 2026-03-29 there.
+/// A time zone with a change to summer time on 2026-03-29.
 const ZONE: &str = "Europe/Berlin";
 
 pub struct SeasonTeam {
     pub team: TestTeam,
     pub name: String,
-    /// It takes no part at present: disqualified, retired, or all of its agents withdrawn.
-    pub rests: bool,
+    /// The team has no evaluations at present: it is disqualified or retired, or all its submissions are withdrawn.
+    pub is_inactive: bool,
 }
 
 pub struct Season {
     pub site: Site,
     pub teams: Vec<SeasonTeam>,
-    pub stand_in: StandIn,
+    pub worker: FakeWorker,
     pub stages: Vec<Value>,
 }
 
-/// The first day, of which there is a number of nights to the `day`th.
+/// The date of a day, counted from 0.
 pub fn date(day: i32) -> Date {
     jiff::civil::date(2026, 3, 1).saturating_add(day.days())
 }
 
-/// An instant of that day, by the season's clocks.
+/// The time at this hour of a day, in the season's time zone.
 pub fn at(day: i32, hour: i8) -> Timestamp {
     let zone = TimeZone::get(ZONE).unwrap();
     date(day)
@@ -54,15 +54,14 @@ pub fn at(day: i32, hour: i8) -> Timestamp {
 }
 
 impl Season {
-    /// Three stages: two weeks of warm-up, two months whose best day counts, and two weeks that nobody sees the scores
-    /// of.
+    /// Three stages: two weeks of warm-up, two months whose best day counts, and two blind weeks.
     pub async fn start() -> Self {
         let site = Site::start().await;
-        site.turn_to(at(0, 8));
+        site.set_time(at(0, 8));
         let mut season = Self {
             site,
             teams: Vec::new(),
-            stand_in: StandIn::default(),
+            worker: FakeWorker::default(),
             stages: Vec::new(),
         };
         let first = season.site.stage().await;
@@ -119,38 +118,38 @@ impl Season {
             .json(200)
     }
 
-    /// The id of the stage that plays on this day.
+    /// The id of the stage that is open on this day.
     pub fn stage_of(&self, day: i32) -> String {
         let index = match day {
             ..14 => 0,
             14..75 => 1,
             _ => 2,
         };
-        text(&self.stages[index]["id"])
+        string(&self.stages[index]["id"])
     }
 
-    /// Who joins does, and who has a new agent uploads it.
+    /// Adds the new teams of the day, and uploads new submissions.
     pub async fn morning(&mut self, day: i32) {
-        self.site.turn_to(at(day, 10));
+        self.site.set_time(at(day, 10));
         let number = usize::try_from(day).unwrap();
-        let there = (FIRST_TEAMS + number).min(TEAMS);
-        for index in self.teams.len()..there {
+        let team_count = (FIRST_TEAMS + number).min(TEAMS);
+        for index in self.teams.len()..team_count {
             let name = format!("Team {index}");
             let team = self.site.team(&name).await;
             self.teams.push(SeasonTeam {
                 team,
                 name,
-                rests: false,
+                is_inactive: false,
             });
             self.upload(index, 0).await;
         }
-        for index in 0..there {
-            if (number + index) % DAYS_PER_SUBMISSION == 0 && number > 0 && !self.teams[index].rests
+        for index in 0..team_count {
+            if (number + index) % DAYS_PER_SUBMISSION == 0 && number > 0 && !self.teams[index].is_inactive
             {
                 self.upload(index, number).await;
             }
         }
-        self.stand_in.check_uploads(&self.site).await;
+        self.worker.perform_validations(&self.site).await;
     }
 
     pub async fn upload(&self, index: usize, version: usize) -> Value {
@@ -166,50 +165,50 @@ impl Season {
             .json(201)
     }
 
-    /// How many teams play a day that starts now.
-    pub fn playing(&self) -> usize {
-        self.teams.iter().filter(|team| !team.rests).count()
+    /// The number of teams with an evaluation on a day that starts now.
+    pub fn active_teams(&self) -> usize {
+        self.teams.iter().filter(|team| !team.is_inactive).count()
     }
 
-    /// The cut, not a millisecond before its time, and all that is played of it. Returns how many were scored.
+    /// The cutoff, not a millisecond before its time, and the evaluations of the day. Returns the number of scored ones.
     pub async fn evening(&mut self, day: i32) -> usize {
         let stage = self.stage_of(day);
         let shown = self.get(&format!("/stages/{stage}")).await;
-        let cut: Timestamp = text(&shown["next_cut"]["at"]).parse().unwrap();
+        let cutoff: Timestamp = string(&shown["next_cut"]["at"]).parse().unwrap();
         assert_eq!(
-            (cut, &shown["next_cut"]["day"]),
+            (cutoff, &shown["next_cut"]["day"]),
             (at(day, 18), &json!(date(day)))
         );
-        self.site.turn_to(cut - SignedDuration::from_millis(1));
+        self.site.set_time(cutoff - SignedDuration::from_millis(1));
         start_due(&self.site.store, self.site.now()).await.unwrap();
         assert_eq!(self.evaluations(day).await.len(), 0, "day {day}");
-        if super::organiser::is_down_at_the_cut(day) {
+        if super::organiser_actions::is_down_at_cutoff(day) {
             return 0;
         }
-        self.site.turn_to(cut);
-        start_due(&self.site.store, cut).await.unwrap();
+        self.site.set_time(cutoff);
+        start_due(&self.site.store, cutoff).await.unwrap();
         let started = self.evaluations(day).await.len();
-        assert_eq!(started, self.playing(), "day {day}");
-        let before = self.stand_in.scored;
-        self.site.later(1);
-        let plays = super::organiser::fits(day).unwrap_or(usize::MAX / 2);
-        self.stand_in.work(&self.site, plays).await;
-        self.stand_in.scored - before
+        assert_eq!(started, self.active_teams(), "day {day}");
+        let before = self.worker.scored;
+        self.site.advance(1);
+        let evaluations = super::organiser_actions::finished_evaluations(day).unwrap_or(usize::MAX / 2);
+        self.worker.work(&self.site, evaluations).await;
+        self.worker.scored - before
     }
 
-    /// All evaluations of a day that are known to the organiser.
+    /// All evaluations of a day, as the organiser sees them.
     pub async fn evaluations(&self, day: i32) -> Vec<Value> {
         let all = self.get(&format!("/evaluations?day={}", date(day))).await;
         all.as_array().unwrap().clone()
     }
 
-    /// The server tidies, long after what was played two days ago.
+    /// The server's clean-up.
     pub async fn night(&mut self) {
-        self.site.later(9 * 3600);
-        tidy(&self.site.store, self.site.now()).await;
+        self.site.advance(9 * 3600);
+        clean_up(&self.site.store, self.site.now()).await;
     }
 
-    /// Of all that SQLite keeps.
+    /// The size of the SQLite files, in bytes.
     pub fn database_bytes(&self) -> u64 {
         let bytes = |name: &str| {
             fs::metadata(self.site.folder.path().join(name)).map_or(0, |found| found.len())
@@ -217,18 +216,18 @@ impl Season {
         bytes("faceoff.sqlite3") + bytes("faceoff.sqlite3-wal")
     }
 
-    /// Each stage's boards, read a second time.
+    /// Loads the boards of each stage twice. Returns the duration of the second request.
     pub async fn boards(&self) -> Vec<(String, Duration)> {
         let mut boards = Vec::new();
         for stage in &self.stages {
             for task in ["", "/hit"] {
-                let path = format!("/api/v1/board{task}?stage={}", text(&stage["id"]));
+                let path = format!("/api/v1/board{task}?stage={}", string(&stage["id"]));
                 let first = self.site.get(&path, None).await.json(200);
                 assert_eq!(first["rows"].as_array().unwrap().len(), TEAMS, "{path}");
-                let asked = Instant::now();
+                let started = Instant::now();
                 self.site.get(&path, None).await.json(200);
-                let name = format!("the board{task} of {}", text(&stage["name"]));
-                boards.push((name, asked.elapsed()));
+                let name = format!("the board{task} of {}", string(&stage["name"]));
+                boards.push((name, started.elapsed()));
             }
         }
         boards

@@ -13,7 +13,7 @@ impl Site for OnePage {
 }
 
 fn html(markdown: &str) -> String {
-    document(markdown, "/docs/page", "Page", &OnePage).html
+    render_document(markdown, "/docs/page", "Page", &OnePage).html
 }
 
 #[test]
@@ -28,24 +28,24 @@ fn html_is_shown_as_text() {
         page.contains("&lt;script&gt;alert(1)&lt;/script&gt;"),
         "{page}"
     );
-    let told = prose("a <b> [`Item`] `<PATH>`");
+    let prose = render_prose("a <b> [`Item`] `<PATH>`");
     assert_eq!(
-        told.html,
+        prose.html,
         "<p>a &lt;b&gt; <code>Item</code> <code>&lt;PATH&gt;</code></p>\n"
     );
-    assert_eq!(told.plain, "a <b> Item <PATH>");
+    assert_eq!(prose.plain, "a <b> Item <PATH>");
 }
 
 #[test]
-fn links_lead_to_pages_of_this_site_or_name_a_file() {
+fn links_point_to_pages_or_name_a_file() {
     for (markdown, link) in [
         (
             "[rules.md](rules.md)",
             r#"<a href="/docs/rules">The rules</a>"#,
         ),
         (
-            "[who](rules.md#who-leaves)",
-            r#"<a href="/docs/rules#who-leaves">who</a>"#,
+            "[teams](rules.md#teams-that-leave)",
+            r#"<a href="/docs/rules#teams-that-leave">teams</a>"#,
         ),
         ("[here](#there)", r##"<a href="#there">here</a>"##),
         (
@@ -67,18 +67,18 @@ fn links_lead_to_pages_of_this_site_or_name_a_file() {
 }
 
 #[test]
-fn headings_have_the_ids_that_github_gives_them() {
+fn heading_ids_follow_github_rules() {
     for (heading, id) in [
         (
-            "The day: its cut and its release",
-            "the-day-its-cut-and-its-release",
+            "The day: cutoff and release",
+            "the-day-cutoff-and-release",
         ),
-        ("What is `kept`?", "what-is-kept"),
+        ("Which `files`?", "which-files"),
         ("Time – measured, fairly", "time--measured-fairly"),
         ("Über snake_case", "über-snake_case"),
     ] {
         let markdown = format!("## {heading}\n\n## {heading}\n");
-        let rendered = document(&markdown, "/docs/page", "Page", &OnePage);
+        let rendered = render_document(&markdown, "/docs/page", "Page", &OnePage);
         let ids: Vec<&str> = rendered
             .contents
             .iter()
@@ -89,8 +89,8 @@ fn headings_have_the_ids_that_github_gives_them() {
 }
 
 #[test]
-fn tables_scroll_by_themselves_and_align_by_class() {
-    let page = html("## Masses\n\n| what | kg |\n|---|--:|\n| puck | 0.01 |\n");
+fn tables_are_scrollable_and_align_by_class() {
+    let page = html("## Masses\n\n| body | kg |\n|---|--:|\n| puck | 0.01 |\n");
     assert!(
         page.contains(
             r#"<div class="wide" role="region" aria-label="Table 1: Masses" tabindex="0">"#
@@ -105,8 +105,8 @@ fn tables_scroll_by_themselves_and_align_by_class() {
 }
 
 #[test]
-fn sections_hold_the_words_below_their_headings() {
-    let rendered = document(
+fn sections_have_the_text_below_their_headings() {
+    let rendered = render_document(
         "# Page\n\nIntro\nhere.\n\n## One\n\nA **b**c.\n\n- d\n- e\n\n### Two\n\n```\ncode\n```\n\n| x | y |\n|---|---|\n| [rules.md](rules.md) | 2 |\n",
         "/docs/page",
         "Page",

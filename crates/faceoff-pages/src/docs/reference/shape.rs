@@ -1,14 +1,14 @@
-//! Schemas of the OpenAPI document in words, with links to the ones that have names.
+//! OpenAPI schemas as text, with links to named schemas.
 
 use super::super::markdown::{self, Prose};
 use serde_json::Value;
 
-/// A piece of what a value is.
+/// A part of the description of a type.
 #[derive(Debug, PartialEq, Eq)]
 pub(in crate::docs) enum Part {
-    Words(String),
+    Text(String),
     Code(String),
-    /// The schema of this name.
+    /// A link to a named schema.
     Schema(String),
 }
 
@@ -21,7 +21,7 @@ pub(in crate::docs) struct Field {
     pub(in crate::docs) about: Prose,
 }
 
-/// What a value is: `integer (uint32)`, `list of Seed`.
+/// Describes a type: `integer (uint32)`, `list of Seed`.
 pub(super) fn shape(schema: &Value) -> Vec<Part> {
     let mut parts = Vec::new();
     write(schema, &mut parts);
@@ -44,16 +44,16 @@ pub(super) fn fields(schema: &Value) -> Vec<Field> {
         .collect()
 }
 
-/// What a schema says of itself; where null may be in its place, what the other says.
+/// The description of a schema; for a nullable schema, the description of the other variant.
 pub(super) fn about(schema: &Value) -> Prose {
     let own = schema["description"].as_str();
-    let of_variant = || {
+    let variant_description = || {
         let variants = schema["oneOf"].as_array().into_iter().flatten();
         variants
             .filter_map(|variant| variant["description"].as_str())
             .next()
     };
-    markdown::prose(own.or_else(of_variant).unwrap_or_default())
+    markdown::render_prose(own.or_else(variant_description).unwrap_or_default())
 }
 
 fn write(schema: &Value, parts: &mut Vec<Part>) {
@@ -61,32 +61,32 @@ fn write(schema: &Value, parts: &mut Vec<Part>) {
         let name = name.rsplit('/').next().unwrap_or_default();
         parts.push(Part::Schema(name.to_owned()));
     } else if let Some(variants) = schema["oneOf"].as_array() {
-        joined(variants, " or ", parts);
+        write_alternatives(variants, parts);
     } else if let Some(values) = schema["enum"].as_array() {
         for (at, value) in values.iter().enumerate() {
             if at > 0 {
-                parts.push(words(" or "));
+                parts.push(text(" or "));
             }
             parts.push(Part::Code(value.to_string()));
         }
     } else {
-        by_type(schema, parts);
+        write_type(schema, parts);
     }
     match &schema["default"] {
         Value::Null => {}
         default @ (Value::Object(_) | Value::Array(_))
-            if default.to_string().len() > LONGEST_DEFAULT => {}
+            if default.to_string().len() > MAX_DEFAULT_LENGTH => {}
         default => {
-            parts.push(words("; left out: "));
+            parts.push(text("; default: "));
             parts.push(Part::Code(default.to_string()));
         }
     }
 }
 
-/// Longer ones are told by the schema of the value.
-const LONGEST_DEFAULT: usize = 60;
+/// Longer defaults are omitted; the schema of the value lists them.
+const MAX_DEFAULT_LENGTH: usize = 60;
 
-fn by_type(schema: &Value, parts: &mut Vec<Part>) {
+fn write_type(schema: &Value, parts: &mut Vec<Part>) {
     let names: Vec<&str> = match &schema["type"] {
         Value::String(name) => vec![name],
         Value::Array(names) => names.iter().filter_map(Value::as_str).collect(),
@@ -94,77 +94,77 @@ fn by_type(schema: &Value, parts: &mut Vec<Part>) {
     };
     for (at, name) in names.iter().enumerate() {
         if at > 0 {
-            parts.push(words(" or "));
+            parts.push(text(" or "));
         }
         match *name {
             "array" => {
-                parts.push(words(&format!(
+                parts.push(text(&format!(
                     "list{} of ",
-                    sizes(schema, "minItems", "maxItems")
+                    bounds(schema, "minItems", "maxItems")
                 )));
                 write(&schema["items"], parts);
             }
-            "object" => object(schema, parts),
+            "object" => write_object(schema, parts),
             "string" | "integer" | "number" => {
                 let format = schema["format"].as_str();
                 let format = format
                     .map(|format| format!(" ({format})"))
                     .unwrap_or_default();
                 let range = match *name {
-                    "string" => sizes(schema, "minLength", "maxLength"),
-                    _ => sizes(schema, "minimum", "maximum"),
+                    "string" => bounds(schema, "minLength", "maxLength"),
+                    _ => bounds(schema, "minimum", "maximum"),
                 };
-                parts.push(words(&format!("{name}{format}{range}")));
+                parts.push(text(&format!("{name}{format}{range}")));
             }
-            other => parts.push(words(other)),
+            other => parts.push(text(other)),
         }
     }
 }
 
-fn object(schema: &Value, parts: &mut Vec<Part>) {
+fn write_object(schema: &Value, parts: &mut Vec<Part>) {
     if let Some(fields) = schema["properties"].as_object() {
-        parts.push(words("object with "));
+        parts.push(text("object with "));
         for (at, (name, field)) in fields.iter().enumerate() {
             if at > 0 {
-                parts.push(words(", "));
+                parts.push(text(", "));
             }
             parts.push(Part::Code(name.clone()));
-            parts.push(words(" ("));
+            parts.push(text(" ("));
             write(field, parts);
-            parts.push(words(")"));
+            parts.push(text(")"));
         }
     } else if schema["additionalProperties"].is_object() {
-        parts.push(words("object whose values are "));
+        parts.push(text("object whose values are "));
         write(&schema["additionalProperties"], parts);
     } else {
-        parts.push(words("object"));
+        parts.push(text("object"));
     }
 }
 
-/// The bounds, where they say something.
-fn sizes(schema: &Value, least: &str, most: &str) -> String {
-    // Not less than 0 are all that have no sign.
-    let least = schema[least].as_f64().filter(|least| *least > 0.0);
-    match (least, schema[most].as_f64()) {
-        (Some(least), Some(most)) if least == most => format!(" of {least}"),
-        (Some(least), Some(most)) => format!(", {least} to {most}"),
-        (Some(least), None) => format!(", {least} or more"),
-        (None, Some(most)) => format!(", up to {most}"),
+/// Bounds of a value or length; empty without bounds.
+fn bounds(schema: &Value, min: &str, max: &str) -> String {
+    // A minimum of 0 only repeats that the type is unsigned.
+    let min = schema[min].as_f64().filter(|min| *min > 0.0);
+    match (min, schema[max].as_f64()) {
+        (Some(min), Some(max)) if min == max => format!(" of {min}"),
+        (Some(min), Some(max)) => format!(", {min} to {max}"),
+        (Some(min), None) => format!(", {min} or more"),
+        (None, Some(max)) => format!(", up to {max}"),
         (None, None) => String::new(),
     }
 }
 
-fn joined(schemas: &[Value], between: &str, parts: &mut Vec<Part>) {
+fn write_alternatives(schemas: &[Value], parts: &mut Vec<Part>) {
     for (at, schema) in schemas.iter().enumerate() {
         if at > 0 {
-            parts.push(words(between));
+            parts.push(text(" or "));
         }
         write(schema, parts);
     }
 }
 
-fn words(text: &str) -> Part {
-    Part::Words(text.to_owned())
+fn text(text: &str) -> Part {
+    Part::Text(text.to_owned())
 }
 
 #[cfg(test)]
@@ -172,10 +172,10 @@ mod tests {
     use super::*;
     use serde_json::json;
 
-    fn told(schema: Value) -> String {
+    fn description(schema: Value) -> String {
         let parts = shape(&schema);
         let parts = parts.iter().map(|part| match part {
-            Part::Words(words) => words.clone(),
+            Part::Text(text) => text.clone(),
             Part::Code(code) => format!("`{code}`"),
             Part::Schema(name) => format!("[{name}]"),
         });
@@ -183,9 +183,9 @@ mod tests {
     }
 
     #[test]
-    fn types_are_told_in_words() {
+    fn types_are_described_as_text() {
         let seed = json!({ "$ref": "#/components/schemas/Seed" });
-        for (schema, words) in [
+        for (schema, expected) in [
             (json!({ "type": "string" }), "string"),
             (
                 json!({ "type": ["integer", "null"], "format": "uint32", "minimum": 0 }),
@@ -217,16 +217,16 @@ mod tests {
             ),
             (
                 json!({ "type": "boolean", "default": false }),
-                "boolean; left out: `false`",
+                "boolean; default: `false`",
             ),
             (json!({}), "any value"),
         ] {
-            assert_eq!(told(schema.clone()), words, "{schema}");
+            assert_eq!(description(schema.clone()), expected, "{schema}");
         }
     }
 
     #[test]
-    fn what_may_be_null_is_described_by_what_it_is_otherwise() {
+    fn nullable_schema_has_the_description_of_its_variant() {
         let schema = json!({ "oneOf": [{ "type": "null" }, { "description": "A `seed`.", "type": "string" }] });
         assert_eq!(about(&schema).html, "<p>A <code>seed</code>.</p>\n");
     }

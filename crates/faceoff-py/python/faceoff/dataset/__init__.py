@@ -1,4 +1,4 @@
-"""Recordings of evaluations and games in Python: reading them, and writing them in other layouts.
+"""Reads recordings of evaluations and games, and writes them in other layouts.
 
     import faceoff.dataset
 
@@ -7,8 +7,8 @@
         print(episode.index, episode.end, episode.success, episode.steps)
     arrays = dataset.episode("hit", 0).to_numpy()
 
-Needs pyarrow 12 or newer (``pip install 'faceoff[dataset]'``); pandas, polars and minari only where they
-are asked for. It does not need the simulator: nothing here imports ``faceoff._native``.
+Needs pyarrow 12 or newer (``pip install 'faceoff[dataset]'``); pandas, polars and minari only for the
+functions that use them. The simulator is not needed: this package never imports ``faceoff._native``.
 ``python -m faceoff.dataset`` does the same from the command line. The layouts are described in
 ``docs/dataset.md``.
 """
@@ -62,13 +62,13 @@ del _pyarrow
 
 
 def open(path: str | os.PathLike[str]) -> Dataset | Game:
-    """Opens a recording: `dataset.zip`, `game.zip`, a side's own file, a folder that one of these was
-    unpacked to, or the folder that `faceoff eval` or `faceoff play` wrote.
+    """Opens a recording: `dataset.zip`, `game.zip`, the file of one side, a folder with the unpacked
+    content of one of these, or the output folder of `faceoff eval` or `faceoff play`.
 
-    Only the manifest is read; tables are read as they are asked for, in place.
+    Only the manifest is read; tables are read on demand, in place.
 
     Raises:
-        DatasetError: there is none, or it is damaged.
+        DatasetError: the recording does not exist or is damaged.
     """
     container = _find(path)
     manifest = container.json(_MANIFEST)
@@ -78,24 +78,24 @@ def open(path: str | os.PathLike[str]) -> Dataset | Game:
 
 
 def open_dataset(path: str | os.PathLike[str]) -> Dataset:
-    """As `open`, for whoever expects an evaluation.
+    """Like `open`, for the recording of an evaluation only.
 
     Raises:
         DatasetError: it cannot be read, or is a game.
     """
-    found = open(path)
-    if isinstance(found, Game):
-        raise DatasetError(f"{found.path}: expected the dataset of an evaluation, got a game")
-    return found
+    recording = open(path)
+    if isinstance(recording, Game):
+        raise DatasetError(f"{recording.path}: expected the dataset of an evaluation, got a game")
+    return recording
 
 
 def open_game(path: str | os.PathLike[str]) -> Game:
-    """As `open`, for whoever expects a game.
+    """Like `open`, for the recording of a game only.
 
     Raises:
         DatasetError: it cannot be read, or is the dataset of an evaluation.
     """
-    found = open(path)
-    if isinstance(found, Dataset):
-        raise DatasetError(f"{found.path}: expected a game, got the dataset of an evaluation")
-    return found
+    recording = open(path)
+    if isinstance(recording, Dataset):
+        raise DatasetError(f"{recording.path}: expected a game, got the dataset of an evaluation")
+    return recording

@@ -1,4 +1,4 @@
-"""``python -m faceoff.dataset``: what is in a recording, and other layouts of it."""
+"""``python -m faceoff.dataset``: summarises a recording, or exports it in another layout."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Runs a command.
 
     Returns:
-        The exit code: 0, or 1 with a line on standard error if it could not be done.
+        The exit code: 0, or 1 after an error, with one line on standard error.
     """
     options = _parser().parse_args(arguments)
     try:
@@ -61,12 +61,12 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _info(options: argparse.Namespace) -> None:
-    found = open(options.recording)
-    told = _of_game(found) if isinstance(found, Game) else _of_dataset(found)
+    recording = open(options.recording)
+    summary = _summarise_game(recording) if isinstance(recording, Game) else _summarise_dataset(recording)
     if options.json:
-        print(json.dumps(told))
+        print(json.dumps(summary))
         return
-    for key, value in told.items():
+    for key, value in summary.items():
         if isinstance(value, dict):
             print(f"{key}:")
             for name, inner in value.items():
@@ -75,7 +75,7 @@ def _info(options: argparse.Namespace) -> None:
             print(f"{key}: {value}")
 
 
-def _of_dataset(dataset: Dataset) -> dict[str, Any]:
+def _summarise_dataset(dataset: Dataset) -> dict[str, Any]:
     tasks = {}
     for task in dataset.tasks:
         episodes = dataset.episodes(task)
@@ -96,7 +96,7 @@ def _of_dataset(dataset: Dataset) -> dict[str, Any]:
     }
 
 
-def _of_game(game: Game) -> dict[str, Any]:
+def _summarise_game(game: Game) -> dict[str, Any]:
     return {
         "layout": game.layout,
         "agents": list(game.agents),
@@ -115,8 +115,8 @@ def _export(options: argparse.Namespace) -> None:
     if options.layout == "minari":
         if options.id is None:
             raise ArgumentError("--id: expected an id such as faceoff/hit/striker-v0, got none")
-        made = to_minari(dataset, options.id, task=options.task, root=options.out)
-        print(f"{options.id}: {made.total_episodes} episodes, {made.total_steps} steps")
+        exported = to_minari(dataset, options.id, task=options.task, root=options.out)
+        print(f"{options.id}: {exported.total_episodes} episodes, {exported.total_steps} steps")
         return
     if options.out is None:
         raise ArgumentError(f"--out: expected a folder for the layout {options.layout}, got none")

@@ -1,4 +1,4 @@
-"""Where a recording's files are: in a folder, or in an archive that is read in place."""
+"""The files of a recording: a folder, or an archive that is read in place."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ from ._errors import DatasetError
 __all__ = ["Container", "find"]
 
 MANIFEST = "manifest.json"
-# In the folders that `faceoff eval` and `faceoff play` write.
+# Archives in the output folders of `faceoff eval` and `faceoff play`.
 ARCHIVES = ("dataset.zip", "game.zip")
-# Of a file's header inside of a zip: fixed part, then name and extra field, whose lengths it ends with.
+# Header of a file in a zip: the fixed part ends with the lengths of the name and extra field that follow.
 LOCAL_HEADER_BYTES = 30
 LOCAL_HEADER_LENGTHS = struct.Struct("<HH")
 LOCAL_HEADER_LENGTHS_AT = 26
@@ -28,29 +28,29 @@ CHECK_BYTES = 1 << 24
 
 
 def find(path: str | os.PathLike[str]) -> Container:
-    """Opens an archive, the folder it was unpacked to, or a folder that holds one.
+    """Opens an archive, a folder with its unpacked content, or a folder that contains an archive.
 
     Raises:
-        DatasetError: there is none, or it cannot be read.
+        DatasetError: there is no recording, or it cannot be read.
     """
-    place = Path(path)
-    if not place.exists():
-        raise DatasetError(f"{place}: there is no such file or folder")
-    if not place.is_dir():
-        return Container(place)
-    if (place / MANIFEST).exists():
-        return Container(place)
+    location = Path(path)
+    if not location.exists():
+        raise DatasetError(f"{location}: there is no such file or folder")
+    if not location.is_dir():
+        return Container(location)
+    if (location / MANIFEST).exists():
+        return Container(location)
     for name in ARCHIVES:
-        if (place / name).exists():
-            return Container(place / name)
+        if (location / name).exists():
+            return Container(location / name)
     expected = ", ".join((MANIFEST, *ARCHIVES))
-    raise DatasetError(f"{place}: expected one of {expected} in this folder, found none")
+    raise DatasetError(f"{location}: expected one of {expected} in this folder, found none")
 
 
 class Container:
     """The files of one recording.
 
-    Tables are mapped into memory where they are: an archive stores them uncompressed.
+    Tables are mapped into memory; archives store them uncompressed.
     """
 
     def __init__(self, path: Path) -> None:
@@ -76,7 +76,7 @@ class Container:
         return sorted(entry.name for entry in self.path.iterdir() if entry.is_file())
 
     def bytes(self, name: str) -> bytes:
-        """A file as a whole.
+        """The content of a file.
 
         Raises:
             DatasetError: it is missing or damaged.
@@ -96,7 +96,7 @@ class Container:
         """A file that holds one JSON object.
 
         Raises:
-            DatasetError: it is missing or something else.
+            DatasetError: it is missing or not a JSON object.
         """
         try:
             value = json.loads(self.bytes(name))
@@ -108,10 +108,10 @@ class Container:
         return value
 
     def table(self, name: str) -> pq.ParquetFile:
-        """A Parquet file, of which only the footer is read.
+        """A Parquet file; only its footer is read here.
 
         Raises:
-            DatasetError: it is missing or no Parquet file.
+            DatasetError: it is missing or not a Parquet file.
         """
         buffer = self._buffer(name)
         try:
@@ -120,21 +120,21 @@ class Container:
             raise DatasetError(f"{self.path}: {name} is no readable table: {error}") from error
 
     def check(self, files: Mapping[str, Mapping[str, Any]]) -> None:
-        """Compares files with their sizes and, where they can be told, with their hashes.
+        """Compares files with their expected sizes and, where possible, hashes.
 
         Args:
-            files: ``bytes`` and ``blake3`` of each, as a manifest has them. Hashes are compared if the
-                package ``blake3`` is installed; an archive's own checksums always are.
+            files: ``bytes`` and ``blake3`` per file, as in a manifest. Hashes are compared if the package
+                ``blake3`` is installed; an archive's own checksums always are.
 
         Raises:
-            DatasetError: a file is missing or not what it was.
+            DatasetError: a file is missing, damaged or altered.
         """
         hasher = _hasher()
-        for name, stated in files.items():
+        for name, expected in files.items():
             buffer = memoryview(self._buffer(name))
-            if len(buffer) != stated["bytes"]:
+            if len(buffer) != expected["bytes"]:
                 raise DatasetError(
-                    f"{self.path}: {name}: expected {stated['bytes']} bytes, got {len(buffer)}; "
+                    f"{self.path}: {name}: expected {expected['bytes']} bytes, got {len(buffer)}; "
                     "download it again"
                 )
             crc, hash_ = 0, hasher() if hasher is not None else None
@@ -143,8 +143,8 @@ class Container:
                 crc = zlib.crc32(piece, crc)
                 if hash_ is not None:
                     hash_.update(piece)
-            same = self._zip is None or crc == self._zip.getinfo(name).CRC
-            if not same or (hash_ is not None and hash_.hexdigest() != stated["blake3"]):
+            is_intact = self._zip is None or crc == self._zip.getinfo(name).CRC
+            if not is_intact or (hash_ is not None and hash_.hexdigest() != expected["blake3"]):
                 raise DatasetError(
                     f"{self.path}: {name} is damaged or altered: its hash is not the manifest's; "
                     "download it again"
@@ -163,7 +163,7 @@ class Container:
         except KeyError as error:
             raise DatasetError(f"{self.path}: {name} is missing in the archive") from error
         if entry.compress_type != zipfile.ZIP_STORED:
-            # Somebody packed it again.
+            # A repacked archive may be compressed.
             return pa.py_buffer(self.bytes(name))
         whole = pa.memory_map(str(self.path)).read_buffer()
         header = memoryview(whole)[entry.header_offset :][:LOCAL_HEADER_BYTES]

@@ -19,30 +19,30 @@ from ._rows import Rows, to_polars
 __all__ = ["LAYOUTS", "Dataset", "Table"]
 
 LAYOUTS = ("faceoff-dataset/4", "faceoff-dataset/3", "faceoff-dataset/2")
-"""The layouts that are read, newest first."""
+"""The supported layouts, newest first."""
 
 Table = Literal["steps", "episodes"]
 
 HOST_TIME = "host_time_ns"
-AFTER = "computation_time_ns"
+COMPUTATION_TIME = "computation_time_ns"
 
 
 class Dataset:
     """The recording of an evaluation. Iterating gives its episodes in the order of the file.
 
-    Nothing but the manifest is read when it is opened. One object is for one thread at a time.
+    Only the manifest is read on opening. An object must not be used by several threads at once.
     """
 
     def __init__(self, container: Container, manifest: dict[str, Any]) -> None:
         """Use `faceoff.dataset.open`.
 
         Raises:
-            DatasetError: the manifest is not one of a dataset that can be read.
+            DatasetError: the manifest is invalid or of an unsupported layout.
         """
         self._container = container
         self.path = container.path
         self.manifest = manifest
-        """What the dataset says of itself: `manifest.json`."""
+        """The content of `manifest.json`."""
         if manifest.get("schema") not in LAYOUTS:
             known = ", ".join(LAYOUTS)
             raise DatasetError(
@@ -72,32 +72,32 @@ class Dataset:
 
     @property
     def profile(self) -> str:
-        """The profile of perturbations that was played."""
+        """The profile of perturbations."""
         return str(self.manifest["profile"])
 
     @property
     def ruleset(self) -> str:
-        """The rules by which it was played."""
+        """The ruleset of the evaluation, e.g. `airhockey-2023.3`."""
         return str(self.manifest["ruleset"])
 
     @property
     def tasks(self) -> tuple[str, ...]:
-        """The tasks that were played, in the order of the file."""
+        """The evaluated tasks, in the order of the file."""
         return tuple(self.manifest["episodes"])
 
     @cached_property
     def results(self) -> dict[str, Any]:
-        """The score: `results.json`."""
+        """The scores: `results.json`."""
         return self._container.json("results.json")
 
     @cached_property
     def violations(self) -> dict[str, Any]:
-        """Where constraints were broken: `violations.json`."""
+        """Violations of constraints: `violations.json`."""
         return self._container.json("violations.json")
 
     @cached_property
     def calibration(self) -> dict[str, Any]:
-        """How evenly the slots kept time: `calibration.json`."""
+        """Timing measurements of the slots: `calibration.json`."""
         return self._container.json("calibration.json")
 
     @cached_property
@@ -108,8 +108,8 @@ class Dataset:
     def check(self) -> None:
         """Reads every file and compares it with its size and hash.
 
-        The BLAKE3 hashes of the manifest are compared if the package `blake3` is installed; without
-        it an archive's own checksums and all sizes are. `faceoff verify` also simulates it again.
+        The BLAKE3 hashes of the manifest are compared if the package `blake3` is installed; otherwise
+        only sizes and an archive's own checksums. `faceoff verify` also repeats the simulation.
 
         Raises:
             DatasetError: a file is missing, damaged or altered.
@@ -126,30 +126,30 @@ class Dataset:
         """The episodes, of one task or of all.
 
         Raises:
-            ArgumentError: the task was not played.
+            ArgumentError: the dataset does not have the task.
             DatasetError: the table is damaged.
         """
         if task is None:
             return list(self._episodes)
-        self._known(task)
+        self._check_task(task)
         return [episode for episode in self._episodes if episode.task == task]
 
     def episode(self, task: str, index: int) -> Episode:
         """One episode.
 
         Raises:
-            ArgumentError: there is none of this task and number.
-            ArgumentTypeError: the number is none.
+            ArgumentError: there is no episode with this task and index.
+            ArgumentTypeError: the index is not a whole number.
             DatasetError: the table is damaged.
         """
-        mine = self.episodes(task)
+        episodes = self.episodes(task)
         if not isinstance(index, (int, np.integer)):
             raise ArgumentTypeError(f"index: expected a whole number, got {index!r}")
-        if not 0 <= index < len(mine):
+        if not 0 <= index < len(episodes):
             raise ArgumentError(
-                f"index: expected an episode of {task} from 0 to {len(mine) - 1}, got {index}"
+                f"index: expected an episode of {task} from 0 to {len(episodes) - 1}, got {index}"
             )
-        return mine[index]
+        return episodes[index]
 
     def table(
         self,
@@ -158,27 +158,27 @@ class Dataset:
         task: str | None = None,
         columns: Sequence[str] | None = None,
     ) -> pa.Table:
-        """A whole table as pyarrow has it. Of `steps` it takes about 550 bytes per control step.
+        """A table as a pyarrow table. `steps` takes about 550 bytes of memory per control step.
 
         Args:
             table: `steps`, a row per answered control step, or `episodes`, a row per episode.
             task: only the rows of this task.
-            columns: those wanted, in this order; None for all.
+            columns: names of columns, in this order; None for all.
 
         Raises:
-            ArgumentError: there is no such table or task.
-            DatasetError: there is no such column, or the file is damaged.
+            ArgumentError: the table or task does not exist.
+            DatasetError: a column does not exist, or the file is damaged.
         """
         if table not in ("steps", "episodes"):
             raise ArgumentError(f"table: expected 'steps' or 'episodes', got {table!r}")
         if task is not None:
-            self._known(task)
+            self._check_task(task)
         if table == "steps":
-            first, last = self._span(task)
-            return self._cut(first, last - first, columns)
-        places = [i for i, e in enumerate(self._episodes) if task in (None, e.task)]
-        start = places[0] if places else 0
-        return self._episode_rows.read(start, len(places), columns)
+            first, last = self._step_range(task)
+            return self._read_steps(first, last - first, columns)
+        indices = [i for i, e in enumerate(self._episodes) if task in (None, e.task)]
+        start = indices[0] if indices else 0
+        return self._episode_rows.read(start, len(indices), columns)
 
     def to_pandas(
         self,
@@ -187,7 +187,7 @@ class Dataset:
         task: str | None = None,
         columns: Sequence[str] | None = None,
     ) -> Any:
-        """As `table`, as a pandas data frame."""
+        """Like `table`, as a pandas data frame."""
         return self.table(table, task=task, columns=columns).to_pandas()
 
     def to_polars(
@@ -197,47 +197,47 @@ class Dataset:
         task: str | None = None,
         columns: Sequence[str] | None = None,
     ) -> Any:
-        """As `table`, as a polars data frame."""
+        """Like `table`, as a polars data frame."""
         return to_polars(self.table(table, task=task, columns=columns))
 
     def rows(self, episode: Episode, columns: Sequence[str] | None) -> pa.Table:
         """The control steps of an episode of this dataset: `Episode.table`."""
-        place = self._places[episode.task, episode.index]
-        return self._cut(int(self._offsets[place]), episode.steps, columns)
+        row_index = self._row_indices[episode.task, episode.index]
+        return self._read_steps(int(self._offsets[row_index]), episode.steps, columns)
 
     def episode_row(self, episode: Episode) -> dict[str, Any]:
         """The row of `episodes.parquet` of an episode of this dataset."""
-        place = self._places[episode.task, episode.index]
-        row: dict[str, Any] = self._episode_table.slice(place, 1).to_pylist()[0]
+        row_index = self._row_indices[episode.task, episode.index]
+        row: dict[str, Any] = self._episode_table.slice(row_index, 1).to_pylist()[0]
         return row
 
     def __repr__(self) -> str:
         return f"<Dataset of {self.agent}: {self.manifest['episodes']}, {self.path}>"
 
-    def _known(self, task: str) -> None:
+    def _check_task(self, task: str) -> None:
         if task not in self.tasks:
             raise ArgumentError(f"task: expected one of {', '.join(self.tasks)}, got {task!r}")
 
-    def _cut(self, start: int, count: int, columns: Sequence[str] | None) -> pa.Table:
+    def _read_steps(self, start: int, count: int, columns: Sequence[str] | None) -> pa.Table:
         rows = self._step_rows
         if HOST_TIME in rows.columns or isinstance(columns, str):
             return rows.read(start, count, columns)
-        # Before layout 4 nothing was told apart: the host took nothing.
+        # Layouts before 4 do not record host interference; it counts as 0.
         stored = None if columns is None else [name for name in columns if name != HOST_TIME]
         if columns is not None and len(stored or []) == len(columns):
             return rows.read(start, count, columns)
         table = rows.read(start, count, stored)
         names = table.column_names
-        place = names.index(AFTER) + 1 if columns is None else list(columns).index(HOST_TIME)
-        return table.add_column(place, HOST_TIME, pa.array(np.zeros(count, dtype=np.int64)))
+        position = names.index(COMPUTATION_TIME) + 1 if columns is None else list(columns).index(HOST_TIME)
+        return table.add_column(position, HOST_TIME, pa.array(np.zeros(count, dtype=np.int64)))
 
-    def _span(self, task: str | None) -> tuple[int, int]:
+    def _step_range(self, task: str | None) -> tuple[int, int]:
         if task is None:
             return 0, int(self._offsets[-1])
-        places = [i for i, episode in enumerate(self._episodes) if episode.task == task]
-        if not places:
+        indices = [i for i, episode in enumerate(self._episodes) if episode.task == task]
+        if not indices:
             return 0, 0
-        return int(self._offsets[places[0]]), int(self._offsets[places[-1] + 1])
+        return int(self._offsets[indices[0]]), int(self._offsets[indices[-1] + 1])
 
     @cached_property
     def _step_rows(self) -> Rows:
@@ -261,15 +261,15 @@ class Dataset:
 
     @cached_property
     def _episodes(self) -> list[Episode]:
-        wanted = (
+        required = (
             *("task", "episode", "seed", "interpolation", "steps", "end", "success", "fault"),
             *("penalty_points", "computation_time_mean_s", "computation_time_max_s"),
             *(f"violated_{group}" for group in CONSTRAINTS),
         )
-        for name in wanted:
+        for name in required:
             if name not in self._episode_table.column_names:
                 raise DatasetError(f"{self.path}: episodes.parquet has no column {name!r}")
-        return [self._episode(row) for row in self._episode_table.select(wanted).to_pylist()]
+        return [self._episode(row) for row in self._episode_table.select(required).to_pylist()]
 
     def _episode(self, row: dict[str, Any]) -> Episode:
         try:
@@ -293,10 +293,10 @@ class Dataset:
         )
 
     @cached_property
-    def _places(self) -> dict[tuple[str, int], int]:
-        return {(e.task, e.index): place for place, e in enumerate(self._episodes)}
+    def _row_indices(self) -> dict[tuple[str, int], int]:
+        return {(e.task, e.index): row for row, e in enumerate(self._episodes)}
 
     @cached_property
     def _offsets(self) -> Any:
-        """Row of `steps.parquet` at which each episode begins, and where the last one ends."""
+        """First row of each episode in `steps.parquet`, and the number of all rows."""
         return np.concatenate([[0], np.cumsum([e.steps for e in self._episodes], dtype=np.int64)])

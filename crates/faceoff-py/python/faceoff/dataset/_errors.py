@@ -1,4 +1,4 @@
-"""The errors that this package adds to :mod:`faceoff.errors`."""
+"""Errors of recordings, in addition to :mod:`faceoff.errors`."""
 
 from __future__ import annotations
 
@@ -12,4 +12,4 @@ class DatasetError(Error):
 
 
 class ExistsError(Error, FileExistsError):
-    """What is to be written is there already."""
+    """The output folder exists already."""

@@ -21,72 +21,72 @@ from ._rows import Floats, Rows, floats, lists, seconds, to_polars
 __all__ = ["GAME_LAYOUTS", "Game", "Rally", "SideArrays"]
 
 GAME_LAYOUTS = ("faceoff-game/1", "faceoff-game-side/1")
-"""The layouts that are read: a whole game's, and that of one side's own file."""
+"""The supported layouts: a whole game, and the file of one side."""
 
 
 @dataclass(frozen=True)
 class SideArrays:
-    """A rally of N control steps as one side played it, in NumPy arrays of doubles.
+    """A rally of N control steps of one side, as float64 arrays.
 
     Lengths in m, angles in rad, times in s. Observations and the end effector are in the base frame of
-    the side's own robot, the puck's true state in the table's frame.
+    the side's robot, the puck's true state in the table's frame.
     """
 
     observations: Floats
-    """What the agent was told, shape (N, 23)."""
+    """Observations sent to the agent, shape (N, 23)."""
     actions: Floats
-    """What it answered, shape (N, *action_shape); NaN where it did not."""
+    """The agent's actions, shape (N, *action_shape); NaN without an answer."""
     effects: npt.NDArray[np.str_]
     """`in_time`, `late`, `fault` or `held` per step, shape (N,)."""
     puck: Floats
-    """x, y, yaw and their rates after the step, true, shape (N, 6)."""
+    """True x, y, yaw and their rates after the step, shape (N, 6)."""
     joint_pos: Floats
-    """Joint positions after the step, true, shape (N, 7)."""
+    """True joint positions after the step, shape (N, 7)."""
     joint_vel: Floats
-    """Joint velocities after the step, true, shape (N, 7)."""
+    """True joint velocities after the step, shape (N, 7)."""
     ee: Floats
-    """End effector after the step, shape (N, 3)."""
+    """Position of the end effector after the step, shape (N, 3)."""
     constraints: Floats
     """Largest value of each constraint group (`CONSTRAINTS`), violated above 0, shape (N, 4)."""
     computation_time_s: Floats
-    """What counts of the time until the answer, shape (N,); NaN where nothing was asked."""
+    """Time until the answer minus host interference, shape (N,); NaN where the agent was not asked."""
 
 
 @dataclass(frozen=True)
 class Rally:
-    """A rally of a game: how it ended, and where its control steps are."""
+    """A rally of a game: its end, and access to its control steps."""
 
     index: int
     """Its number, from 0."""
     game_step: int
     """Control step of the game at which it began."""
     serves: int
-    """On whose side the puck lay, 1 or 2."""
+    """The side on which the puck started, 1 or 2."""
     steps: int
     """Control steps, N."""
     end: str
     """`goal`, `foul`, `stuck`, `left_table`, `diverged` or `game_over`."""
     by: int | None
-    """Who scored or fouled, 1 or 2."""
+    """The side that scored or fouled, 1 or 2."""
     score: tuple[int, int]
-    """Of both sides after it."""
+    """The score of both sides after the rally."""
     _game: Game = field(repr=False, compare=False, hash=False)
 
     def table(self, name: str = "motion", columns: Sequence[str] | None = None) -> pa.Table:
-        """The control steps with the columns of `motion`, `side-1` or `side-2`.
+        """The control steps, with the columns of `motion`, `side-1` or `side-2`.
 
         Raises:
-            ArgumentError: there is no such table of control steps.
-            DatasetError: there is no such column, or the file is damaged.
+            ArgumentError: the table does not exist or has no control steps.
+            DatasetError: a column does not exist, or the file is damaged.
         """
         return self._game.rally_rows(self, name, columns)
 
     def to_pandas(self, name: str = "motion", columns: Sequence[str] | None = None) -> Any:
-        """As `table`, as a pandas data frame."""
+        """Like `table`, as a pandas data frame."""
         return self.table(name, columns).to_pandas()
 
     def to_polars(self, name: str = "motion", columns: Sequence[str] | None = None) -> Any:
-        """As `table`, as a polars data frame."""
+        """Like `table`, as a polars data frame."""
         return to_polars(self.table(name, columns))
 
     def to_numpy(self, side: int) -> SideArrays:
@@ -96,25 +96,25 @@ class Rally:
             side: 1 or 2.
 
         Raises:
-            ArgumentError: the recording does not hold this side.
+            ArgumentError: the recording does not have this side.
             DatasetError: a file is damaged.
         """
-        self._game.expect_side(side)
+        self._game.check_side(side)
         steps, motion = self.table(f"side-{side}"), self.table("motion")
         entry = self._game.table(f"entries-{side}").slice(self.index, 1).to_pylist()[0]
-        what = f"side {side}, rally {self.index}"
+        context = f"side {side}, rally {self.index}"
 
-        def robot(names: Sequence[str]) -> Floats:
+        def robot_columns(names: Sequence[str]) -> Floats:
             return floats(motion, [f"robot_{side}_{name}" for name in names])
 
         return SideArrays(
             observations=floats(steps, OBSERVATION),
-            actions=lists(steps, "action", action_shape(entry["interpolation"], what), what),
+            actions=lists(steps, "action", action_shape(entry["interpolation"], context), context),
             effects=np.asarray(steps.column("effect").to_pylist(), dtype=np.str_),
             puck=floats(motion, PUCK),
-            joint_pos=robot(JOINT_POS),
-            joint_vel=robot(JOINT_VEL),
-            ee=robot(EE),
+            joint_pos=robot_columns(JOINT_POS),
+            joint_vel=robot_columns(JOINT_VEL),
+            ee=robot_columns(EE),
             constraints=floats(steps, [f"constraint_{name}" for name in CONSTRAINTS]),
             computation_time_s=seconds(steps, "computation_time_ns"),
         )
@@ -123,20 +123,20 @@ class Rally:
 class Game:
     """The recording of a game. Iterating gives its rallies.
 
-    A side's own file has the motion, the rallies and that side's tables. One object is for one thread
-    at a time.
+    The file of one side has the motion, the rallies and that side's tables. An object must not be used by
+    several threads at once.
     """
 
     def __init__(self, container: Container, manifest: dict[str, Any]) -> None:
         """Use `faceoff.dataset.open`.
 
         Raises:
-            DatasetError: the manifest is not one of a game that can be read.
+            DatasetError: the manifest is invalid or of an unsupported layout.
         """
         self._container = container
         self.path = container.path
         self.manifest = manifest
-        """What the recording says of itself: `manifest.json`."""
+        """The content of `manifest.json`."""
         if manifest.get("schema") not in GAME_LAYOUTS:
             known = ", ".join(GAME_LAYOUTS)
             raise DatasetError(
@@ -161,7 +161,7 @@ class Game:
 
     @property
     def sides(self) -> tuple[int, ...]:
-        """The sides whose observations and actions are in it: 1, 2 or both."""
+        """The sides whose observations and actions are recorded: 1, 2 or both."""
         return tuple(side for side in (1, 2) if f"side-{side}.parquet" in self.manifest["files"])
 
     @property
@@ -172,7 +172,7 @@ class Game:
 
     @cached_property
     def results(self) -> dict[str, Any]:
-        """The score: `results.json`."""
+        """The scores: `results.json`."""
         return self._container.json("results.json")
 
     @cached_property
@@ -211,24 +211,24 @@ class Game:
         return iter(self.rallies)
 
     def table(self, name: str, columns: Sequence[str] | None = None) -> pa.Table:
-        """A whole table as pyarrow has it.
+        """A table as a pyarrow table.
 
         Args:
             name: one of `tables`.
-            columns: those wanted, in this order; None for all.
+            columns: names of columns, in this order; None for all.
 
         Raises:
-            ArgumentError: there is no such table.
-            DatasetError: there is no such column, or the file is damaged.
+            ArgumentError: the table does not exist.
+            DatasetError: a column does not exist, or the file is damaged.
         """
         return self._rows(name).read(columns=columns)
 
     def to_pandas(self, name: str, columns: Sequence[str] | None = None) -> Any:
-        """As `table`, as a pandas data frame."""
+        """Like `table`, as a pandas data frame."""
         return self.table(name, columns).to_pandas()
 
     def to_polars(self, name: str, columns: Sequence[str] | None = None) -> Any:
-        """As `table`, as a polars data frame."""
+        """Like `table`, as a polars data frame."""
         return to_polars(self.table(name, columns))
 
     def rally_rows(self, rally: Rally, name: str, columns: Sequence[str] | None) -> pa.Table:
@@ -238,9 +238,11 @@ class Game:
             raise ArgumentError(f"name: expected one of {', '.join(known)}, got {name!r}")
         return self._rows(name).read(rally.game_step, rally.steps, columns)
 
-    def expect_side(self, side: int) -> None:
-        """Raises:
-        ArgumentError: the recording does not hold this side's tables.
+    def check_side(self, side: int) -> None:
+        """Checks that the recording has this side.
+
+        Raises:
+            ArgumentError: it has no tables of this side.
         """
         if side not in self.sides:
             known = " or ".join(map(str, self.sides))
@@ -252,11 +254,11 @@ class Game:
     def _rows(self, name: str) -> Rows:
         if name not in self.tables:
             raise ArgumentError(f"name: expected one of {', '.join(self.tables)}, got {name!r}")
-        if name not in self._opened:
+        if name not in self._open_tables:
             file = f"{name}.parquet"
-            self._opened[name] = Rows(self._container.table(file), f"{self.path}: {file}")
-        return self._opened[name]
+            self._open_tables[name] = Rows(self._container.table(file), f"{self.path}: {file}")
+        return self._open_tables[name]
 
     @cached_property
-    def _opened(self) -> dict[str, Rows]:
+    def _open_tables(self) -> dict[str, Rows]:
         return {}

@@ -1,4 +1,4 @@
-"""The layout of the 2023 challenge, for tools that were written for it."""
+"""Export in the layout of the 2023 challenge, for tools written for it."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ from ._errors import ExistsError
 __all__ = ["ENVIRONMENTS", "to_2023"]
 
 ENVIRONMENTS = {"hit": "7dof-hit", "defend": "7dof-defend", "prepare": "7dof-prepare"}
-"""What the tasks were called."""
+"""Names of the tasks in 2023."""
 
 TIERS = {"deployable": 0, "improvable": 1, "non_deployable": 2}
-# The oldest protocol that has all that is needed.
+# The oldest pickle protocol that supports these types.
 PICKLE_PROTOCOL = 2
 TIME = "Computation Time"
 
@@ -32,19 +32,19 @@ def to_2023(dataset: Dataset, out: str | os.PathLike[str]) -> list[Path]:
 
     Each folder holds `dataset.pkl`, a pickled list of ``(state, action, reward, next_state, absorbing,
     last)`` per control step; `computation_time.npy`, shape (steps,); for each constraint group its
-    largest value per step, e.g. `ee_constr.npy`, shape (steps, 1); and `violations.json`. The pickle and
-    the arrays are read by any NumPy, also by those of 2023.
+    largest value per step, e.g. `ee_constr.npy`, shape (steps, 1); and `violations.json`. Any version of
+    NumPy since 2023 can read the pickle and the arrays.
 
     Args:
-        dataset: it is compared with its hashes first.
-        out: a folder, made if need be.
+        dataset: its files are compared with their hashes first.
+        out: a folder, created if necessary.
 
     Returns:
         The folders.
 
     Raises:
         DatasetError: the dataset is damaged.
-        ExistsError: a folder of the export is there already.
+        ExistsError: a folder of the export exists already.
     """
     dataset.check()
     root = Path(out)
@@ -73,7 +73,7 @@ def _write_task(folder: Path, episodes: list[Episode]) -> None:
                 yield (
                     arrays.observations[step],
                     action,
-                    0.0,  # The challenge's evaluation gave none.
+                    0.0,  # The challenge's evaluation had no rewards.
                     arrays.observations[step + 1],
                     last and episode.terminated,
                     last,
@@ -88,8 +88,8 @@ def _write_task(folder: Path, episodes: list[Episode]) -> None:
     _write_json(folder / "violations.json", _violations(episodes))
 
 
-class _Streamed:
-    """A list that is pickled item by item; what was written is forgotten."""
+class _StreamedList:
+    """Pickles an iterable as a list, item by item, without keeping items in memory."""
 
     def __init__(self, items: Iterable[Any]) -> None:
         self.items = items
@@ -99,8 +99,8 @@ class _Streamed:
 
 
 class _Pickler(pickle.Pickler):
-    """Writes arrays as calls of `numpy.array`: NumPy's own way names modules that NumPy 1 and 2 have in
-    different places, so that neither reads what the other has written."""
+    """Writes arrays as calls of `numpy.array`. NumPy's own pickles name modules that moved between NumPy 1
+    and 2, so neither can read those of the other."""
 
     def reducer_override(self, value: Any) -> Any:
         if isinstance(value, np.ndarray):
@@ -111,32 +111,32 @@ class _Pickler(pickle.Pickler):
 def dump_transitions(file: BinaryIO, transitions: Iterable[Transition]) -> None:
     """Pickles a list of transitions that need not be in memory at once."""
     pickler = _Pickler(file, protocol=PICKLE_PROTOCOL)
-    # Nothing occurs twice: without this the pickler would keep all that it has written.
+    # No object occurs twice; without this the pickler would keep a reference to each.
     pickler.fast = True
-    pickler.dump(_Streamed(transitions))
+    pickler.dump(_StreamedList(transitions))
 
 
 def _violations(episodes: list[Episode]) -> dict[str, Any]:
-    """What was violated in which episode, in the words of 2023."""
+    """Violations per episode and their counts, in the format of 2023."""
     out: dict[str, Any] = {}
     counts = {f"{group}_constr": 0 for group in CONSTRAINTS} | {TIME: 0}
     for episode in episodes:
         groups = [f"{group}_constr" for group in CONSTRAINTS if group in episode.violated]
-        words = [f"{group} violated" for group in groups]
-        slow = _slowness(episode.computation_time_mean_s, episode.computation_time_max_s)
+        messages = [f"{group} violated" for group in groups]
+        slow = _slow_message(episode.computation_time_mean_s, episode.computation_time_max_s)
         if slow is not None:
             groups.append(TIME)
-            words.append(slow)
+            messages.append(slow)
         for group in groups:
             counts[group] += 1
-        if words:
-            out[f"Episode {episode.index}"] = words
+        if messages:
+            out[f"Episode {episode.index}"] = messages
     summary = {group: count for group, count in counts.items() if count}
     out["violation summary"] = summary | {"Total": sum(counts.values())}
     return out
 
 
-def _slowness(mean_s: float, max_s: float) -> str | None:
+def _slow_message(mean_s: float, max_s: float) -> str | None:
     if max_s > 0.2:
         return "max computation_time > 0.2s"
     if mean_s > 0.02:
@@ -151,11 +151,11 @@ def _slowness(mean_s: float, max_s: float) -> str | None:
 def _results(results: dict[str, Any]) -> dict[str, Any]:
     out: dict[str, Any] = {
         ENVIRONMENTS[task]: {
-            "Success": of["success_rate"],
-            "Penalty": of["penalty_points"],
-            "Color": TIERS[of["tier"]],
+            "Success": result["success_rate"],
+            "Penalty": result["penalty_points"],
+            "Color": TIERS[result["tier"]],
         }
-        for task, of in results["tasks"].items()
+        for task, result in results["tasks"].items()
     }
     out["Total Score"] = {
         "Score": results["score"] / 100.0,

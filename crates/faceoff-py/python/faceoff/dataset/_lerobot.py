@@ -1,4 +1,4 @@
-"""LeRobot datasets of version 3.0, written without LeRobot."""
+"""Export as a LeRobot dataset of version 3.0, without a dependency on LeRobot."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ import pyarrow.parquet as pq
 from ._dataset import Dataset
 from ._episode import JOINT_POS, JOINT_VEL, OPPONENT_EE, PUCK, Episode
 from ._errors import ExistsError
-from ._rewards import Reward, rewards_of, success_at_end
+from ._rewards import Reward, checked_rewards, success_at_end
 from ._select import Selection, select
 
 __all__ = ["to_lerobot"]
@@ -50,39 +50,39 @@ def to_lerobot(
     """Writes the episodes of one task as a LeRobot dataset, which
     ``LeRobotDataset("me/name", root=root)`` opens.
 
-    A frame is a control step, in float32: `observation.state`, joint positions and velocities as the
-    agent was told, shape (14,); `observation.environment_state`, the puck's pose and rates, shape (6,),
+    A frame is a control step, in float32: `observation.state`, observed joint positions and velocities,
+    shape (14,); `observation.environment_state`, the puck's pose and rates, shape (6,),
     with an opponent also its end effector, shape (9,); `action`, flat; `next.reward`, `next.done`,
-    `next.success`. Lengths in m, angles in rad, velocities per s. Episodes are numbered anew; `seed`,
-    `end` and `source_episode` beside LeRobot's own columns tell which they were. Those without an
+    `next.success`. Lengths in m, angles in rad, velocities per s. Episodes are renumbered; the
+    additional columns `seed`, `end` and `source_episode` identify the original ones. Episodes without an
     answered step are left out.
 
     Args:
-        dataset: what is converted.
+        dataset: the dataset to convert.
         root: a folder that does not exist yet.
         task: `hit`, `defend` or `prepare`.
-        episodes: only these; None for all of the task.
-        reward: gives an episode's rewards; the evaluation itself knows none.
-        data_file_mb: a file of frames is closed when it has so many MiB in memory.
+        episodes: the episodes to convert; None for all of the task.
+        reward: computes the rewards of an episode; the evaluation has none.
+        data_file_mb: maximum size of a file of frames, MiB in memory.
 
     Returns:
         The folder.
 
     Raises:
-        ArgumentError: the task was not played.
-        ExistsError: the folder is there already.
+        ArgumentError: the dataset does not have the task.
+        ExistsError: the folder exists already.
         DatasetError: the dataset is damaged, or actions have different shapes.
     """
     folder = Path(root)
     if folder.exists():
         raise ExistsError(f"root: {folder} is there already; name another folder")
-    chosen = select(dataset, task, episodes)
-    features = _features(chosen)
+    selection = select(dataset, task, episodes)
+    features = _features(selection)
     rows: list[dict[str, Any]] = []
-    kept: list[Frames] = []
+    all_frames: list[Frames] = []
     first = 0
     with _DataFiles(folder, _schema(features), data_file_mb << 20) as files:
-        for number, episode in enumerate(chosen.episodes):
+        for number, episode in enumerate(selection.episodes):
             frames = _frames(episode, number, first, reward)
             chunk, file = files.write(frames)
             rows.append(
@@ -107,20 +107,20 @@ def to_lerobot(
                     },
                 }
             )
-            kept.append(frames)
+            all_frames.append(frames)
             first += episode.steps
     meta = folder / EPISODES_PATH.format(chunk_index=0, file_index=0)
     meta.parent.mkdir(parents=True)
     pq.write_table(pa.Table.from_pylist(rows), meta)
     pq.write_table(_tasks([INSTRUCTIONS[task]]), folder / "meta/tasks.parquet")
-    stats = {key: _stats(np.concatenate([f[key] for f in kept])) for key in features}
+    stats = {key: _stats(np.concatenate([f[key] for f in all_frames])) for key in features}
     _write_json(folder / "meta/stats.json", stats)
-    _write_json(folder / "meta/info.json", _info(dataset, chosen, features, first, data_file_mb))
+    _write_json(folder / "meta/info.json", _info(dataset, selection, features, first, data_file_mb))
     return folder
 
 
-def _features(chosen: Selection) -> dict[str, dict[str, Any]]:
-    """Of each column its type, its shape and the names of its parts."""
+def _features(selection: Selection) -> dict[str, dict[str, Any]]:
+    """Type, shape and names of the components of each column."""
 
     def numbers(names: Iterable[str]) -> dict[str, Any]:
         parts = list(names)
@@ -129,8 +129,8 @@ def _features(chosen: Selection) -> dict[str, dict[str, Any]]:
     def single(dtype: str) -> dict[str, Any]:
         return {"dtype": dtype, "shape": [1], "names": None}
 
-    opponent = OPPONENT_EE if chosen.task == "hit" else ()
-    width = int(np.prod(chosen.action_shape))
+    opponent = OPPONENT_EE if selection.task == "hit" else ()
+    width = int(np.prod(selection.action_shape))
     return {
         "observation.state": numbers((*JOINT_POS, *JOINT_VEL)),
         "observation.environment_state": numbers((*PUCK, *opponent)),
@@ -158,14 +158,16 @@ def _schema(features: Mapping[str, dict[str, Any]]) -> pa.Schema:
 def _frames(episode: Episode, number: int, first: int, reward: Reward) -> Frames:
     arrays = episode.to_numpy()
     steps = episode.steps
-    told = arrays.observations[:-1].astype(np.float32)
+    observations = arrays.observations[:-1].astype(np.float32)
     frame = np.arange(steps)
     last = frame + 1 == steps
     return {
-        "observation.state": told[:, 6:20],
-        "observation.environment_state": np.concatenate([told[:, :6], told[:, 20:]], axis=1),
+        "observation.state": observations[:, 6:20],
+        "observation.environment_state": np.concatenate(
+            [observations[:, :6], observations[:, 20:]], axis=1
+        ),
         "action": arrays.actions.reshape(steps, -1).astype(np.float32),
-        "next.reward": rewards_of(reward, episode, arrays).astype(np.float32),
+        "next.reward": checked_rewards(reward, episode, arrays).astype(np.float32),
         "next.done": last,
         "next.success": last & episode.success,
         "timestamp": (frame / FPS).astype(np.float32),
@@ -177,7 +179,7 @@ def _frames(episode: Episode, number: int, first: int, reward: Reward) -> Frames
 
 
 class _DataFiles:
-    """Files of frames, a row group per episode; an episode is in one file."""
+    """Writer of frame files: a row group per episode, each episode in a single file."""
 
     def __init__(self, folder: Path, schema: pa.Schema, limit_bytes: int) -> None:
         self._folder = folder
@@ -188,7 +190,7 @@ class _DataFiles:
         self._writer: pq.ParquetWriter | None = None
 
     def write(self, frames: Frames) -> tuple[int, int]:
-        """Adds an episode; gives the numbers of its chunk and file."""
+        """Adds an episode; returns the numbers of its chunk and file."""
         columns = []
         for field in self._schema:
             values = frames[field.name]
@@ -199,13 +201,13 @@ class _DataFiles:
                 columns.append(pa.array(values, field.type))
         table = pa.Table.from_arrays(columns, schema=self._schema)
         if self._writer is None or self._bytes + table.nbytes > self._limit_bytes:
-            self._next()
+            self._open_next()
         assert self._writer is not None
         self._writer.write_table(table)
         self._bytes += table.nbytes
         return divmod(self._number, FILES_PER_CHUNK)
 
-    def _next(self) -> None:
+    def _open_next(self) -> None:
         self._close()
         self._number += 1
         self._bytes = 0
@@ -227,7 +229,7 @@ class _DataFiles:
 
 
 def _stats(values: Array) -> dict[str, list[float]]:
-    """Of a column of shape (frames,) or (frames, width): lists of one or `width` numbers."""
+    """Statistics of a column (frames,) or (frames, width), as lists of one or `width` numbers."""
     numbers = values.astype(np.float64).reshape(len(values), -1)
     out = {
         "min": numbers.min(axis=0),
@@ -241,7 +243,7 @@ def _stats(values: Array) -> dict[str, list[float]]:
 
 
 def _tasks(instructions: list[str]) -> pa.Table:
-    """A row per task, with its text as the index of the data frame that LeRobot makes of it."""
+    """A row per task; its text is the index of the data frame that LeRobot reads."""
     index = "__index_level_0__"
     table = pa.table({"task_index": pa.array(range(len(instructions)), pa.int64()), index: instructions})
 
@@ -268,7 +270,7 @@ def _tasks(instructions: list[str]) -> pa.Table:
 
 def _info(
     dataset: Dataset,
-    chosen: Selection,
+    selection: Selection,
     features: Mapping[str, dict[str, Any]],
     frames: int,
     data_file_mb: int,
@@ -276,23 +278,23 @@ def _info(
     return {
         "codebase_version": VERSION,
         "robot_type": "iiwa14_air_hockey",
-        "total_episodes": len(chosen.episodes),
+        "total_episodes": len(selection.episodes),
         "total_frames": frames,
         "total_tasks": 1,
         "chunks_size": FILES_PER_CHUNK,
         "data_files_size_in_mb": data_file_mb,
         "video_files_size_in_mb": VIDEO_FILE_MB,
         "fps": FPS,
-        "splits": {"train": f"0:{len(chosen.episodes)}"},
+        "splits": {"train": f"0:{len(selection.episodes)}"},
         "data_path": DATA_PATH,
         "video_path": None,
         "features": features,
         "faceoff": {
             "agent": dataset.agent,
-            "task": chosen.task,
+            "task": selection.task,
             "profile": dataset.profile,
             "ruleset": dataset.ruleset,
-            "action_shape": list(chosen.action_shape),
+            "action_shape": list(selection.action_shape),
         },
     }
 

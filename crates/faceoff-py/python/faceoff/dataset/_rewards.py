@@ -1,4 +1,4 @@
-"""Rewards of recorded episodes: an evaluation gives none, learners want some."""
+"""Rewards of recorded episodes for learners; evaluations have none."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from ._episode import Episode, EpisodeArrays
 from ._errors import DatasetError
 from ._rows import Floats
 
-__all__ = ["Reward", "rewards_of", "success_at_end"]
+__all__ = ["Reward", "checked_rewards", "success_at_end"]
 
 Reward = Callable[[Episode, EpisodeArrays], Floats]
-"""Gives the N rewards of an episode of N control steps, shape (N,)."""
+"""Computes the rewards, shape (N,), of an episode of N control steps."""
 
 
 def success_at_end(episode: Episode, arrays: EpisodeArrays) -> Floats:
@@ -24,11 +24,11 @@ def success_at_end(episode: Episode, arrays: EpisodeArrays) -> Floats:
     return out
 
 
-def rewards_of(reward: Reward, episode: Episode, arrays: EpisodeArrays) -> Floats:
-    """What a reward function gives, looked at.
+def checked_rewards(reward: Reward, episode: Episode, arrays: EpisodeArrays) -> Floats:
+    """The rewards of a reward function, after a check.
 
     Raises:
-        DatasetError: another shape, or something that is not finite.
+        DatasetError: the shape is wrong, or a reward is not finite.
     """
     out = np.asarray(reward(episode, arrays), dtype=np.float64)
     expected = (len(arrays.actions),)

@@ -1,4 +1,4 @@
-"""Rows of a Parquet file, read by row groups."""
+"""Reads rows of a Parquet file by row groups."""
 
 from __future__ import annotations
 
@@ -21,15 +21,15 @@ Floats = npt.NDArray[np.float64]
 
 
 class Rows:
-    """A table whose rows are cut out by number; whoever goes through them unpacks each once."""
+    """A table that is read by row ranges; the last row group is cached, so sequential reads unpack each once."""
 
-    def __init__(self, file: pq.ParquetFile, what: str) -> None:
+    def __init__(self, file: pq.ParquetFile, name: str) -> None:
         """Args:
         file: the Parquet file.
-        what: its name, for messages.
+        name: its name for error messages.
         """
         self._file = file
-        self._what = what
+        self._name = name
         self.columns: list[str] = file.schema_arrow.names
         counts = (file.metadata.row_group(i).num_rows for i in range(file.num_row_groups))
         self._starts = [0, *accumulate(counts)]
@@ -41,32 +41,32 @@ class Rows:
     def read(
         self, start: int = 0, count: int | None = None, columns: Sequence[str] | None = None
     ) -> pa.Table:
-        """Rows ``start`` to ``start + count``, to the end without a count.
+        """The rows from ``start`` (included) to ``start + count`` (excluded); without ``count``, to the end.
 
         Raises:
-            ArgumentTypeError: the columns are a text.
+            ArgumentTypeError: ``columns`` is a text instead of a list.
             DatasetError: a column or rows do not exist, or cannot be read.
         """
         if isinstance(columns, str):
             raise ArgumentTypeError(f"columns: expected a list of names, got the text {columns!r}")
-        wanted = tuple(self.columns if columns is None else columns)
-        for name in wanted:
+        names = tuple(self.columns if columns is None else columns)
+        for name in names:
             if name not in self.columns:
                 known = ", ".join(self.columns)
-                raise DatasetError(f"{self._what} has no column {name!r}; it has {known}")
+                raise DatasetError(f"{self._name} has no column {name!r}; it has {known}")
         end = len(self) if count is None else start + count
         if end > len(self):
-            raise DatasetError(f"{self._what}: expected {end} rows or more, got {len(self)}")
+            raise DatasetError(f"{self._name}: expected {end} rows or more, got {len(self)}")
         pieces = []
         group = bisect_right(self._starts, start) - 1
         while group + 1 < len(self._starts) and self._starts[group] < end:
             first = max(start - self._starts[group], 0)
             last = min(end, self._starts[group + 1]) - self._starts[group]
-            pieces.append(self._group(group, wanted).slice(first, last - first))
+            pieces.append(self._group(group, names).slice(first, last - first))
             group += 1
         if not pieces:
             schema = self._file.schema_arrow
-            return pa.schema([schema.field(name) for name in wanted]).empty_table()
+            return pa.schema([schema.field(name) for name in names]).empty_table()
         return pa.concat_tables(pieces)
 
     def _group(self, group: int, columns: tuple[str, ...]) -> pa.Table:
@@ -78,13 +78,13 @@ class Rows:
                 hint = ""
                 if "BYTE_STREAM_SPLIT" in str(error):
                     hint = "; recordings of layout 2 need a newer pyarrow, such as 21"
-                raise DatasetError(f"{self._what} cannot be read: {error}{hint}") from error
+                raise DatasetError(f"{self._name} cannot be read: {error}{hint}") from error
             self._cached = (key, table)
         return self._cached[1]
 
 
 def floats(table: pa.Table, names: Sequence[str]) -> Floats:
-    """Columns of doubles side by side, shape (rows, columns); NaN where a value is absent."""
+    """Columns of doubles as one array, shape (rows, columns); NaN for missing values."""
     out = np.empty((table.num_rows, len(names)))
     for index, name in enumerate(names):
         out[:, index] = table.column(name).to_numpy()
@@ -92,24 +92,24 @@ def floats(table: pa.Table, names: Sequence[str]) -> Floats:
 
 
 def seconds(table: pa.Table, name: str) -> Floats:
-    """A column of nanoseconds in seconds, shape (rows,); NaN where it is absent."""
+    """A column of nanoseconds in seconds, shape (rows,); NaN for missing values."""
     values = table.column(name).to_numpy()
     return np.asarray(values, dtype=np.float64) / 1e9
 
 
-def lists(table: pa.Table, name: str, shape: tuple[int, ...], what: str) -> Floats:
-    """A column of lists as one array, shape (rows, *shape); NaN where a list is absent.
+def lists(table: pa.Table, name: str, shape: tuple[int, ...], context: str) -> Floats:
+    """A column of lists as one array, shape (rows, *shape); NaN for missing lists.
 
     Raises:
-        DatasetError: a list has another length.
+        DatasetError: a list has another length; the message begins with ``context``.
     """
     array = table.column(name).combine_chunks()
     width = int(np.prod(shape))
     lengths = array.value_lengths()
     present = ~np.asarray(lengths.is_null())
-    odd = [n for n in lengths.drop_null().unique().to_pylist() if n != width]
-    if odd:
-        raise DatasetError(f"{what}: expected {name}s of {width} numbers, got one of {odd[0]}")
+    unexpected = [n for n in lengths.drop_null().unique().to_pylist() if n != width]
+    if unexpected:
+        raise DatasetError(f"{context}: expected {name}s of {width} numbers, got one of {unexpected[0]}")
     out = np.full((len(array), width), np.nan)
     out[present] = np.asarray(array.flatten()).reshape(-1, width)
     return out.reshape(len(array), *shape)

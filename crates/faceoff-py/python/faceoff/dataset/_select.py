@@ -1,4 +1,4 @@
-"""Which episodes of a dataset are converted."""
+"""Selects the episodes of a dataset for a conversion."""
 
 from __future__ import annotations
 
@@ -24,23 +24,23 @@ class Selection:
 
 
 def select(dataset: Dataset, task: str, episodes: Iterable[Episode] | None) -> Selection:
-    """The episodes that a learner can use: those without an answered step are left out.
+    """Selects the episodes for learning: those with at least one answered step.
 
     Raises:
         ArgumentError: an episode is of another task.
-        DatasetError: none is left, or their actions have different shapes.
+        DatasetError: no episode remains, or their actions have different shapes.
     """
-    chosen = dataset.episodes(task) if episodes is None else list(episodes)
-    for episode in chosen:
+    selected = dataset.episodes(task) if episodes is None else list(episodes)
+    for episode in selected:
         if episode.task != task:
             raise ArgumentError(f"episodes: expected episodes of {task}, got one of {episode.task}")
-    chosen = [episode for episode in chosen if episode.steps]
-    if not chosen:
+    selected = [episode for episode in selected if episode.steps]
+    if not selected:
         raise DatasetError(f"{dataset.path}: expected an answered control step of {task}, found none")
-    shapes = sorted({episode.action_shape for episode in chosen})
+    shapes = sorted({episode.action_shape for episode in selected})
     if len(shapes) > 1:
         raise DatasetError(
             f"{dataset.path}: expected actions of {task} of one shape, got {shapes}; "
             "choose episodes of one interpolation with the argument `episodes`"
         )
-    return Selection(task, shapes[0], chosen)
+    return Selection(task, shapes[0], selected)

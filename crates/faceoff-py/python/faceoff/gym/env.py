@@ -1,4 +1,4 @@
-"""One world."""
+"""The environment of one world."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from faceoff.errors import ArgumentError, ArgumentTypeError, ClosedError
 from faceoff.gym.reward import Reward, State, Transition
 from faceoff.gym.rows import Rows
 from faceoff.gym.spaces import action_space, observation_space
-from faceoff.gym.turn import Turn, alone
+from faceoff.gym.call_guard import CallGuard, exclusive
 
 Observation = npt.NDArray[np.float32]
 
-#: What ``reset`` takes as options.
+#: Keys of the options of ``reset``.
 OPTIONS = ("episode", "puck")
 
 
@@ -28,21 +28,21 @@ class AirHockeyEnv(gymnasium.Env[Any, Any]):
 
     Args:
         task: ``hit``, ``defend`` or ``prepare``.
-        interpolation: how actions become trajectories: 1, 2, 3, 4, 5, -1 or None (docs/protocol.md); the action has
+        interpolation: how an action becomes a trajectory: 1, 2, 3, 4, 5, -1 or None (docs/protocol.md); the action has
             7, 7, 14, 14, 21, 14 or 420 numbers.
         action_mode: ``delta``, ``absolute`` or ``raw`` (docs/python.md, "Actions").
-        clip_actions: bring numbers that are too large to their bounds, instead of refusing them.
-        profile: what perturbs the world: a profile's name, or names of factors.
-        perturbations: magnitudes other than the ruleset's, as in ``{"tracking_loss": {"probability": 0.0}}``.
-        mismatch_seed: seed of the arm's deviation from its model, where that is switched on; left out, it follows from
-            the seed of ``reset``, so that another seed is another robot.
-        max_episode_steps: where an episode is cut off, at most 500.
+        clip_actions: clip numbers to their bounds instead of refusing them.
+        profile: perturbations of the world: the name of a profile, or names of factors.
+        perturbations: magnitudes that replace those of the ruleset, as in ``{"tracking_loss": {"probability": 0.0}}``.
+        mismatch_seed: seed of the arm's deviation from its model, if that factor is active; by default it follows from
+            the seed of ``reset``, so that each seed has its own robot.
+        max_episode_steps: control steps after which an episode is truncated, at most 500.
         reward: from a :class:`~faceoff.gym.reward.Transition` to a number, instead of the default reward.
         render_mode: ``rgb_array``, ``human`` or None.
 
-    Episodes are those of the competition's evaluator: after ``reset(seed=s)`` the first is episode 0 of
-    ``faceoff eval --seed s``, each ``reset()`` plays the next one. ``options={"episode": 7}`` plays that one,
-    ``options={"puck": [x, y, yaw, vx, vy, yaw_rate]}`` (table's frame) starts with that puck.
+    Episodes are those of the competition's evaluator: ``reset(seed=s)`` begins episode 0 of ``faceoff eval --seed s``,
+    each ``reset()`` the next one. ``options={"episode": 7}`` selects an episode,
+    ``options={"puck": [x, y, yaw, vx, vy, yaw_rate]}`` (table's frame; m, rad and s) sets the puck's initial state.
     """
 
     metadata: ClassVar[dict[str, Any]] = {  # type: ignore[misc]
@@ -87,7 +87,7 @@ class AirHockeyEnv(gymnasium.Env[Any, Any]):
         self._reward = reward
         self._window: Any = None
         self._worlds: _native.Worlds | None = _native.Worlds(self._setup, 1, 1, "disabled")
-        self._turn = Turn()
+        self._calls = CallGuard()
         self._is_started = False
         self._rows = self._new_rows()
 
@@ -100,11 +100,11 @@ class AirHockeyEnv(gymnasium.Env[Any, Any]):
             raise ClosedError("expected an open environment, got one that was closed: make a new one")
         return self._worlds
 
-    @alone
+    @exclusive
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observation, dict[str, Any]]:
-        """Begins an episode. Returns its first observation, and ``seed`` and ``episode_number`` as info."""
+        """Begins an episode. Returns its first observation, and info with ``seed`` and ``episode_number``."""
         worlds = self._open()
         if seed is not None:
             seed_number("seed", seed)
@@ -112,26 +112,26 @@ class AirHockeyEnv(gymnasium.Env[Any, Any]):
         super().reset(seed=seed)
         if seed is None and not self._is_started:
             seed = int(self.np_random.integers(2**63))
-        everything = np.ones(1, np.bool_)
-        worlds.reset(everything, [seed], number, puck, self._rows.arrays())
+        all_worlds = np.ones(1, np.bool_)
+        worlds.reset(all_worlds, [seed], number, puck, self._rows.arrays())
         self._is_started = True
-        self._show()
+        self._render_human()
         return self._rows.observations[0].copy(), self._origin()
 
-    @alone
+    @exclusive
     def step(
         self, action: Any
     ) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """One control step, 20 ms.
 
-        Info has ``constraints``, 4 values in the order of :data:`faceoff.gym.CONSTRAINTS`, and at an end ``success``,
-        ``end`` (why), ``violations`` (4 bools) and ``steps``.
+        Info has ``constraints``, 4 values in the order of :data:`faceoff.gym.CONSTRAINTS`, and at the end of
+        an episode ``success``, ``end`` (the reason), ``violations`` (4 bools) and ``steps``.
         """
         worlds = self._open()
-        given = numbers("action", action, self._action_shape)  # type: ignore[arg-type]
+        checked = numbers("action", action, self._action_shape)  # type: ignore[arg-type]
         rows = self._rows
         before = None if self._reward is None else (rows.observations[0].copy(), rows.next_states[0].copy())
-        worlds.step(given.reshape(1, -1), rows.arrays())
+        worlds.step(checked.reshape(1, -1), rows.arrays())
         terminated, truncated = bool(rows.terminated[0]), bool(rows.truncated[0])
         info: dict[str, Any] = {"constraints": rows.constraints[0]}
         if terminated or truncated:
@@ -143,7 +143,7 @@ class AirHockeyEnv(gymnasium.Env[Any, Any]):
         if self._reward is not None and before is not None:
             transition = Transition(
                 observation=before[0],
-                action=given,
+                action=checked,
                 next_observation=rows.observations[0].copy(),
                 state=State(before[1]),
                 next_state=State(rows.states[0].copy()),
@@ -153,20 +153,20 @@ class AirHockeyEnv(gymnasium.Env[Any, Any]):
                 terminated=rows.terminated[0],
                 truncated=rows.truncated[0],
             )
-            reward = checked_reward(self._reward(transition))
-        self._show()
+            reward = check_reward(self._reward(transition))
+        self._render_human()
         return rows.observations[0].copy(), reward, terminated, truncated, info
 
-    @alone
+    @exclusive
     def save(self) -> _native.Snapshot:
         """The exact state of the world; it can be pickled."""
         return self._open().save(0)
 
-    @alone
+    @exclusive
     def restore(self, state: _native.Snapshot) -> tuple[Observation, dict[str, Any]]:
-        """Brings the world back to a saved state, of this environment or of another one made alike.
+        """Restores a saved state of this environment, or of another one with the same arguments.
 
-        Returns the observation there, and info as :meth:`reset` does.
+        Returns the observation of that state, and info as :meth:`reset` does.
         """
         if not isinstance(state, _native.Snapshot):
             raise ArgumentTypeError(f"state: expected what save() returned, got {state!r:.80}")
@@ -176,7 +176,7 @@ class AirHockeyEnv(gymnasium.Env[Any, Any]):
 
     @property
     def state(self) -> State:
-        """The true state now."""
+        """The present true state."""
         return State(np.array(self._open().state(0)))
 
     def _origin(self) -> dict[str, Any]:
@@ -184,7 +184,7 @@ class AirHockeyEnv(gymnasium.Env[Any, Any]):
         return {"seed": seed, "episode_number": number}
 
     def render(self) -> npt.NDArray[np.uint8] | None:  # type: ignore[override]
-        """(360, 640, 3) uint8 of the table from above for ``rgb_array``; a window for ``human``."""
+        """A picture of the table from above, (360, 640, 3) uint8; None for ``human``, which shows a window."""
         if self.render_mode is None:
             raise ArgumentError(
                 "render: expected an environment made with render_mode='rgb_array' or 'human', got None"
@@ -201,12 +201,12 @@ class AirHockeyEnv(gymnasium.Env[Any, Any]):
         self._window.show(frame)
         return None
 
-    def _show(self) -> None:
+    def _render_human(self) -> None:
         if self.render_mode == "human":
             self.render()
 
     def close(self) -> None:
-        """Gives up the world and the window; may be called again."""
+        """Releases the world and the window; may be called more than once."""
         if self._worlds is not None:
             self._worlds.close()
             self._worlds = None
@@ -215,16 +215,16 @@ class AirHockeyEnv(gymnasium.Env[Any, Any]):
             self._window = None
 
     def __getstate__(self) -> dict[str, Any]:
-        kept = self.__dict__.copy()
-        worlds = kept.pop("_worlds")
-        kept["_window"] = None
-        kept["_is_open"] = worlds is not None
-        kept["_saved"] = worlds.save(0) if worlds is not None and self._is_started else None
-        return kept
+        state = self.__dict__.copy()
+        worlds = state.pop("_worlds")
+        state["_window"] = None
+        state["_is_open"] = worlds is not None
+        state["_saved"] = worlds.save(0) if worlds is not None and self._is_started else None
+        return state
 
-    def __setstate__(self, kept: dict[str, Any]) -> None:
-        is_open, saved = kept.pop("_is_open"), kept.pop("_saved")
-        self.__dict__.update(kept)
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        is_open, saved = state.pop("_is_open"), state.pop("_saved")
+        self.__dict__.update(state)
         self._worlds = _native.Worlds(self._setup, 1, 1, "disabled") if is_open else None
         self._rows = self._new_rows()
         if saved is not None:
@@ -232,7 +232,7 @@ class AirHockeyEnv(gymnasium.Env[Any, Any]):
 
 
 def read_options(options: Mapping[str, Any] | None) -> tuple[int | None, list[float] | None]:
-    """The episode's number and the puck's first state, where they are given."""
+    """The episode's number and the puck's initial state of ``reset``'s options, each None if it is absent."""
     if options is None:
         return None, None
     if not isinstance(options, Mapping):
@@ -249,8 +249,8 @@ def read_options(options: Mapping[str, Any] | None) -> tuple[int | None, list[fl
     return number, puck
 
 
-def checked_reward(value: Any) -> float:
-    """What a reward function returned, if it is a finite number."""
+def check_reward(value: Any) -> float:
+    """The return value of a reward function as a float; refused unless it is a finite number."""
     try:
         reward = float(value)
     except (TypeError, ValueError):

@@ -1,4 +1,4 @@
-"""Actions that move the mallet over the table, instead of joints."""
+"""Wrappers whose actions are mallet velocities instead of joint commands."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ from faceoff.kinematics.arrays import Floats
 from faceoff.kinematics.mallet import MalletMotion
 
 if TYPE_CHECKING:
-    ManyWorlds = VectorWrapper[Any, Any, Any, Any, Any]
+    VectorWrapperBase = VectorWrapper[Any, Any, Any, Any, Any]
 else:
     # Not generic in Gymnasium 1.1.
-    ManyWorlds = VectorWrapper
+    VectorWrapperBase = VectorWrapper
 
 
-def _check(space: gymnasium.Space[Any], action_mode: str) -> None:
+def _check_env(space: gymnasium.Space[Any], action_mode: str) -> None:
     length = space.shape[-1]  # type: ignore[index]
     if action_mode != "raw" or length != 14:
         raise ArgumentError(
@@ -32,51 +32,51 @@ def _check(space: gymnasium.Space[Any], action_mode: str) -> None:
         )
 
 
-def _speed(value: float) -> float:
+def _check_speed(value: float) -> float:
     if not 0.0 < value <= 5.0:
         raise ArgumentError(f"max_speed_m_s: expected a speed above 0 and up to 5, got {value}")
     return float(value)
 
 
 class MalletPlane(gymnasium.ActionWrapper[Any, Any, Any]):
-    """Actions (2,) in [-1, 1]: how fast the mallet moves along x and y, at its height over the table.
+    """Actions (2,) in [-1, 1]: the mallet's velocity along x and y, as shares of ``max_speed_m_s``, at constant height.
 
     Args:
         env: an :class:`AirHockeyEnv` with ``action_mode="raw"`` and ``interpolation=3``: without commanded velocities
             the arm lags and sags by centimetres.
-        max_speed_m_s: what 1 stands for; joints that would be too fast for it slow the mallet down.
+        max_speed_m_s: mallet speed of an action of 1; the mallet moves slower where a joint's speed limit requires it.
     """
 
     def __init__(self, env: gymnasium.Env[Any, Any], max_speed_m_s: float = 1.0) -> None:
         super().__init__(env)
-        _check(env.action_space, getattr(env.unwrapped, "action_mode", "none"))
-        self.motion = MalletMotion(1, _speed(max_speed_m_s), native.inverse)
+        _check_env(env.action_space, getattr(env.unwrapped, "action_mode", "none"))
+        self.motion = MalletMotion(1, _check_speed(max_speed_m_s), native.inverse)
         self.action_space = Box(-1.0, 1.0, (2,), np.float32)
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Any, dict[str, Any]]:
-        """As of the environment."""
-        told = self.env.reset(seed=seed, options=options)
+        """Like the method of the wrapped environment."""
+        result = self.env.reset(seed=seed, options=options)
         self.motion.restart(np.ones(1, np.bool_))
-        return told
-
-    def action(self, action: Any) -> Floats:
-        """The joints that follow, as a raw action."""
-        given = numbers("action", action, (2,))
-        if not np.isfinite(given).all():
-            raise ArgumentError(f"action: expected finite numbers, got {given}")
-        result: Floats = self.motion.command(given[None])[0]
         return result
 
+    def action(self, action: Any) -> Floats:
+        """The raw action, (14,): joint positions (rad) and velocities (rad/s) that follow the mallet's velocity."""
+        checked = numbers("action", action, (2,))
+        if not np.isfinite(checked).all():
+            raise ArgumentError(f"action: expected finite numbers, got {checked}")
+        command: Floats = self.motion.command(checked[None])[0]
+        return command
 
-class MalletPlaneVector(ManyWorlds):
+
+class MalletPlaneVector(VectorWrapperBase):
     """:class:`MalletPlane` for an :class:`AirHockeyVectorEnv`; actions are (num_envs, 2)."""
 
     def __init__(self, env: VectorEnv[Any, Any, Any], max_speed_m_s: float = 1.0) -> None:
         super().__init__(env)
-        _check(env.action_space, getattr(env.unwrapped, "action_mode", "none"))
-        self.motion = MalletMotion(env.num_envs, _speed(max_speed_m_s), native.inverse)
+        _check_env(env.action_space, getattr(env.unwrapped, "action_mode", "none"))
+        self.motion = MalletMotion(env.num_envs, _check_speed(max_speed_m_s), native.inverse)
         self.single_action_space = Box(-1.0, 1.0, (2,), np.float32)
         self.action_space = batch_space(self.single_action_space, env.num_envs)
         self._ended = np.zeros(env.num_envs, np.bool_)
@@ -84,27 +84,27 @@ class MalletPlaneVector(ManyWorlds):
     def reset(
         self, *, seed: Any = None, options: dict[str, Any] | None = None
     ) -> tuple[Any, dict[str, Any]]:
-        """As of the environment."""
-        told = self.env.reset(seed=seed, options=options)
+        """Like the method of the wrapped environment."""
+        result = self.env.reset(seed=seed, options=options)
         is_reset = np.ones(self.num_envs, np.bool_)
         if options is not None and options.get("reset_mask") is not None:
             is_reset = options["reset_mask"]
         self.motion.restart(is_reset)
         self._ended[is_reset] = False
-        return told
+        return result
 
     def step(self, actions: Any) -> tuple[Any, Any, Any, Any, dict[str, Any]]:
-        """As of the environment."""
-        given = numbers("actions", actions, (self.num_envs, 2))
-        if not np.isfinite(given).all():
-            world, index = np.argwhere(~np.isfinite(given))[0]
+        """Like the method of the wrapped environment."""
+        checked = numbers("actions", actions, (self.num_envs, 2))
+        if not np.isfinite(checked).all():
+            world, index = np.argwhere(~np.isfinite(checked))[0]
             raise ArgumentError(
-                f"actions: expected finite numbers, got {given[world, index]} at index {index} of world {world}"
+                f"actions: expected finite numbers, got {checked[world, index]} at index {index} of world {world}"
             )
-        told = self.env.step(self.motion.command(given))
-        ended = told[2] | told[3]
+        result = self.env.step(self.motion.command(checked))
+        ended = result[2] | result[3]
         same_step = self.env.metadata["autoreset_mode"].name == "SAME_STEP"
-        # Whose world has begun an episode with this step.
+        # Motions of the worlds in which this step began an episode.
         self.motion.restart(ended if same_step else self._ended)
         self._ended = ended.copy()
-        return told
+        return result

@@ -1,4 +1,4 @@
-"""The table from above, drawn by NumPy alone."""
+"""Pictures of the table from above, drawn with NumPy alone."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ import numpy.typing as npt
 from faceoff.gym.reward import State
 from faceoff.kinematics import model
 
-#: Pixels.
+#: Size of a picture, pixels.
 HEIGHT, WIDTH = 360, 640
-#: Metres of a pixel: the table with a margin.
+#: Metres per pixel: the table with a margin.
 SCALE = 2.16 / WIDTH
 
 HALF_LENGTH, HALF_WIDTH, HALF_GOAL = model.TABLE_LENGTH_M / 2, model.TABLE_WIDTH_M / 2, model.GOAL_WIDTH_M / 2
@@ -23,15 +23,15 @@ TABLE = (238, 241, 244)
 LINES = (176, 190, 204)
 GOALS = (208, 96, 72)
 PUCK = (24, 26, 30)
-OWN = (32, 110, 190)
-OTHER = (200, 120, 30)
+OWN_MALLET = (32, 110, 190)
+OTHER_MALLET = (200, 120, 30)
 
 Picture = npt.NDArray[np.uint8]
 
 
 @lru_cache(maxsize=1)
 def _grid() -> tuple[npt.NDArray[Any], npt.NDArray[Any]]:
-    """x of each column and y of each row, m."""
+    """x of each column (1, WIDTH) and y of each row (HEIGHT, 1), m."""
     x = (np.arange(WIDTH) + 0.5 - WIDTH / 2) * SCALE
     y = (HEIGHT / 2 - np.arange(HEIGHT) - 0.5) * SCALE
     return x[None, :], y[:, None]
@@ -59,10 +59,10 @@ def draw(state: State, *, has_opponent: bool) -> Picture:
     """(360, 640, 3) uint8: the table, the puck with a mark that shows its yaw, and the mallets."""
     picture = _table().copy()
     own_x, own_y, _ = state.mallet
-    _disc(picture, own_x - model.BASE_X_M, own_y, model.MALLET_RADIUS_M, OWN)
+    _disc(picture, own_x - model.BASE_X_M, own_y, model.MALLET_RADIUS_M, OWN_MALLET)
     if has_opponent:
         x, y, _ = state.opponent
-        _disc(picture, model.BASE_X_M - x, -y, model.MALLET_RADIUS_M, OTHER)
+        _disc(picture, model.BASE_X_M - x, -y, model.MALLET_RADIUS_M, OTHER_MALLET)
     x, y, yaw = state.puck[:3]
     _disc(picture, x, y, model.PUCK_RADIUS_M, PUCK)
     mark = 0.6 * model.PUCK_RADIUS_M

@@ -1,4 +1,4 @@
-"""The arrays that the native half writes."""
+"""Arrays with a row per world, written by the native half."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Bools = npt.NDArray[np.bool_]
 
 @dataclass
 class Rows:
-    """What a step leads to: a row per world."""
+    """Results of a step: a row per world."""
 
     observations: Singles
     final_observations: Singles
@@ -30,7 +30,7 @@ class Rows:
 
     @classmethod
     def make(cls, worlds: int, observation_len: int, *, finals: bool, states: bool) -> Rows:
-        """For so many worlds; final observations and true states only where they are asked for."""
+        """Zeroed arrays for so many worlds; final observations and true states are empty unless requested."""
         state_rows = worlds if states else 0
         return cls(
             np.zeros((worlds, observation_len), np.float32),
@@ -44,14 +44,14 @@ class Rows:
         )
 
     def renew(self) -> None:
-        """New memory for what users get: they may keep what they got before."""
+        """Allocates new arrays for the results that callers keep."""
         self.observations = np.empty_like(self.observations)
         self.rewards = np.empty_like(self.rewards)
         self.terminated = np.empty_like(self.terminated)
         self.truncated = np.empty_like(self.truncated)
 
     def arrays(self) -> tuple[Any, ...]:
-        """In the order of the native half."""
+        """All arrays in the order that the native half expects."""
         return (
             self.observations,
             self.final_observations,
@@ -70,25 +70,25 @@ class Rows:
 
     @property
     def success(self) -> Bools:
-        """[worlds] the episode has ended in success."""
+        """[worlds] whether the episode has ended in success."""
         return self.facts[:, 1] > 0.0
 
     @property
     def numbers(self) -> npt.NDArray[np.int64]:
-        """[worlds] the episode's number; the one that has ended, at an end."""
+        """[worlds] the episode's number; at an end that of the ended episode."""
         return self.facts[:, 2].astype(np.int64)
 
     @property
     def steps(self) -> npt.NDArray[np.int64]:
-        """[worlds] control steps of that episode."""
+        """[worlds] control steps of the episode so far."""
         return self.facts[:, 3].astype(np.int64)
 
     @property
     def constraints(self) -> Floats:
-        """[worlds][4] a copy."""
+        """[worlds][4] values of the constraints, a copy."""
         return self.facts[:, 4:8].copy()
 
     @property
     def violations(self) -> Bools:
-        """[worlds][4]"""
+        """[worlds][4] whether each constraint was violated in the episode."""
         return self.facts[:, 8:12] > 0.0

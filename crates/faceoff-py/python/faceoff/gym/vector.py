@@ -1,4 +1,4 @@
-"""Many worlds, stepped together by threads."""
+"""The environment of many worlds, stepped together by threads."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ from gymnasium.vector.utils import batch_space
 from faceoff import _native
 from faceoff._arguments import ActionMode, Task, integer, mask, numbers, one_of, seed_number, write_setup
 from faceoff.errors import ArgumentError, ArgumentTypeError, ClosedError, OrderError
+from faceoff.gym.call_guard import CallGuard, exclusive
 from faceoff.gym.env import AirHockeyEnv, read_options
 from faceoff.gym.reward import Reward, State, Transition
 from faceoff.gym.rows import Rows
 from faceoff.gym.spaces import action_space, observation_space
-from faceoff.gym.turn import Turn, alone
 
 try:
     from gymnasium.vector import AutoresetMode
-except ImportError:  # Gymnasium 1.0 knows one mode and no name for it.
+except ImportError:  # Gymnasium 1.0 has one mode and no name for it.
 
     class AutoresetMode(Enum):  # type: ignore[no-redef]
         """When a world whose episode has ended begins the next one."""
@@ -33,7 +33,7 @@ except ImportError:  # Gymnasium 1.0 knows one mode and no name for it.
         DISABLED = "Disabled"
 
 
-#: Worlds for which another thread is worth it.
+#: Fewer worlds than this do not pay for another thread.
 WORLDS_PER_THREAD = 4
 
 Floats = npt.NDArray[np.float64]
@@ -42,18 +42,18 @@ Step = tuple[npt.NDArray[np.float32], Floats, Bools, Bools, dict[str, Any]]
 
 
 class AirHockeyVectorEnv(VectorEnv[Any, Any, Any]):
-    """Worlds of a task, stepped together.
+    """Many worlds of a task, stepped together.
 
-    World i after ``reset(seed=s)`` is, to the last bit, an :class:`AirHockeyEnv` after ``reset(seed=s + i)``.
+    World i after ``reset(seed=s)`` equals an :class:`AirHockeyEnv` after ``reset(seed=s + i)`` bit for bit.
 
     Args:
         num_envs: number of worlds.
-        task, interpolation, action_mode, clip_actions, profile, perturbations, mismatch_seed, max_episode_steps: as of
+        task, interpolation, action_mode, clip_actions, profile, perturbations, mismatch_seed, max_episode_steps: as for
             :class:`AirHockeyEnv`.
         autoreset_mode: an ``AutoresetMode`` or its value: ``NextStep``, ``SameStep`` or ``Disabled``.
-        copy: whether each step returns arrays of its own. Without it observations, rewards and flags are the same
-            arrays each time, overwritten by the next step or reset.
-        threads: threads of this environment's pool; left out, one per CPU that this process may use. Results do not
+        copy: whether each step returns new arrays. Otherwise observations, rewards and flags are the same arrays each
+            time, overwritten by the next step or reset.
+        threads: threads of this environment's pool; by default one per CPU that this process may use. Results do not
             depend on it.
         reward: from a :class:`~faceoff.gym.reward.Transition` of all worlds to an array of shape (num_envs,).
         render_mode: ``rgb_array`` or None.
@@ -108,7 +108,7 @@ class AirHockeyVectorEnv(VectorEnv[Any, Any, Any]):
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
         self._reward = reward
-        self._turn = Turn()
+        self._calls = CallGuard()
         self._is_started = False
         self._seeds = np.zeros(self.num_envs, np.int64)
         self._sent: tuple[Floats, npt.NDArray[np.float32], Floats] | None = None
@@ -134,7 +134,7 @@ class AirHockeyVectorEnv(VectorEnv[Any, Any, Any]):
 
     # --- reset -------------------------------------------------------------------------------------------------
 
-    @alone
+    @exclusive
     def reset(
         self,
         *,
@@ -144,8 +144,8 @@ class AirHockeyVectorEnv(VectorEnv[Any, Any, Any]):
         """Begins an episode in every world, or in those of ``options["reset_mask"]``, an array of bool.
 
         Args:
-            seed: s for seeds s, s + 1, …; or one for each world, None for those that go on with their next episode.
-            options: ``reset_mask``, and ``episode`` and ``puck`` as of :meth:`AirHockeyEnv.reset`, for all worlds.
+            seed: s for seeds s, s + 1, …; or a sequence with one per world, None to continue with its next episode.
+            options: ``reset_mask``, and ``episode`` and ``puck`` as for :meth:`AirHockeyEnv.reset`, for all worlds.
         """
         worlds = self._open()
         if options is not None and not isinstance(options, Mapping):
@@ -159,8 +159,8 @@ class AirHockeyVectorEnv(VectorEnv[Any, Any, Any]):
         seeds = self._read_seeds(seed)
         super().reset(seed=seed if isinstance(seed, int) else None)
         if not self._is_started:
-            drawn = self.np_random.integers(2**63, size=self.num_envs).tolist()
-            seeds = [one if one is not None else new for one, new in zip(seeds, drawn, strict=True)]
+            fallback = self.np_random.integers(2**63, size=self.num_envs).tolist()
+            seeds = [new if seed is None else seed for seed, new in zip(seeds, fallback, strict=True)]
         worlds.reset(is_reset, seeds, number, puck, self._rows_to_write(keep=True).arrays())
         self._is_started = True
         origins = np.array(worlds.origins(), np.uint64).astype(np.int64)
@@ -183,52 +183,52 @@ class AirHockeyVectorEnv(VectorEnv[Any, Any, Any]):
                 f"seed: expected one for each of {self.num_envs} worlds, got {len(seed)}"
             )
         return [
-            None if one is None else seed_number(f"seed[{index}]", one)
-            for index, one in enumerate(seed)
+            None if value is None else seed_number(f"seed[{index}]", value)
+            for index, value in enumerate(seed)
         ]
 
-    def _origins(self, is_reset: Bools, numbers_: npt.NDArray[np.int64]) -> dict[str, Any]:
+    def _origins(self, is_reset: Bools, episode_numbers: npt.NDArray[np.int64]) -> dict[str, Any]:
         return {
             "seed": np.where(is_reset, self._seeds, 0),
             "_seed": is_reset.copy(),
-            "episode_number": np.where(is_reset, numbers_, 0),
+            "episode_number": np.where(is_reset, episode_numbers, 0),
             "_episode_number": is_reset.copy(),
         }
 
     # --- step --------------------------------------------------------------------------------------------------
 
-    @alone
+    @exclusive
     def step(self, actions: Any) -> Step:
         """One control step of every world, 20 ms; ``actions`` is (num_envs, n).
 
-        Infos are arrays with a mask each (``constraints`` and ``_constraints``, …), as
-        :class:`gymnasium.vector.SyncVectorEnv` gathers them from :class:`AirHockeyEnv`.
+        Infos are arrays, each with a mask (``constraints`` and ``_constraints``, …), as
+        :class:`gymnasium.vector.SyncVectorEnv` collects them from :class:`AirHockeyEnv`.
         """
         worlds = self._open()
-        given = numbers("actions", actions, self.action_space.shape)  # type: ignore[arg-type]
+        checked = numbers("actions", actions, self.action_space.shape)  # type: ignore[arg-type]
         before = self._before()
         rows = self._rows_to_write(keep=False)
-        worlds.step(given, rows.arrays())
-        return self._result(given, before)
+        worlds.step(checked, rows.arrays())
+        return self._result(checked, before)
 
-    @alone
+    @exclusive
     def send(self, actions: Any) -> None:
-        """Begins a step, which goes on in other threads; :meth:`recv` waits for it. Nothing else may be called before."""
+        """Begins a step in other threads; :meth:`recv` waits for it. No other method may be called in between."""
         worlds = self._open()
-        given = numbers("actions", actions, self.action_space.shape)  # type: ignore[arg-type]
-        worlds.send(given, self._reward is not None)
-        self._sent = (given, *self._before())
+        checked = numbers("actions", actions, self.action_space.shape)  # type: ignore[arg-type]
+        worlds.send(checked, self._reward is not None)
+        self._sent = (checked, *self._before())
 
-    @alone
+    @exclusive
     def recv(self) -> Step:
-        """Waits for the step that was sent, and returns what :meth:`step` would have."""
+        """Waits for the step that was sent, and returns its result as :meth:`step` does."""
         worlds = self._open()
         if self._sent is None:
             raise OrderError("recv: expected a step that was sent, got none: call send() first")
         worlds.recv(self._rows_to_write(keep=False).arrays())
-        given, observations, states = self._sent
+        checked, observations, states = self._sent
         self._sent = None
-        return self._result(given, (observations, states))
+        return self._result(checked, (observations, states))
 
     def _before(self) -> tuple[npt.NDArray[np.float32], Floats]:
         if self._reward is None:
@@ -237,28 +237,28 @@ class AirHockeyVectorEnv(VectorEnv[Any, Any, Any]):
 
     def _rows_to_write(self, *, keep: bool) -> Rows:
         if self.copy:
-            kept = self._rows.observations
+            previous = self._rows.observations
             self._rows.renew()
             if keep:
-                self._rows.observations[:] = kept
+                self._rows.observations[:] = previous
         return self._rows
 
     def _observations(self) -> npt.NDArray[np.float32]:
-        # A reset of some worlds goes on from these; what users get must not change with it.
+        # A reset of some worlds changes this array in place, so the caller gets a copy.
         return self._rows.observations.copy() if self.copy else self._rows.observations
 
     def _result(
-        self, given: Floats, before: tuple[npt.NDArray[np.float32], Floats]
+        self, checked: Floats, before: tuple[npt.NDArray[np.float32], Floats]
     ) -> Step:
         rows = self._rows
         ended = rows.facts[:, 0] >= 0.0
         was_reset = rows.facts[:, 3] == 0.0
         if self._reward is not None:
-            rows.rewards[:] = self._custom_rewards(given, before, ended)
+            rows.rewards[:] = self._custom_rewards(checked, before, ended)
             rows.rewards[was_reset] = 0.0
         infos: dict[str, Any] = {}
         same_step = self.autoreset_mode.name == "SAME_STEP"
-        is_told = ~was_reset
+        has_step_info = ~was_reset
         if same_step and ended.any():
             finals = np.full(self.num_envs, None, object)
             for world in np.flatnonzero(ended):
@@ -266,27 +266,27 @@ class AirHockeyVectorEnv(VectorEnv[Any, Any, Any]):
             infos["final_obs"], infos["_final_obs"] = finals, ended.copy()
             infos["final_info"] = self._step_infos(ended, ended)
             infos["_final_info"] = ended.copy()
-            is_told &= ~ended
+            has_step_info &= ~ended
             was_reset = ended
-        infos |= self._step_infos(is_told, ended & is_told)
+        infos |= self._step_infos(has_step_info, ended & has_step_info)
         if was_reset.any():
-            # A fresh episode's number is told; an ended one's is the number before.
+            # Infos have the number of the new episode; rows have the number of the ended one.
             infos |= self._origins(was_reset, rows.numbers + int(same_step))
         return rows.observations, rows.rewards, rows.terminated, rows.truncated, infos
 
-    def _step_infos(self, told: Bools, ended: Bools) -> dict[str, Any]:
+    def _step_infos(self, stepped: Bools, ended: Bools) -> dict[str, Any]:
         rows = self._rows
         infos: dict[str, Any] = {}
-        if told.any():
+        if stepped.any():
             constraints = rows.constraints
-            constraints[~told] = 0.0
-            infos["constraints"], infos["_constraints"] = constraints, told.copy()
+            constraints[~stepped] = 0.0
+            infos["constraints"], infos["_constraints"] = constraints, stepped.copy()
         if ended.any():
             success = np.zeros(self.num_envs, np.bool_)
             ends = np.full(self.num_envs, None, object)
             violations = np.zeros((self.num_envs, 4), np.bool_)
             steps = np.zeros(self.num_envs, np.int64)
-            # Few worlds end in a step: only their rows are read.
+            # Few episodes end in a step, so only their rows are read.
             for world in np.flatnonzero(ended).tolist():
                 code, is_success, _, count = rows.facts[world, :4].tolist()
                 success[world] = is_success > 0.0
@@ -299,7 +299,7 @@ class AirHockeyVectorEnv(VectorEnv[Any, Any, Any]):
         return infos
 
     def _custom_rewards(
-        self, given: Floats, before: tuple[npt.NDArray[np.float32], Floats], ended: Bools
+        self, checked: Floats, before: tuple[npt.NDArray[np.float32], Floats], ended: Bools
     ) -> Floats:
         assert self._reward is not None
         rows = self._rows
@@ -308,7 +308,7 @@ class AirHockeyVectorEnv(VectorEnv[Any, Any, Any]):
             after[ended] = rows.final_observations[ended]
         transition = Transition(
             observation=before[0],
-            action=given,
+            action=checked,
             next_observation=after,
             state=State(before[1]),
             next_state=State(rows.states.copy()),
@@ -329,17 +329,17 @@ class AirHockeyVectorEnv(VectorEnv[Any, Any, Any]):
 
     # --- state -------------------------------------------------------------------------------------------------
 
-    @alone
+    @exclusive
     def save(self) -> list[_native.Snapshot]:
-        """The exact state of every world; they can be pickled, and restored into an :class:`AirHockeyEnv`, too."""
+        """The exact state of every world. States can be pickled, and restored into an :class:`AirHockeyEnv`, too."""
         worlds = self._open()
         return [worlds.save(world) for world in range(self.num_envs)]
 
-    @alone
+    @exclusive
     def restore(
         self, states: Sequence[_native.Snapshot]
     ) -> tuple[npt.NDArray[np.float32], dict[str, Any]]:
-        """Brings every world to its saved state. Returns as :meth:`reset` does."""
+        """Restores a saved state in every world. Returns observations and infos as :meth:`reset` does."""
         worlds = self._open()
         if len(states) != self.num_envs:
             raise ArgumentError(f"states: expected one for each of {self.num_envs} worlds, got {len(states)}")
@@ -353,42 +353,42 @@ class AirHockeyVectorEnv(VectorEnv[Any, Any, Any]):
             worlds.restore(index, state, rows.arrays())
         origins = np.array(worlds.origins(), np.uint64).astype(np.int64)
         self._seeds = origins[:, 0].copy()
-        everything = np.ones(self.num_envs, np.bool_)
-        return self._observations(), self._origins(everything, origins[:, 1])
+        all_worlds = np.ones(self.num_envs, np.bool_)
+        return self._observations(), self._origins(all_worlds, origins[:, 1])
 
     @property
     def state(self) -> State:
-        """The true state of all worlds now, each array with the worlds first."""
+        """The present true state of all worlds; the first dimension of each array is the world."""
         worlds = self._open()
         return State(np.array([worlds.state(world) for world in range(self.num_envs)]))
 
     def render(self) -> tuple[npt.NDArray[np.uint8], ...]:  # type: ignore[override]
-        """A (360, 640, 3) uint8 picture of each world's table from above."""
+        """A picture of each world's table from above, (360, 640, 3) uint8."""
         if self.render_mode is None:
             raise ArgumentError("render: expected an environment made with render_mode='rgb_array', got None")
         from faceoff.gym.render import draw
 
         states = self.state.array
-        return tuple(draw(State(one), has_opponent=self.task == "hit") for one in states)
+        return tuple(draw(State(state), has_opponent=self.task == "hit") for state in states)
 
     def close_extras(self, **kwargs: Any) -> None:
-        """Gives up worlds and threads; called by ``close``."""
+        """Releases worlds and threads; called by ``close``."""
         if getattr(self, "_worlds", None) is not None:
             self._open().close()
             self._worlds = None
 
     def __getstate__(self) -> dict[str, Any]:
-        kept = self.__dict__.copy()
-        worlds = kept.pop("_worlds")
+        state = self.__dict__.copy()
+        worlds = state.pop("_worlds")
         if worlds is not None and self._sent is not None:
             raise OrderError("pickle: expected recv() of the step that was sent, got another call")
-        kept["_is_open"] = worlds is not None
-        kept["_saved"] = self.save() if worlds is not None and self._is_started else None
-        return kept
+        state["_is_open"] = worlds is not None
+        state["_saved"] = self.save() if worlds is not None and self._is_started else None
+        return state
 
-    def __setstate__(self, kept: dict[str, Any]) -> None:
-        is_open, saved = kept.pop("_is_open"), kept.pop("_saved")
-        self.__dict__.update(kept)
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        is_open, saved = state.pop("_is_open"), state.pop("_saved")
+        self.__dict__.update(state)
         self._worlds = self._new_worlds() if is_open else None
         self._rows = self._new_rows()
         if saved is not None:
@@ -397,7 +397,7 @@ class AirHockeyVectorEnv(VectorEnv[Any, Any, Any]):
 
 
 def read_autoreset_mode(mode: AutoresetMode | str) -> AutoresetMode:
-    """An AutoresetMode, or its value."""
+    """``mode`` as an AutoresetMode, given as a member or as its value."""
     values = [known.value for known in AutoresetMode]
     value = mode.value if isinstance(mode, Enum) else mode
     return AutoresetMode(one_of("autoreset_mode", value, values))

@@ -1,4 +1,4 @@
-"""A window that shows pictures at the pace of the table."""
+"""A window that shows pictures in simulated real time."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from faceoff.errors import MissingError
 
 
 class Window:
-    """A window of tkinter's, which comes with Python or as the system's package python3-tk.
+    """A tkinter window; tkinter comes with Python or as the system's package python3-tk.
 
     Raises:
-        MissingError: if there is no tkinter, or no display to show it on.
+        MissingError: if tkinter or a display is missing.
     """
 
     def __init__(self, title: str, frames_per_second: int) -> None:
@@ -40,13 +40,13 @@ class Window:
         self._root.protocol("WM_DELETE_WINDOW", self.close)
 
     def show(self, picture: npt.NDArray[np.uint8]) -> None:
-        """Shows a picture, (height, width, 3), when it is due; a window that the user has closed shows nothing."""
+        """Shows a picture, (height, width, 3), at its time; does nothing after the user has closed the window."""
         if not self._is_open:
             return
         height, width, _ = picture.shape
         image = self._new_image(data=b"P6 %d %d 255\n" % (width, height) + picture.tobytes())
         self._label.configure(image=image)
-        # tkinter keeps no reference of its own.
+        # tkinter keeps no reference to it.
         self._image = image
         self._root.update()
         now = time.monotonic()
@@ -54,7 +54,7 @@ class Window:
         time.sleep(self._next_s - now)
 
     def close(self) -> None:
-        """Takes the window away; may be called again."""
+        """Closes the window; may be called more than once."""
         if self._is_open:
             self._is_open = False
             self._root.destroy()

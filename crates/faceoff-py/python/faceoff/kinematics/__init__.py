@@ -1,12 +1,12 @@
-"""Kinematics of the arm: where the mallet is, which joints put it somewhere, and how it gets there in time.
+"""Kinematics of the arm: forward and inverse kinematics, velocities, constraints and trajectories of the mallet.
 
 All functions take and return NumPy arrays with any leading dimensions, in the robot's own base frame, in SI units and
-radians. `faceoff.kinematics.plain` does the same for one pose with the standard library alone, in one file to be
-copied into a bundle; `faceoff.kinematics.native` computes most of it by the compiled half of the package, for training.
-`faceoff.kinematics.model` has the numbers.
+radians. `faceoff.kinematics.plain` does the same for one pose with the standard library alone, in one file to copy
+into a bundle. `faceoff.kinematics.native` computes most of it in the compiled half of the package, for training.
+`faceoff.kinematics.model` has the constants.
 
-The agent's model has seven joints. The mallet hangs on a universal joint that keeps it upright by itself, so that
-"where the mallet is" means the end effector, the rod's tip.
+The agent's model has seven joints. The mallet hangs on a universal joint that keeps it upright automatically, so
+"the mallet's position" is that of the end effector, the rod's tip.
 """
 
 from faceoff.kinematics.limits import Constraints, constraints, speed_share

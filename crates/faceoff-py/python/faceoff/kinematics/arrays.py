@@ -1,4 +1,4 @@
-"""What the functions of this package ask of their arguments."""
+"""Checks and conversions of array arguments."""
 
 from typing import Any
 
@@ -11,21 +11,21 @@ Floats = NDArray[np.float64]
 
 
 def finite(name: str, given: ArrayLike) -> Floats:
-    """The argument as an array of float64 within ±10,000, of any shape; ValueError that names it otherwise."""
+    """The argument as a float64 array of any shape; ValueError unless all numbers are within ±10,000."""
     try:
         array: NDArray[Any] = np.asarray(given, dtype=np.float64)
     except (TypeError, ValueError) as error:
         raise ValueError(f"{name}: expected an array of numbers, got {given!r:.80}") from error
-    # Written so that a number that is none fails.
-    good = np.abs(array) <= plain.NUMBER_LIMIT
-    if not good.all():
-        worst = array[~good].flat[0]
-        raise ValueError(f"{name}: expected numbers within ±{plain.NUMBER_LIMIT:g}, got {worst}")
+    # This comparison is false for NaN, too.
+    is_allowed = np.abs(array) <= plain.NUMBER_LIMIT
+    if not is_allowed.all():
+        refused = array[~is_allowed].flat[0]
+        raise ValueError(f"{name}: expected numbers within ±{plain.NUMBER_LIMIT:g}, got {refused}")
     return array
 
 
 def joints(name: str, given: ArrayLike) -> Floats:
-    """The argument as (..., 7)."""
+    """The argument as an array of shape (..., 7)."""
     array = finite(name, given)
     if array.ndim == 0 or array.shape[-1] != model.JOINTS:
         raise ValueError(f"{name}: expected shape (..., {model.JOINTS}), got {array.shape}")
@@ -33,7 +33,7 @@ def joints(name: str, given: ArrayLike) -> Floats:
 
 
 def points(name: str, given: ArrayLike, z: float) -> Floats:
-    """The argument as (..., 3); of x and y alone, `z` (m or m/s) is added."""
+    """The argument as an array of shape (..., 3); `z` (m or m/s) completes points of shape (..., 2)."""
     array = finite(name, given)
     if array.ndim == 0 or array.shape[-1] not in (2, 3):
         raise ValueError(f"{name}: expected shape (..., 2) or (..., 3), got {array.shape}")
@@ -42,8 +42,8 @@ def points(name: str, given: ArrayLike, z: float) -> Floats:
     return np.concatenate([array, np.full((*array.shape[:-1], 1), z)], axis=-1)
 
 
-def together(names: str, *arrays: Floats) -> list[Floats]:
-    """The arrays with equal leading dimensions, by NumPy's rules of broadcasting."""
+def broadcast(names: str, *arrays: Floats) -> list[Floats]:
+    """The arrays with their leading dimensions broadcast by NumPy's rules; `names` is for the error message."""
     try:
         leading = np.broadcast_shapes(*(array.shape[:-1] for array in arrays))
     except ValueError as error:

@@ -1,4 +1,4 @@
-"""The rules' constraints on the robot, and how near its limits a command is."""
+"""The rules' constraints on the robot, and joint speeds relative to their limits."""
 
 from typing import NamedTuple
 
@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from faceoff.kinematics import model, plain
-from faceoff.kinematics.arrays import Floats, joints, together
+from faceoff.kinematics.arrays import Floats, broadcast, joints
 from faceoff.kinematics.poses import forward, heights
 
 _POSITION = model.LIMIT_FRACTION * np.array(model.POSITION_LIMIT_RAD)
@@ -16,29 +16,29 @@ _VELOCITY = model.LIMIT_FRACTION * np.array(model.VELOCITY_LIMIT_RAD_S)
 class Constraints(NamedTuple):
     """The values of each group of constraints; above 0 is a violation.
 
-    The rules' fifth group, computation time, is not the robot's.
+    The rules' fifth group, computation time, does not concern the robot.
     """
 
     ee: Floats
     """(..., 5), m: too near, too far right, too far left, too low, too high."""
     link: Floats
-    """(..., 2), m: elbow and wrist below their least height."""
+    """(..., 2), m: how far elbow and wrist are below their minimum height."""
     joint_pos: Floats
     """(..., 14), rad: above 95 % of the upper limits, then below 95 % of the lower ones."""
     joint_vel: Floats
     """(..., 14), rad/s: above 95 % of the upper limits, then below 95 % of the lower ones."""
 
     def worst(self) -> dict[str, Floats]:
-        """The largest value (...) of each group, by the rules' keys."""
+        """The largest value, shape (...), of each group, by the rules' keys."""
         return {name: values.max(axis=-1) for name, values in self._asdict().items()}
 
 
 def constraints(q: ArrayLike, dq: ArrayLike) -> Constraints:
     """The constraints at joint positions (..., 7), rad, and velocities (..., 7), rad/s.
 
-    The rules look at the low-pass filtered velocities, as the observation has them.
+    The rules apply to the low-pass filtered velocities of the observation.
     """
-    pose, rates = together("q and dq", joints("q", q), joints("dq", dq))
+    pose, rates = broadcast("q and dq", joints("q", q), joints("dq", dq))
     ee = forward(pose)
     x, y, z = ee[..., 0], ee[..., 1], ee[..., 2]
     low = model.EE_DESIRED_HEIGHT_M - model.EE_HEIGHT_TOLERANCE_M
@@ -53,11 +53,11 @@ def constraints(q: ArrayLike, dq: ArrayLike) -> Constraints:
 
 
 def speed_share(dq: ArrayLike) -> Floats:
-    """The largest of joint velocities (..., 7), rad/s, as a share (...) of what the rules allow; above 1 they do not."""
-    return share_of(joints("dq", dq))
+    """The largest joint velocity of (..., 7), rad/s, as a share (...) of the allowed one; above 1 is a violation."""
+    return speed_share_unchecked(joints("dq", dq))
 
 
-def share_of(dq: Floats) -> Floats:
-    """`speed_share` of velocities that are not an argument of the user's, however large."""
+def speed_share_unchecked(dq: Floats) -> Floats:
+    """`speed_share` without the check of its argument: (..., 7), rad/s, of any magnitude."""
     share: Floats = np.max(np.abs(dq) / _VELOCITY, axis=-1)
     return share

@@ -1,25 +1,25 @@
-"""Kinematics of the arm for one pose at a time, with nothing but the standard library.
+"""Kinematics of the arm for one pose at a time, with the standard library alone.
 
-Copy this file into a bundle: it needs no other. `faceoff.kinematics` does the same for NumPy arrays.
+Copy this file into a bundle: it needs no other file. `faceoff.kinematics` does the same for NumPy arrays.
 
-Points are in the robot's own base frame, metres; angles in rad; the mallet is where the end effector is, the
-universal joint at the rod's tip. All functions take any sequences of numbers and return lists and tuples.
+Points are in the robot's own base frame, metres; angles in rad. The mallet's position is that of the end effector,
+the universal joint at the rod's tip. All functions take any sequences of numbers and return lists and tuples.
 
-`inverse` knows two ways to choose among the many poses that put the mallet at a point:
+`inverse` has two ways to choose among the many poses that put the mallet at a point:
 
 - Without a start it returns *the* pose of the point, in closed form: joints 3, 5 and 7 at zero, joint 1 turned
-  towards the point, joints 2, 4 and 6 in a vertical plane, elbow up. How far the hand leans is a fixed linear
-  function of the reach, such that the start pose of an episode is the pose of its own point. Poses change smoothly
-  with their points, so that `posture_velocities` gives the joint speeds that belong to a moving point.
+  towards the point, joints 2, 4 and 6 in a vertical plane, elbow up. The hand's angle is a fixed linear function
+  of the reach, chosen so that the start pose of an episode is the pose of its own point. Poses change smoothly with
+  their points, so `posture_velocities` can give the joint velocities for a moving point.
 - From a start `q0` it moves all seven joints as little as it can: damped least squares, each joint weighted by its
-  speed limit, at most `ITERATIONS` steps of at most `STEP_LIMIT_RAD`; a joint at its bound is left out of a step that
-  would push it further, and a low wrist is raised by what is free of the arm.
+  speed limit, at most `ITERATIONS` steps of at most `STEP_LIMIT_RAD`; a joint at its bound is excluded from a step
+  that would push it further, and a low wrist is raised within the arm's null space.
 """
 
 import math
 from collections.abc import Sequence
 
-# The numbers of the model (a test holds them to it).
+# Constants of the model; a test compares them with `model.py`.
 LINK_OFFSET_M = (
     (0.0, 0.0, 0.1575),
     (0.0, 0.0, 0.2025),
@@ -43,14 +43,14 @@ TABLE_WIDTH_M = 1.038
 MALLET_RADIUS_M = 0.04815
 
 JOINTS = 7
-# Numbers beyond this mean nothing, as in the protocol.
+# Larger magnitudes are refused, as in the protocol.
 NUMBER_LIMIT = 1e4
-# What a command keeps from the bounds of the rules, for the controller's errors.
+# Margins between commands and the rules' bounds, for the controller's errors.
 JOINT_MARGIN_RAD = 0.01
 HEIGHT_MARGIN_M = 0.01
-# A pose is found when its end effector is this near, metres.
+# A pose is a solution if its end effector is this close to the point, metres.
 TOLERANCE_M = 1e-6
-# The iteration goes on to a tenth of a nanometre, as far as it gets.
+# The iteration stops at this distance, metres.
 GOAL_M = 1e-10
 ITERATIONS = 100
 STEP_LIMIT_RAD = 0.3
@@ -61,13 +61,13 @@ SHOULDER_M = LINK_OFFSET_M[0][2] + LINK_OFFSET_M[1][2]
 UPPER_ARM_M = LINK_OFFSET_M[2][1] + LINK_OFFSET_M[3][2]
 FOREARM_M = LINK_OFFSET_M[4][1] + LINK_OFFSET_M[5][2]
 HAND_M = LINK_OFFSET_M[6][1] + END_EFFECTOR_Z_M
-# The hand's angle from straight up in the start pose, and how much less it is per metre of reach beyond that.
+# The hand's angle from straight up in the start pose, and its decrease per metre of additional reach.
 START_HAND_RAD = START_Q[1] - START_Q[3] + START_Q[5]
 HAND_PER_REACH_RAD_M = 0.85
-# Where the mallet may be.
+# Allowed area of the mallet.
 X_MIN_M = BASE_X_M - (TABLE_LENGTH_M / 2 - MALLET_RADIUS_M)
 Y_MAX_M = TABLE_WIDTH_M / 2 - MALLET_RADIUS_M
-# Bounds of commanded joints: joint 2 alone decides the elbow's height.
+# Bounds of commanded joints; the elbow's height depends on joint 2 alone.
 _ELBOW_COSINE = (LINK_HEIGHT_M + HEIGHT_MARGIN_M - SHOULDER_M) / UPPER_ARM_M
 JOINT_BOUND_RAD = tuple(
     min(
@@ -104,26 +104,26 @@ def inverse(
 ) -> tuple[list[float], bool]:
     """Joint positions (rad) that put the end effector at a point, and whether they do so within all bounds.
 
-    `target` is x, y at the mallet's height, or x, y, z; m. `q0` (rad) is where to start; see the module's text.
-    Bounds are 95 % of the joints' range and the elbow's and wrist's least height, with a margin. Where the second
-    answer is false, the first one is the nearest that was found and must not be commanded unseen.
+    `target` is x, y at the mallet's height, or x, y, z; m. `q0` (rad) is the start pose; see the module's text.
+    Bounds are 95 % of the joints' range and the minimum height of elbow and wrist, with a margin. If the flag is
+    false, the pose is the nearest that was found; do not command it without a check.
     """
     point = _point(target)
     if q0 is None:
         q = _posture(point)
     else:
         q = _least_squares(point, _numbers("q0", q0, JOINTS))
-    return q, _is_good(q, point)
+    return q, _is_solution(q, point)
 
 
 def posture_velocities(target: Sequence[float], velocity: Sequence[float]) -> list[float]:
-    """Joint velocities (rad/s) that keep `inverse(target)` on a point that moves.
+    """Joint velocities (rad/s) that keep the pose `inverse(target)` on a moving point.
 
     `target` as for `inverse`; `velocity` of the point: x, y (then z is 0) or x, y, z; m/s.
     """
     x, y, z = _point(target)
     vx, vy, vz = _point(velocity, "velocity", 0.0)
-    # On joint 1's axis there is no outwards.
+    # On joint 1's axis the outward direction is undefined.
     reach = max(math.hypot(x, y), 1e-6)
     outwards = (x * vx + y * vy) / reach
     _, upper, _, elbow, _, wrist, _ = _posture((x, y, z))
@@ -133,7 +133,7 @@ def posture_velocities(target: Sequence[float], velocity: Sequence[float]) -> li
     ahead_rate = outwards - HAND_M * math.cos(hand) * hand_rate
     above_rate = vz + HAND_M * math.sin(hand) * hand_rate
     span = math.sin(upper - forearm)
-    # Stretched out there is no speed that would do; a large one says so.
+    # A stretched arm cannot move outwards; the result is a large joint velocity.
     span = math.copysign(max(abs(span), 1e-6), span)
     upper_rate = -(math.sin(forearm) * ahead_rate + math.cos(forearm) * above_rate) / (
         UPPER_ARM_M * span
@@ -154,23 +154,23 @@ def posture_velocities(target: Sequence[float], velocity: Sequence[float]) -> li
 def velocities(q: Sequence[float], velocity: Sequence[float]) -> list[float]:
     """Joint velocities (rad/s) that move the end effector of pose `q` (rad) with x, y, z velocity (m/s).
 
-    The least ones, each weighted by its joint's limit. Given x and y alone, the height is kept.
+    The norm, weighted by the joints' limits, is minimal. With x and y alone the height is constant.
     """
     origins, axes = _chain(_numbers("q", q, JOINTS))
-    return _weighted(_jacobian(origins, axes), _point(velocity, "velocity", 0.0), WEIGHT)
+    return _least_change(_jacobian(origins, axes), _point(velocity, "velocity", 0.0), WEIGHT)
 
 
 def speed_share(dq: Sequence[float]) -> float:
-    """The largest joint velocity (rad/s in) as a share of what the rules allow: above 1 is a violation."""
-    given = _numbers("dq", dq, JOINTS)
-    return max(abs(v) / (LIMIT_FRACTION * m) for v, m in zip(given, VELOCITY_LIMIT_RAD_S))
+    """The largest joint velocity (rad/s) as a share of the allowed one: above 1 is a violation."""
+    velocity = _numbers("dq", dq, JOINTS)
+    return max(abs(v) / (LIMIT_FRACTION * m) for v, m in zip(velocity, VELOCITY_LIMIT_RAD_S))
 
 
 def constraints(q: Sequence[float], dq: Sequence[float]) -> dict[str, float]:
     """The rules' constraints on the robot at a pose (rad) and joint velocities (rad/s): above 0 is a violation.
 
     Keys as in the rules: `ee` (m), `link` (m), `joint_pos` (rad), `joint_vel` (rad/s); the largest of each. The
-    rules look at the low-pass filtered velocity.
+    rules apply to the low-pass filtered velocity.
     """
     q, dq = _numbers("q", q, JOINTS), _numbers("dq", dq, JOINTS)
     origins, _ = _chain(q)
@@ -191,7 +191,7 @@ def _chain(q: Sequence[float]) -> tuple[list[Vector], list[Vector]]:
     axes: list[Vector] = []
     for joint, (angle, (_, along_y, along_z)) in enumerate(zip(q, LINK_OFFSET_M)):
         at = _sum(at, _sum(_scaled(y, along_y), _scaled(z, along_z)))
-        # A link's frame on its parent's at angle 0: aligned, half a turn about y + z, a quarter turn about x.
+        # A link's frame in its parent's at angle 0: aligned, half a turn about y + z, a quarter turn about x.
         if joint in (1, 2, 4, 6):
             x, y, z = _scaled(x, -1.0), z, y
         elif joint != 0:
@@ -221,14 +221,14 @@ def _posture(point: Vector) -> list[float]:
     above = z - HAND_M * math.cos(hand) - SHOULDER_M
     # Shoulder, elbow and wrist are a triangle of known sides; the angles at elbow and shoulder follow.
     side = math.hypot(ahead, above)
-    elbow = _corner(side, UPPER_ARM_M, FOREARM_M)
-    upper = math.atan2(ahead, above) - _corner(FOREARM_M, UPPER_ARM_M, max(side, 1e-9))
+    elbow = _triangle_angle(side, UPPER_ARM_M, FOREARM_M)
+    upper = math.atan2(ahead, above) - _triangle_angle(FOREARM_M, UPPER_ARM_M, max(side, 1e-9))
     forearm = upper + math.pi - elbow
     return [math.atan2(y, x), upper, 0.0, upper - forearm, 0.0, hand - forearm, 0.0]
 
 
-def _corner(opposite: float, a: float, b: float) -> float:
-    """The angle of a triangle between sides a and b, as far as there is such a triangle."""
+def _triangle_angle(opposite: float, a: float, b: float) -> float:
+    """The angle between the sides a and b of a triangle; 0 or pi if there is no such triangle."""
     cosine = (a * a + b * b - opposite * opposite) / (2.0 * a * b)
     return math.acos(max(-1.0, min(1.0, cosine)))
 
@@ -242,17 +242,17 @@ def _least_squares(point: Vector, q0: Sequence[float]) -> list[float]:
         if math.sqrt(_dot(error, error)) < GOAL_M and deficit <= 0.0:
             break
         rows = _jacobian(origins, axes)
-        # How the wrist's height changes; joint 7 turns about an axis through it.
+        # Change of the wrist's height with each joint; joint 7's axis passes through the wrist.
         rise = [
             _cross(axis, _sum(origins[6], _scaled(at, -1.0)))[2] for axis, at in zip(axes, origins)
         ]
         step = _step(rows, rise, error, deficit, WEIGHT)
-        kept = [
+        usable = [
             0.0 if abs(a + d) > bound and abs(a) >= bound and a * d > 0.0 else w
             for a, d, bound, w in zip(q, step, JOINT_BOUND_RAD, WEIGHT)
         ]
-        if 0.0 in kept:
-            step = _step(rows, rise, error, deficit, kept)
+        if 0.0 in usable:
+            step = _step(rows, rise, error, deficit, usable)
         length = math.sqrt(sum(d * d for d in step))
         share = min(1.0, STEP_LIMIT_RAD / max(length, 1e-300))
         q = [max(-b, min(b, a + share * d)) for a, d, b in zip(q, step, JOINT_BOUND_RAD)]
@@ -266,22 +266,22 @@ def _step(
     deficit: float,
     weight: Sequence[float],
 ) -> list[float]:
-    """One step towards the target; where the wrist is too low, it also rises, the end effector staying."""
-    step = _weighted(rows, error, weight)
+    """One step towards the target; a low wrist is raised without moving the end effector."""
+    step = _least_change(rows, error, weight)
     if deficit <= 0.0:
         return step
-    wish = [w * g for w, g in zip(weight, rise)]
-    moved = (_inner(rows[0], wish), _inner(rows[1], wish), _inner(rows[2], wish))
-    free = [a - b for a, b in zip(wish, _weighted(rows, moved, weight))]
+    desired = [w * g for w, g in zip(weight, rise)]
+    moved = (_inner(rows[0], desired), _inner(rows[1], desired), _inner(rows[2], desired))
+    free = [a - b for a, b in zip(desired, _least_change(rows, moved, weight))]
     gain = _inner(rise, free)
     share = deficit / max(gain, 1e-3)
     return [a + share * b for a, b in zip(step, free)]
 
 
-def _weighted(
-    rows: Sequence[Sequence[float]], wish: Vector, weight: Sequence[float]
+def _least_change(
+    rows: Sequence[Sequence[float]], desired: Vector, weight: Sequence[float]
 ) -> list[float]:
-    """W Jᵀ (J W Jᵀ + λ I)⁻¹ wish."""
+    """W Jᵀ (J W Jᵀ + λ I)⁻¹ d: the smallest weighted joint change that moves the end effector by `desired`, d."""
     scaled = [[w * a for w, a in zip(weight, row)] for row in rows]
     a, b, c = (
         tuple(_inner(scaled[i], rows[k]) + (DAMPING if i == k else 0.0) for k in range(3))
@@ -291,9 +291,9 @@ def _weighted(
     bc, ca, ab = _cross(b, c), _cross(c, a), _cross(a, b)
     determinant = _dot(a, bc)
     force = (
-        _dot((bc[0], ca[0], ab[0]), wish) / determinant,
-        _dot((bc[1], ca[1], ab[1]), wish) / determinant,
-        _dot((bc[2], ca[2], ab[2]), wish) / determinant,
+        _dot((bc[0], ca[0], ab[0]), desired) / determinant,
+        _dot((bc[1], ca[1], ab[1]), desired) / determinant,
+        _dot((bc[2], ca[2], ab[2]), desired) / determinant,
     )
     return [
         scaled[0][i] * force[0] + scaled[1][i] * force[1] + scaled[2][i] * force[2]
@@ -301,7 +301,7 @@ def _weighted(
     ]
 
 
-def _is_good(q: Sequence[float], point: Vector) -> bool:
+def _is_solution(q: Sequence[float], point: Vector) -> bool:
     origins, _ = _chain(q)
     error = _sum(point, _scaled(origins[JOINTS], -1.0))
     lowest = min(origins[3][2], origins[6][2])
@@ -312,25 +312,25 @@ def _is_good(q: Sequence[float], point: Vector) -> bool:
     )
 
 
-def _numbers(name: str, given: Sequence[float], *counts: int) -> list[float]:
+def _numbers(name: str, values: Sequence[float], *counts: int) -> list[float]:
     try:
-        numbers = [float(x) for x in given]
+        numbers = [float(x) for x in values]
     except (TypeError, ValueError) as error:
-        raise ValueError(f"{name}: expected a sequence of numbers, got {given!r:.80}") from error
+        raise ValueError(f"{name}: expected a sequence of numbers, got {values!r:.80}") from error
     if len(numbers) not in counts:
         expected = " or ".join(map(str, counts))
         raise ValueError(f"{name}: expected {expected} numbers, got {len(numbers)}")
     for x in numbers:
-        # Written so that a number that is none fails.
+        # This comparison is false for NaN, too.
         if not abs(x) <= NUMBER_LIMIT:
             raise ValueError(f"{name}: expected numbers within ±{NUMBER_LIMIT:g}, got {x}")
     return numbers
 
 
 def _point(
-    given: Sequence[float], name: str = "target", z: float = EE_DESIRED_HEIGHT_M
+    values: Sequence[float], name: str = "target", z: float = EE_DESIRED_HEIGHT_M
 ) -> Vector:
-    x, y, *rest = _numbers(name, given, 2, 3)
+    x, y, *rest = _numbers(name, values, 2, 3)
     return x, y, rest[0] if rest else z
 
 

@@ -1,13 +1,13 @@
 """Forward and inverse kinematics and velocities, for batches.
 
-Step for step the arithmetic of `faceoff.kinematics.plain`, whose text explains it, on arrays.
+The algorithms are those of `faceoff.kinematics.plain`, which explains them, applied to arrays.
 """
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from faceoff.kinematics import model, plain
-from faceoff.kinematics.arrays import Floats, joints, points, together
+from faceoff.kinematics.arrays import Floats, broadcast, joints, points
 
 _OFFSETS = np.array(model.LINK_OFFSET_M)
 _MOUNTS = np.array(model.LINK_MOUNT)
@@ -47,28 +47,28 @@ def frames(q: ArrayLike) -> tuple[Floats, Floats]:
 def inverse(target: ArrayLike, q0: ArrayLike | None = None) -> tuple[Floats, NDArray[np.bool_]]:
     """Joint positions (..., 7), rad, that put the end effector at points, and (...) whether they do within bounds.
 
-    `target` is (..., 2), at the mallet's height, or (..., 3); m, base frame. Without `q0` the answer is the point's
-    own posture, in closed form; from `q0` (..., 7), rad, it is a pose near that one, by damped least squares. Bounds
-    are 95 % of the joints' range and the least height of elbow and wrist, with a margin. Where the second answer is
-    false, the first is the nearest that was found. `faceoff.kinematics.plain` tells the algorithm.
+    `target` is (..., 2), at the mallet's height, or (..., 3); m, base frame. Without `q0` the result is the point's
+    posture, in closed form; with `q0` (..., 7), rad, it is a pose near it, by damped least squares. Bounds are 95 % of
+    the joints' range and the minimum height of elbow and wrist, with a margin. Where the flag is false, the pose is the
+    nearest that was found. `faceoff.kinematics.plain` describes the algorithm.
     """
     point = points("target", target, model.EE_DESIRED_HEIGHT_M)
     if q0 is None:
         q = posture(point)
     else:
-        point, start = together("target and q0", point, joints("q0", q0))
+        point, start = broadcast("target and q0", point, joints("q0", q0))
         leading = point.shape[:-1]
         q = _least_squares(point.reshape(-1, 3), start.reshape(-1, model.JOINTS))
         q = q.reshape(*leading, model.JOINTS)
-    return q, is_good(q, point)
+    return q, is_solution(q, point)
 
 
 def posture_velocities(target: ArrayLike, velocity: ArrayLike) -> Floats:
-    """Joint velocities (..., 7), rad/s, that keep `inverse(target)` on points that move.
+    """Joint velocities (..., 7), rad/s, that keep the pose `inverse(target)` on moving points.
 
-    `target` as for `inverse`; `velocity` (..., 2), the height kept, or (..., 3), m/s.
+    `target` as for `inverse`; `velocity` is (..., 2), at constant height, or (..., 3), m/s.
     """
-    point, speed = together(
+    point, speed = broadcast(
         "target and velocity",
         points("target", target, model.EE_DESIRED_HEIGHT_M),
         points("velocity", velocity, 0.0),
@@ -77,7 +77,7 @@ def posture_velocities(target: ArrayLike, velocity: ArrayLike) -> Floats:
 
 
 def posture_rates(point: Floats, speed: Floats) -> Floats:
-    """`posture_velocities` of (..., 3) and (..., 3), however large."""
+    """`posture_velocities` without checks, for points and velocities (..., 3) of any magnitude."""
     x, y = point[..., 0], point[..., 1]
     vx, vy, vz = speed[..., 0], speed[..., 1], speed[..., 2]
     reach = np.maximum(np.hypot(x, y), 1e-6)
@@ -104,10 +104,10 @@ def posture_rates(point: Floats, speed: Floats) -> Floats:
 def velocities(q: ArrayLike, velocity: ArrayLike) -> Floats:
     """Joint velocities (..., 7), rad/s, that move the end effector at `q` (..., 7), rad, with `velocity`, m/s.
 
-    `velocity` is (..., 2), the height kept, or (..., 3). The least ones, each weighted by its joint's limit.
+    `velocity` is (..., 2), at constant height, or (..., 3). The norm, weighted by the joints' limits, is minimal.
     """
-    pose, speed = together("q and velocity", joints("q", q), points("velocity", velocity, 0.0))
-    return _weighted(_jacobian(*_chain(pose)), speed, np.broadcast_to(_WEIGHT, pose.shape))
+    pose, speed = broadcast("q and velocity", joints("q", q), points("velocity", velocity, 0.0))
+    return _least_change(_jacobian(*_chain(pose)), speed, np.broadcast_to(_WEIGHT, pose.shape))
 
 
 def _frames(q: Floats) -> tuple[Floats, Floats]:
@@ -143,15 +143,15 @@ def _jacobian(origins: Floats, axes: Floats) -> Floats:
 
 
 def posture(point: Floats) -> Floats:
-    """`inverse` of (..., 3) without a start: (..., 7)."""
+    """`inverse` without a start pose: points (..., 3) to joint positions (..., 7)."""
     x, y, z = point[..., 0], point[..., 1], point[..., 2]
     reach = np.hypot(x, y)
     hand = _HAND_START - plain.HAND_PER_REACH_RAD_M * (reach - _START_REACH)
     ahead = reach - _HAND * np.sin(hand)
     above = z - _HAND * np.cos(hand) - plain.SHOULDER_M
     side = np.hypot(ahead, above)
-    elbow = _corner(side, _UPPER, _FOREARM)
-    upper = np.arctan2(ahead, above) - _corner(_FOREARM, _UPPER, np.maximum(side, 1e-9))
+    elbow = _triangle_angle(side, _UPPER, _FOREARM)
+    upper = np.arctan2(ahead, above) - _triangle_angle(_FOREARM, _UPPER, np.maximum(side, 1e-9))
     forearm = upper + np.pi - elbow
     q = np.zeros((*reach.shape, model.JOINTS))
     q[..., 0] = np.arctan2(y, x)
@@ -161,72 +161,73 @@ def posture(point: Floats) -> Floats:
     return q
 
 
-def _corner(opposite: Floats | float, a: float, b: Floats | float) -> Floats:
+def _triangle_angle(opposite: Floats | float, a: float, b: Floats | float) -> Floats:
     cosine = (a * a + b * b - opposite * opposite) / (2.0 * a * b)
     angle: Floats = np.arccos(np.clip(cosine, -1.0, 1.0))
     return angle
 
 
 def _least_squares(point: Floats, q0: Floats) -> Floats:
-    """Of (n, 3) points from (n, 7) poses. Who has arrived takes no further part."""
+    """Poses (n, 7) for points (n, 3) from start poses (n, 7); only unfinished rows are iterated."""
     q = np.clip(q0, -_BOUND, _BOUND)
-    going = np.arange(len(q))
+    active = np.arange(len(q))
     for _ in range(plain.ITERATIONS):
-        here = q[going]
-        origins, axes = _chain(here)
-        error = point[going] - origins[:, -1]
+        pose = q[active]
+        origins, axes = _chain(pose)
+        error = point[active] - origins[:, -1]
         deficit = _HEIGHT - origins[:, 6, 2]
-        left = (np.sqrt(np.sum(error * error, axis=-1)) >= plain.GOAL_M) | (deficit > 0.0)
-        if not left.any():
+        unfinished = (np.sqrt(np.sum(error * error, axis=-1)) >= plain.GOAL_M) | (deficit > 0.0)
+        if not unfinished.any():
             break
-        going, here, origins, axes = going[left], here[left], origins[left], axes[left]
-        error, deficit = error[left], deficit[left]
+        active, pose = active[unfinished], pose[unfinished]
+        origins, axes = origins[unfinished], axes[unfinished]
+        error, deficit = error[unfinished], deficit[unfinished]
         rows = _jacobian(origins, axes)
         rise = np.cross(axes, origins[:, 6:7] - origins[:, :7])[..., 2]
-        step = _step(rows, rise, error, deficit, np.broadcast_to(_WEIGHT, here.shape))
-        stuck = (np.abs(here + step) > _BOUND) & (np.abs(here) >= _BOUND) & (here * step > 0.0)
-        kept = np.where(stuck, 0.0, _WEIGHT)
-        again = stuck.any(axis=-1)
-        if again.any():
-            step[again] = _step(rows[again], rise[again], error[again], deficit[again], kept[again])
+        step = _step(rows, rise, error, deficit, np.broadcast_to(_WEIGHT, pose.shape))
+        stuck = (np.abs(pose + step) > _BOUND) & (np.abs(pose) >= _BOUND) & (pose * step > 0.0)
+        usable = np.where(stuck, 0.0, _WEIGHT)
+        redo = stuck.any(axis=-1)
+        if redo.any():
+            step[redo] = _step(rows[redo], rise[redo], error[redo], deficit[redo], usable[redo])
         length = np.sqrt(np.sum(step * step, axis=-1, keepdims=True))
         share = np.minimum(1.0, plain.STEP_LIMIT_RAD / np.maximum(length, 1e-300))
-        q[going] = np.clip(here + share * step, -_BOUND, _BOUND)
+        q[active] = np.clip(pose + share * step, -_BOUND, _BOUND)
     return q
 
 
 def _step(rows: Floats, rise: Floats, error: Floats, deficit: Floats, weight: Floats) -> Floats:
-    step = _weighted(rows, error, weight)
-    wish = weight * rise
-    moved = np.einsum("nij,nj->ni", rows, wish)
-    free = wish - _weighted(rows, moved, weight)
+    step = _least_change(rows, error, weight)
+    desired = weight * rise
+    moved = np.einsum("nij,nj->ni", rows, desired)
+    free = desired - _least_change(rows, moved, weight)
     gain = np.sum(rise * free, axis=-1)
     share = np.maximum(deficit, 0.0) / np.maximum(gain, 1e-3)
-    risen: Floats = step + share[:, None] * free
-    return risen
+    raised: Floats = step + share[:, None] * free
+    return raised
 
 
-def _weighted(rows: Floats, wish: Floats, weight: Floats) -> Floats:
-    """W Jᵀ (J W Jᵀ + λ I)⁻¹ wish."""
+def _least_change(rows: Floats, desired: Floats, weight: Floats) -> Floats:
+    """W Jᵀ (J W Jᵀ + λ I)⁻¹ d, with d `desired`: (..., 3) to joint changes (..., 7)."""
     scaled = rows * weight[..., None, :]
     square = scaled @ np.swapaxes(rows, -1, -2) + plain.DAMPING * np.eye(3)
     a, b, c = square[..., 0, :], square[..., 1, :], square[..., 2, :]
     bc, ca, ab = np.cross(b, c), np.cross(c, a), np.cross(a, b)
     determinant = np.sum(a * bc, axis=-1, keepdims=True)
     columns = np.stack([bc, ca, ab], axis=-1)
-    force = np.einsum("...ij,...j->...i", columns, wish) / determinant
-    answer: Floats = np.einsum("...ij,...i->...j", scaled, force)
-    return answer
+    force = np.einsum("...ij,...j->...i", columns, desired) / determinant
+    change: Floats = np.einsum("...ij,...i->...j", scaled, force)
+    return change
 
 
-def is_good(q: Floats, point: Floats) -> NDArray[np.bool_]:
-    """Whether poses (..., 7) have the end effector at points (..., 3), within all bounds: (...)."""
+def is_solution(q: Floats, point: Floats) -> NDArray[np.bool_]:
+    """Whether poses (..., 7) put the end effector at points (..., 3) within all bounds: (...)."""
     origins, _ = _chain(q)
     error = point - origins[..., -1, :]
     near = np.sum(error * error, axis=-1) <= plain.TOLERANCE_M**2
     high = np.min(origins[..., [3, 6], 2], axis=-1) >= _HEIGHT - 1e-9
-    good: NDArray[np.bool_] = near & high & np.all(np.abs(q) <= _BOUND, axis=-1)
-    return good
+    solved: NDArray[np.bool_] = near & high & np.all(np.abs(q) <= _BOUND, axis=-1)
+    return solved
 
 
 _START_REACH = float(np.hypot(*forward(model.START_Q)[:2]))

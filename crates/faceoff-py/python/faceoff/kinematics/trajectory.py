@@ -1,8 +1,8 @@
-"""Motions of the mallet, as actions for every interpolation of the protocol.
+"""Trajectories of the mallet, as actions for every interpolation of the protocol.
 
-A motion is a path of the mallet over time, a polynomial of least jerk, which the postures of `inverse` follow. Its
-knots, one per control step, lie on it exactly, so that the controller's interpolation between them does, too, but for
-what a polynomial of its order cannot follow within 20 ms.
+A trajectory is a minimum-jerk polynomial of the mallet's position over time, followed by the postures of `inverse`. Its
+knots, one per control step, are exact. Between them the controller interpolates; the deviation is what a polynomial of
+its order cannot follow within 20 ms.
 """
 
 from dataclasses import dataclass
@@ -12,47 +12,47 @@ from numpy.typing import ArrayLike
 
 from faceoff.kinematics import model
 from faceoff.kinematics.arrays import Floats, finite, joints, points
-from faceoff.kinematics.limits import constraints, share_of
-from faceoff.kinematics.poses import is_good, posture, posture_rates
+from faceoff.kinematics.limits import constraints, speed_share_unchecked
+from faceoff.kinematics.poses import is_solution, posture, posture_rates
 
 INTERPOLATIONS = (1, 2, 3, 4, 5, -1, None)
-"""As the protocol numbers them."""
+"""The interpolation codes of the protocol."""
 
-# No motion is longer than an episode.
+# Control steps of an episode, the longest trajectory.
 _STEPS_MAX = 500
 # Below this distance, rad, the quadratic interpolation starts at rest.
 _QUADRATIC_REST_RAD = 1e-3
-# Half of the time over which an acceleration is measured, s.
+# Half of the interval of the difference quotient for accelerations, s.
 _INSTANT_S = 1e-5
 
 
 @dataclass(frozen=True)
 class Trajectory:
-    """A motion's knots at the end of each of its n control steps, and the 20 set-points of each step."""
+    """Knots at the end of each of n control steps, and the 20 set-points of each step."""
 
     q: Floats
-    """(n, 7), rad."""
+    """(n, 7): joint positions, rad."""
     dq: Floats
-    """(n, 7), rad/s."""
+    """(n, 7): joint velocities, rad/s."""
     ddq: Floats
-    """(n, 7), rad/s²."""
+    """(n, 7): joint accelerations, rad/s²."""
     dense: Floats
     """(n, 20, 3, 7): position, velocity and acceleration at each millisecond of each step."""
     speed_share: float
-    """The largest joint velocity on the way, as a share of what the rules allow."""
+    """The largest joint velocity, as a share of the allowed one."""
     ok: bool
-    """Whether every point was reached within all bounds, no faster than was asked for."""
+    """Whether all points are within all bounds and no joint exceeds the requested share of its velocity."""
 
     def __len__(self) -> int:
         return len(self.q)
 
     @property
     def duration_s(self) -> float:
-        """Seconds."""
+        """Duration, s."""
         return len(self) * model.CONTROL_STEP_S
 
     def actions(self, interpolation: int | None) -> Floats:
-        """The actions of the n steps: (n, 7), (n, 2, 7), (n, 3, 7) or (n, 20, 3, 7), as the protocol wants them."""
+        """The actions of the n steps: (n, 7), (n, 2, 7), (n, 3, 7) or (n, 20, 3, 7), as in the protocol."""
         if interpolation in (1, 2):
             return self.q
         if interpolation in (3, 4, -1):
@@ -61,7 +61,7 @@ class Trajectory:
             return np.stack([self.q, self.dq, self.ddq], axis=1)
         if interpolation is None:
             return self.dense
-        raise _unknown(interpolation)
+        raise _unknown_interpolation(interpolation)
 
 
 def minimum_jerk(
@@ -73,17 +73,16 @@ def minimum_jerk(
     end_velocity: ArrayLike = (0.0, 0.0),
     share: float = 0.9,
 ) -> Trajectory:
-    """The mallet's way from one point to another with the least jerk, at the mallet's height or in space.
+    """A minimum-jerk trajectory of the mallet from one point to another, at the mallet's height or in space.
 
     `start` and `end` are (2,) or (3,), m, velocities there (2,) or (3,), m/s; accelerations are 0 at both ends. The
-    joints begin and end in the postures of `inverse(start)` and `inverse(end)`. With a duration (s, rounded to whole
-    control steps of 20 ms) the motion takes as long, and its `ok` tells whether it stays below `share` of the allowed
-    joint velocities; without one it takes as long as it needs for that. What is left to 1 is for the controller, which
-    overshoots.
+    joints begin and end in the postures of `inverse(start)` and `inverse(end)`. `duration_s` (s) is rounded to whole
+    control steps of 20 ms; `ok` then says whether joint velocities stay below `share` of the allowed ones. Without it
+    the trajectory is as short as `share` permits. A share below 1 leaves room for the controller's overshoot.
     """
     ends = [
-        _one(name, given, z)
-        for name, given, z in (
+        _single_point(name, value, z)
+        for name, value, z in (
             ("start", start, model.EE_DESIRED_HEIGHT_M),
             ("end", end, model.EE_DESIRED_HEIGHT_M),
             ("start_velocity", start_velocity, 0.0),
@@ -93,30 +92,30 @@ def minimum_jerk(
     if not 0.0 < share <= 1.0:
         raise ValueError(f"share: expected more than 0 and at most 1, got {share}")
     if duration_s is None:
-        return _motion(ends, _shortest(ends, share), share)
+        return _trajectory(ends, _shortest(ends, share), share)
     longest = _STEPS_MAX * model.CONTROL_STEP_S
     if not 0.0 < duration_s <= longest:
         raise ValueError(f"duration_s: expected more than 0 and at most {longest}, got {duration_s}")
-    return _motion(ends, max(1, round(duration_s / model.CONTROL_STEP_S)), share)
+    return _trajectory(ends, max(1, round(duration_s / model.CONTROL_STEP_S)), share)
 
 
 def setpoints(
     q: ArrayLike, actions: ArrayLike, interpolation: int | None, dq: ArrayLike | None = None
 ) -> Floats:
-    """What the controller makes of n actions, before its limiter: (n, 20, 3, 7), a set-point for each millisecond.
+    """The controller's set-points for n actions, before its limiter: (n, 20, 3, 7), one per millisecond.
 
-    `q` (7,), rad, is the position commanded before, `dq` (7,), rad/s, the velocity then (0 where left out), the
-    acceleration 0. `actions` as in the protocol, n of them.
+    `q` (7,), rad, is the last commanded position, `dq` (7,), rad/s, its velocity (default 0); its acceleration is 0.
+    `actions` are n actions as in the protocol.
     """
     if interpolation not in INTERPOLATIONS:
-        raise _unknown(interpolation)
+        raise _unknown_interpolation(interpolation)
     shape = {1: (7,), 2: (7,), 5: (3, 7), None: (20, 3, 7)}.get(interpolation, (2, 7))
     rows = finite("actions", actions)
     if rows.shape[1:] != shape or rows.ndim == 0:
         raise ValueError(f"actions: expected shape (n, {', '.join(map(str, shape))}), got {rows.shape}")
     state = np.zeros((3, model.JOINTS))
-    for row, name, given in ((0, "q", q), (1, "dq", np.zeros(model.JOINTS) if dq is None else dq)):
-        values = joints(name, given)
+    for row, name, value in ((0, "q", q), (1, "dq", np.zeros(model.JOINTS) if dq is None else dq)):
+        values = joints(name, value)
         if values.ndim != 1:
             raise ValueError(f"{name}: expected shape ({model.JOINTS},), got {values.shape}")
         state[row] = values
@@ -166,27 +165,27 @@ def _interpolate(interpolation: int | None, state: Floats, action: Floats) -> Fl
 
 
 def _shortest(ends: list[Floats], share: float) -> int:
-    """Control steps: doubled until the speeds are allowed, then halved into the gap."""
+    """The smallest count of control steps with allowed speeds, by doubling and bisection."""
 
     def is_allowed(steps: int) -> bool:
-        at, speed = _path(ends, steps, _times(steps))
-        return bool(share_of(posture_rates(at, speed)).max() <= share)
+        position, speed = _path(ends, steps, _times(steps))
+        return bool(speed_share_unchecked(posture_rates(position, speed)).max() <= share)
 
-    most = 1
-    while most < _STEPS_MAX and not is_allowed(most):
-        most = min(2 * most, _STEPS_MAX)
-    least = most // 2
-    while most - least > 1:
-        middle = (most + least) // 2
+    high = 1
+    while high < _STEPS_MAX and not is_allowed(high):
+        high = min(2 * high, _STEPS_MAX)
+    low = high // 2
+    while high - low > 1:
+        middle = (high + low) // 2
         if is_allowed(middle):
-            most = middle
+            high = middle
         else:
-            least = middle
-    return most
+            low = middle
+    return high
 
 
 def _times(steps: int) -> Floats:
-    """Every millisecond of so many control steps, the last included, s."""
+    """Times of each millisecond of `steps` control steps, the last included, s."""
     return model.SUBSTEP_S * np.arange(1.0, steps * model.SUBSTEPS + 1.0)
 
 
@@ -195,29 +194,29 @@ def _path(ends: list[Floats], steps: int, t: Floats) -> tuple[Floats, Floats]:
     start, end, v0, v1 = ends
     duration = steps * model.CONTROL_STEP_S
     s = (t / duration)[:, None]
-    way = end - start - v0 * duration
-    turn = (v1 - v0) * duration
+    offset = end - start - v0 * duration
+    change = (v1 - v0) * duration
     cubic, quartic, quintic = (
-        10.0 * way - 4.0 * turn,
-        -15.0 * way + 7.0 * turn,
-        6.0 * way - 3.0 * turn,
+        10.0 * offset - 4.0 * change,
+        -15.0 * offset + 7.0 * change,
+        6.0 * offset - 3.0 * change,
     )
-    at = start + v0 * duration * s + s**3 * (cubic + s * (quartic + s * quintic))
+    position = start + v0 * duration * s + s**3 * (cubic + s * (quartic + s * quintic))
     rate = 3.0 * cubic + s * (4.0 * quartic + s * 5.0 * quintic)
-    return at, v0 + s**2 * rate / duration
+    return position, v0 + s**2 * rate / duration
 
 
-def _motion(ends: list[Floats], steps: int, share: float) -> Trajectory:
+def _trajectory(ends: list[Floats], steps: int, share: float) -> Trajectory:
     t = _times(steps)
-    at, speed = _path(ends, steps, t)
-    q = posture(at)
-    dq = posture_rates(at, speed)
+    position, speed = _path(ends, steps, t)
+    q = posture(position)
+    dq = posture_rates(position, speed)
     before, after = (
         posture_rates(*_path(ends, steps, t + instant)) for instant in (-_INSTANT_S, _INSTANT_S)
     )
     ddq = (after - before) / (2.0 * _INSTANT_S)
     dense = np.stack([q, dq, ddq], axis=1).reshape(steps, model.SUBSTEPS, 3, model.JOINTS)
-    fastest = float(share_of(dq).max())
+    fastest = float(speed_share_unchecked(dq).max())
     worst = constraints(q, np.zeros_like(q)).worst()
     inside = all(bool((values <= 0.0).all()) for values in worst.values())
     knots = dense[:, -1]
@@ -227,17 +226,17 @@ def _motion(ends: list[Floats], steps: int, share: float) -> Trajectory:
         ddq=knots[:, 2],
         dense=dense,
         speed_share=fastest,
-        ok=bool(is_good(q, at).all()) and inside and fastest <= share,
+        ok=bool(is_solution(q, position).all()) and inside and fastest <= share,
     )
 
 
-def _one(name: str, given: ArrayLike, z: float) -> Floats:
-    array = points(name, given, z)
+def _single_point(name: str, value: ArrayLike, z: float) -> Floats:
+    array = points(name, value, z)
     if array.shape != (3,):
-        raise ValueError(f"{name}: expected shape (2,) or (3,), got {np.shape(given)}")
+        raise ValueError(f"{name}: expected shape (2,) or (3,), got {np.shape(value)}")
     return array
 
 
-def _unknown(interpolation: object) -> ValueError:
+def _unknown_interpolation(interpolation: object) -> ValueError:
     known = ", ".join(map(str, INTERPOLATIONS))
     return ValueError(f"interpolation: expected one of {known}, got {interpolation}")

@@ -1,13 +1,13 @@
 use super::{
-    digest::{Digest, Hashed},
-    words::invalid,
+    digest::{Digest, HashingReader},
+    messages::invalid,
 };
 use crate::bundle::{
-    budget::{Budget, Watched},
+    budget::{Budget, CancellableReader},
     error::BundleError,
     node::Node,
 };
-use faceoff_types::harmless;
+use faceoff_types::escape_unprintable;
 use fs_err::{self as fs, File};
 use serde::de::DeserializeOwned;
 use std::{
@@ -16,37 +16,37 @@ use std::{
     path::{Path, PathBuf},
 };
 
-/// What `docker save` writes.
+/// Index file of `docker save`.
 pub(super) const DOCKER_LIST: &str = "manifest.json";
-/// What the layout of the Open Container Initiative begins with.
+/// Index file of an OCI layout.
 pub(super) const OCI_INDEX: &str = "index.json";
 const OCI_MARK: &str = "oci-layout";
-/// Largest JSON document, in bytes; those of ordinary images have some kilobytes.
+/// Largest JSON document, in bytes; the documents of ordinary images have a few kilobytes.
 const DOCUMENT_MAX_BYTES: u64 = 1 << 20;
-/// How many documents may be read: lists can name lists.
-const MOST_DOCUMENTS: u32 = 64;
+/// Maximum number of read documents, because lists can contain lists.
+const MAX_DOCUMENTS: u32 = 64;
 /// As many links as Linux follows on one path.
-const MOST_LINKS: usize = 40;
+const MAX_LINKS: usize = 40;
 
-/// The files of an unpacked archive that may be an image. As everywhere, what is there is known from memory;
-/// of its links none is on the disk, and of its folders those that hold a file.
+/// The files of an unpacked archive that may be an image. Its content is known from memory. No link is on the disk, and
+/// only the folders that contain a file.
 pub(in crate::bundle) struct Archive<'a> {
     into: PathBuf,
     nodes: BTreeMap<String, Node>,
     budget: &'a Budget<'a>,
     documents: u32,
-    /// Whose digests have been compared.
+    /// Digests of the blobs that have been verified.
     verified: BTreeSet<Digest>,
 }
 
 impl<'a> Archive<'a> {
-    /// The files in the folder `into`. What was packed with the folder around it is taken from there.
+    /// The files in the folder `into`. If they are all inside a single top-level folder, that folder is used.
     pub(in crate::bundle) fn new(
         into: PathBuf,
         nodes: BTreeMap<String, Node>,
         budget: &'a Budget<'a>,
     ) -> Self {
-        let (into, nodes) = match only_folder(&nodes) {
+        let (into, nodes) = match single_top_folder(&nodes) {
             Some(folder) => {
                 let inside = nodes.iter().filter_map(|(path, node)| {
                     let path = path.strip_prefix(&folder)?.strip_prefix('/')?;
@@ -65,12 +65,12 @@ impl<'a> Archive<'a> {
         }
     }
 
-    /// Does it hold what makes an archive an image?
+    /// Does it have the index file of an image?
     pub(in crate::bundle) fn is_image(&self) -> bool {
         self.has(DOCKER_LIST) || self.is_layout()
     }
 
-    /// Does it hold the Open Container Initiative's layout?
+    /// Does it have an OCI layout?
     pub(super) fn is_layout(&self) -> bool {
         self.has(OCI_MARK) && self.has(OCI_INDEX)
     }
@@ -79,11 +79,11 @@ impl<'a> Archive<'a> {
         self.nodes.get(name) == Some(&Node::File)
     }
 
-    /// The file that `name` leads to. Links inside of the archive are followed in memory: earlier versions of
-    /// Docker write one where two layers are the same.
-    pub(super) fn real_name(&self, name: &str) -> Result<String, BundleError> {
+    /// The file to which `name` leads. Links inside of the archive are followed in memory: earlier versions of Docker
+    /// write a link for a layer that is the same as another.
+    pub(super) fn resolve_name(&self, name: &str) -> Result<String, BundleError> {
         let mut at = name.to_owned();
-        for _ in 0..MOST_LINKS {
+        for _ in 0..MAX_LINKS {
             match self.nodes.get(&at) {
                 Some(Node::File) => return Ok(at),
                 Some(Node::Link { target }) => match join(&at, target) {
@@ -94,58 +94,58 @@ impl<'a> Archive<'a> {
             }
         }
         let shown: String = name.chars().take(200).collect();
-        // Engines write what they have, and some do not have all of an image.
-        let help = match Digest::of_blob(name) {
-            Some(_) => ": pull or build the image again, and save it anew",
+        // Some container engines do not have all layers of an image, and save the ones that they have.
+        let hint = match Digest::from_blob_path(name) {
+            Some(_) => ": pull or build the image again, and save it again",
             None => "",
         };
         Err(invalid(format_args!(
-            "names {shown:?}, which is no file of the archive{help}"
+            "names {shown:?}, which is no file of the archive{hint}"
         )))
     }
 
-    fn place(&self, name: &str) -> Result<PathBuf, BundleError> {
-        Ok(self.into.join(self.real_name(name)?))
+    fn path(&self, name: &str) -> Result<PathBuf, BundleError> {
+        Ok(self.into.join(self.resolve_name(name)?))
     }
 
-    /// Opens the file `name`. What is read of it counts, since an image may name it as often as it likes.
+    /// Opens the file `name`. Its bytes are counted, because an image may name the same file many times.
     pub(super) fn open(&self, name: &str) -> Result<Blob<'a>, BundleError> {
-        let place = self.place(name)?;
+        let path = self.path(name)?;
         Ok(Blob {
-            inner: self.watched(&place)?,
+            inner: self.reader(&path)?,
             budget: self.budget,
         })
     }
 
-    /// Reads the file `name`, once, if it is named by its digest: it must have it.
+    /// Checks the digest of the file `name`, once, if its name contains a digest.
     pub(super) fn verify(&mut self, name: &str) -> Result<(), BundleError> {
-        let Some(digest) = Digest::of_blob(name) else {
+        let Some(digest) = Digest::from_blob_path(name) else {
             return Ok(());
         };
         if self.verified.contains(&digest) {
             return Ok(());
         }
-        let mut hashed = Hashed::new(self.watched(&self.place(name)?)?);
-        io::copy(&mut hashed, &mut io::sink()).map_err(BundleError::reading(name))?;
+        let mut hashed = HashingReader::new(self.reader(&self.path(name)?)?);
+        io::copy(&mut hashed, &mut io::sink()).map_err(BundleError::on_read(name))?;
         digest.check(name, hashed.into_hash())?;
         self.verified.insert(digest);
         Ok(())
     }
 
-    fn watched(&self, place: &Path) -> Result<Watched<'a, std::fs::File>, BundleError> {
-        Ok(Watched::new(File::open(place)?.into_file(), self.budget))
+    fn reader(&self, path: &Path) -> Result<CancellableReader<'a, std::fs::File>, BundleError> {
+        Ok(CancellableReader::new(File::open(path)?.into_file(), self.budget))
     }
 
     /// Reads a JSON document.
     pub(super) fn document<T: DeserializeOwned>(&mut self, name: &str) -> Result<T, BundleError> {
         self.documents += 1;
-        if self.documents > MOST_DOCUMENTS {
+        if self.documents > MAX_DOCUMENTS {
             return Err(invalid(format_args!(
-                "is described by more than {MOST_DOCUMENTS} documents"
+                "is described by more than {MAX_DOCUMENTS} documents"
             )));
         }
-        let bytes_of = |place: &Path| Ok::<_, BundleError>(fs::symlink_metadata(place)?.len());
-        if bytes_of(&self.place(name)?)? > DOCUMENT_MAX_BYTES {
+        let size = fs::symlink_metadata(self.path(name)?)?.len();
+        if size > DOCUMENT_MAX_BYTES {
             return Err(invalid(format_args!(
                 "has the document {name:?} of more than {DOCUMENT_MAX_BYTES} bytes"
             )));
@@ -155,22 +155,22 @@ impl<'a> Archive<'a> {
         self.open(name)?
             .take(DOCUMENT_MAX_BYTES)
             .read_to_end(&mut bytes)
-            .map_err(BundleError::reading(name))?;
+            .map_err(BundleError::on_read(name))?;
         serde_json::from_slice(&bytes).map_err(|error| {
-            // It may quote the text.
-            let told = error.to_string();
-            invalid(format_args!("cannot be read: {name}: {}", harmless(&told)))
+            // The message may quote the document.
+            let message = error.to_string();
+            invalid(format_args!("cannot be read: {name}: {}", escape_unprintable(&message)))
         })
     }
 
-    /// Where nothing of the archive is.
-    pub(super) fn free_place(&self) -> PathBuf {
+    /// A path that the archive does not use.
+    pub(super) fn unused_path(&self) -> PathBuf {
         let mut names = (0_u64..).map(|number| format!("root{number}"));
         let free = names.find(|name| !self.nodes.contains_key(name));
         self.into.join(free.unwrap_or_default())
     }
 
-    /// Removes a file that is not needed any more.
+    /// Removes a file that is no longer needed.
     pub(super) fn remove(&mut self, name: &str) -> Result<(), BundleError> {
         if self.nodes.remove(name) == Some(Node::File) {
             fs::remove_file(self.into.join(name))?;
@@ -178,49 +178,49 @@ impl<'a> Archive<'a> {
         Ok(())
     }
 
-    /// Removes all that is left.
+    /// Removes all remaining files.
     pub(super) fn clear(self) -> Result<(), BundleError> {
-        for top in self.tops() {
-            let place = self.into.join(top);
+        for top in self.top_level_names() {
+            let path = self.into.join(top);
             match self.nodes.get(top) {
-                Some(Node::Folder { is_made: true, .. }) => fs::remove_dir_all(place)?,
-                Some(Node::File) => fs::remove_file(place)?,
+                Some(Node::Folder { is_created: true, .. }) => fs::remove_dir_all(path)?,
+                Some(Node::File) => fs::remove_file(path)?,
                 Some(Node::Folder { .. } | Node::Link { .. }) | None => {}
             }
         }
         Ok(())
     }
 
-    fn tops(&self) -> impl Iterator<Item = &str> {
+    fn top_level_names(&self) -> impl Iterator<Item = &str> {
         let names = self.nodes.keys().map(String::as_str);
         names.filter(|name| !name.contains('/'))
     }
 }
 
-/// The single folder at the top, if there is nothing beside it.
-fn only_folder(nodes: &BTreeMap<String, Node>) -> Option<String> {
-    let mut tops = nodes.iter().filter(|(path, _)| !path.contains('/'));
-    match (tops.next(), tops.next()) {
+/// The single top-level folder, if the archive has no other top-level entry.
+fn single_top_folder(nodes: &BTreeMap<String, Node>) -> Option<String> {
+    let mut top_level_names = nodes.iter().filter(|(path, _)| !path.contains('/'));
+    match (top_level_names.next(), top_level_names.next()) {
         (Some((folder, Node::Folder { .. })), None) => Some(folder.clone()),
         _ => None,
     }
 }
 
-/// A file of the archive that is read as a part of an image.
+/// Reader of a file that is part of an image; counts its bytes.
 pub(super) struct Blob<'a> {
-    inner: Watched<'a, std::fs::File>,
+    inner: CancellableReader<'a, std::fs::File>,
     budget: &'a Budget<'a>,
 }
 
 impl Read for Blob<'_> {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         let read = self.inner.read(buffer)?;
-        self.budget.of_image(read)?;
+        self.budget.count_image_bytes(read)?;
         Ok(read)
     }
 }
 
-/// The path to which a link at `from` leads, if that is inside of the archive.
+/// The path to which a link at `from` leads; `None` if it is outside of the archive.
 fn join(from: &str, target: &str) -> Option<String> {
     if target.starts_with('/') {
         return None;
@@ -242,7 +242,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn links_of_the_archive_stay_inside() {
+    fn archive_links_stay_inside() {
         assert_eq!(
             join("a/layer.tar", "../b/layer.tar").as_deref(),
             Some("b/layer.tar")

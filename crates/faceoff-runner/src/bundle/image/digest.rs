@@ -1,14 +1,14 @@
-use super::words::invalid;
+use super::messages::invalid;
 use crate::bundle::error::BundleError;
 use sha2::{Digest as _, Sha256};
 use std::io::{self, Read};
 
-/// What bytes must hash to, as hexadecimal digits of SHA-256.
+/// A SHA-256 digest, as hexadecimal digits.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct Digest(String);
 
 impl Digest {
-    /// Of `sha256:` and 64 digits.
+    /// Parses `sha256:` and 64 digits.
     pub(super) fn parse(text: &str) -> Result<Self, BundleError> {
         let digits = text.strip_prefix("sha256:").unwrap_or_default();
         if is_hash(digits) {
@@ -20,25 +20,25 @@ impl Digest {
         )))
     }
 
-    /// Where an image's layout keeps the bytes of this digest.
-    pub(super) fn blob(&self) -> String {
+    /// Path of the blob with this digest in an OCI layout.
+    pub(super) fn blob_path(&self) -> String {
         format!("{BLOBS}{}", self.0)
     }
 
-    /// The digest of the bytes that belong at a place of a layout; of other places nothing is said.
-    pub(super) fn of_blob(place: &str) -> Option<Self> {
-        let digits = place.strip_prefix(BLOBS)?;
+    /// The digest in the path of a blob; `None` for other paths.
+    pub(super) fn from_blob_path(path: &str) -> Option<Self> {
+        let digits = path.strip_prefix(BLOBS)?;
         is_hash(digits).then(|| Self(digits.to_owned()))
     }
 
-    /// What has been read must have this digest.
-    pub(super) fn check(&self, what: &str, found: Sha256) -> Result<(), BundleError> {
+    /// Checks that the read bytes have this digest.
+    pub(super) fn check(&self, name: &str, found: Sha256) -> Result<(), BundleError> {
         let found = hex::encode(found.finalize());
         if found == self.0 {
             return Ok(());
         }
         Err(BundleError::Invalid(format!(
-            "{what} is not what the image says: expected SHA-256 {}, found {found}",
+            "{name} differs from the image's digest: expected SHA-256 {}, found {found}",
             self.0
         )))
     }
@@ -53,13 +53,13 @@ fn is_hash(digits: &str) -> bool {
             .all(|b| b.is_ascii_digit() || (b'a'..=b'f').contains(&b))
 }
 
-/// A reader that hashes what is read through it.
-pub(super) struct Hashed<R> {
+/// A reader that hashes its bytes.
+pub(super) struct HashingReader<R> {
     inner: R,
     hash: Sha256,
 }
 
-impl<R: Read> Hashed<R> {
+impl<R: Read> HashingReader<R> {
     pub(super) fn new(inner: R) -> Self {
         Self {
             inner,
@@ -67,13 +67,13 @@ impl<R: Read> Hashed<R> {
         }
     }
 
-    /// The hash of all that was read.
+    /// The hash of all read bytes.
     pub(super) fn into_hash(self) -> Sha256 {
         self.hash
     }
 }
 
-impl<R: Read> Read for Hashed<R> {
+impl<R: Read> Read for HashingReader<R> {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         let read = self.inner.read(buffer)?;
         self.hash.update(&buffer[..read]);

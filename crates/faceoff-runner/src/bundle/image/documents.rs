@@ -1,74 +1,74 @@
-//! Which layers an archive's image has, by its own documents.
+//! Finds the layers of an archive's image in its JSON documents.
 
 use super::{
     archive::{Archive, DOCKER_LIST, OCI_INDEX},
     digest::Digest,
     env,
-    words::{invalid, what_to_write},
+    messages::{invalid, dockerfile_hint},
 };
 use crate::bundle::error::BundleError;
-use faceoff_types::harmless;
+use faceoff_types::escape_unprintable;
 use serde::{Deserialize, de::IgnoredAny};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// As many as the file system of most container engines can stack.
-const MOST_LAYERS: usize = 127;
-/// How many entries the lists of one archive may have in all.
-const MOST_ENTRIES: usize = 256;
-/// How much is shown of the step that made a layer, in characters.
-const STEP_SHOWN: usize = 80;
-/// What lists of images are, beside the images in them.
+const MAX_LAYERS: usize = 127;
+/// Maximum number of entries in all lists of one archive.
+const MAX_ENTRIES: usize = 256;
+/// Maximum shown length of a layer's build step, in characters.
+const STEP_MAX_CHARS: usize = 80;
+/// Media types of lists of images.
 const LIST_TYPES: [&str; 2] = [
     "application/vnd.oci.image.index.v1+json",
     "application/vnd.docker.distribution.manifest.list.v2+json",
 ];
 
-/// What makes the image's root.
-pub(super) struct Parts {
+/// Environment and layers of an image.
+pub(super) struct ImageParts {
     pub env: BTreeMap<String, String>,
-    /// The lowest one first.
+    /// In the order of application, the lowest first.
     pub layers: Vec<LayerPart>,
 }
 
 pub(super) struct LayerPart {
     /// Its file in the archive.
     pub name: String,
-    /// Of its uncompressed content.
+    /// Digest of its uncompressed content.
     pub diff_id: Digest,
-    /// The step that made it, as a Dockerfile has it.
-    pub made_by: Option<String>,
+    /// The build step that created it, as in a Dockerfile.
+    pub step: Option<String>,
 }
 
 impl LayerPart {
-    /// What is wrong in this layer, the `number`th from below, from 1.
-    pub fn in_it(&self, error: BundleError, number: usize, count: usize) -> BundleError {
-        let step = self.made_by.as_ref();
+    /// Adds the layer to the message of an error. `number`: position of the layer from below, from 1.
+    pub fn in_layer(&self, error: BundleError, number: usize, count: usize) -> BundleError {
+        let step = self.step.as_ref();
         let step = step.map_or(String::new(), |step| format!(" ({step})"));
         match error {
-            BundleError::Invalid(told) => BundleError::Invalid(format!(
-                "layer {number} of the image's {count}{step}: {told}"
+            BundleError::Invalid(message) => BundleError::Invalid(format!(
+                "layer {number} of the image's {count}{step}: {message}"
             )),
-            ours => ours,
+            other => other,
         }
     }
 }
 
-/// An entry of `manifest.json`, as `docker save` writes it. Tags of one image are in one entry.
+/// An entry of `manifest.json`, as written by `docker save`. All tags of an image are in one entry.
 #[derive(Debug, PartialEq, Eq, PartialOrd, Ord, Deserialize)]
 struct DockerImage {
     #[serde(rename = "Config")]
     config: String,
     #[serde(rename = "Layers")]
     layers: Vec<String>,
-    /// Its names; one image may have several.
+    /// Its names; an image may have several.
     #[serde(rename = "RepoTags")]
     tags: Option<Vec<String>>,
 }
 
-/// A list of images in the Open Container Initiative's layout.
+/// A list of images in an OCI layout.
 #[derive(Debug, Deserialize)]
 struct OciList {
-    /// None is written as `null` by some.
+    /// Some engines write an empty list as `null`.
     manifests: Option<Vec<Descriptor>>,
 }
 
@@ -90,20 +90,20 @@ struct Descriptor {
 
 #[derive(Debug, Clone, Default, Deserialize)]
 struct Annotations {
-    /// Says of an entry of a list that it is no image, but tells of one (how it was built, say).
+    /// Set if the entry is not an image, but describes one (an attestation of its build, say).
     #[serde(rename = "vnd.docker.reference.type")]
-    tells_of_another: Option<IgnoredAny>,
+    reference_type: Option<IgnoredAny>,
 }
 
 #[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
 struct Platform {
     architecture: String,
     os: String,
-    /// Which extensions of the processor it needs.
+    /// The CPU variant that it needs.
     variant: Option<String>,
 }
 
-/// An image's configuration; what it says of how to start something is not used.
+/// An image's configuration. Its settings for starting a program are not used.
 #[derive(Debug, Deserialize)]
 struct Config {
     #[serde(flatten)]
@@ -114,7 +114,7 @@ struct Config {
     history: Option<Vec<Step>>,
 }
 
-/// How a layer came about.
+/// A build step in the image's history.
 #[derive(Debug, Deserialize)]
 struct Step {
     #[serde(default)]
@@ -135,8 +135,8 @@ struct RootFs {
 }
 
 impl Platform {
-    /// The one whose programs run here.
-    fn of_this_host() -> Self {
+    /// The platform of this host.
+    fn host() -> Self {
         let architecture = match std::env::consts::ARCH {
             "x86_64" => "amd64",
             "aarch64" => "arm64",
@@ -149,8 +149,8 @@ impl Platform {
         }
     }
 
-    fn is_of_this_host(&self) -> bool {
-        let host = Self::of_this_host();
+    fn matches_host(&self) -> bool {
+        let host = Self::host();
         (&self.architecture, &self.os) == (&host.architecture, &host.os)
     }
 
@@ -164,42 +164,42 @@ impl std::fmt::Display for Platform {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let shown = |text: &str| text.chars().take(40).collect::<String>();
         let platform = format!("{}/{}", shown(&self.os), shown(&self.architecture));
-        f.write_str(&faceoff_types::harmless(&platform))
+        f.write_str(&faceoff_types::escape_unprintable(&platform))
     }
 }
 
-/// Finds the only image of the archive and its layers. Docker's list is asked first: newer versions write the
-/// layout beside it, some without its layers. Of an image for several platforms that list has the one of the machine that
-/// saved it, and the layout all.
-pub(super) fn read(archive: &mut Archive<'_>) -> Result<Parts, BundleError> {
+/// Finds the only image of the archive and its layers. Docker's list is read first: newer versions also write an OCI
+/// layout, some without the layers. Of an image for several platforms, Docker's list has the one of the machine that
+/// saved it, and the layout has all.
+pub(super) fn read(archive: &mut Archive<'_>) -> Result<ImageParts, BundleError> {
     let (mut image, mut config) = if archive.has(DOCKER_LIST) {
-        let image = of_docker(archive)?;
+        let image = read_docker_list(archive)?;
         let config: Config = archive.document(&image.config)?;
         (image, config)
     } else {
-        of_layout(archive)?
+        read_oci_layout(archive)?
     };
-    if !config.platform.is_of_this_host()
+    if !config.platform.matches_host()
         && archive.has(DOCKER_LIST)
         && archive.is_layout()
-        && let Ok((other, its_config)) = of_layout(archive)
-        && its_config.platform.is_of_this_host()
+        && let Ok((other, its_config)) = read_oci_layout(archive)
+        && its_config.platform.matches_host()
     {
         (image, config) = (other, its_config);
     }
-    if image.layers.len() > MOST_LAYERS {
+    if image.layers.len() > MAX_LAYERS {
         return Err(invalid(format_args!(
-            "has {} layers; at most {MOST_LAYERS} are allowed: build it with fewer steps",
+            "has {} layers; at most {MAX_LAYERS} are allowed: build it with fewer steps",
             image.layers.len()
         )));
     }
-    if !config.platform.is_of_this_host() {
-        return Err(of_another_host(&config.platform.to_string()));
+    if !config.platform.matches_host() {
+        return Err(wrong_platform(&config.platform.to_string()));
     }
     let diff_ids = config.rootfs.diff_ids.unwrap_or_default();
     if diff_ids.len() != image.layers.len() {
         return Err(invalid(format_args!(
-            "has {} layers, and its configuration knows of {}",
+            "has {} layers, and its configuration lists {}",
             image.layers.len(),
             diff_ids.len()
         )));
@@ -209,18 +209,18 @@ pub(super) fn read(archive: &mut Archive<'_>) -> Result<Parts, BundleError> {
         Ok(LayerPart {
             name,
             diff_id: Digest::parse(diff_id)?,
-            made_by,
+            step: made_by,
         })
     };
     let layers = image.layers.into_iter().zip(&diff_ids).zip(steps).map(part);
     let variables = config.config.and_then(|config| config.env);
-    Ok(Parts {
+    Ok(ImageParts {
         env: env::read(&variables.unwrap_or_default())?,
         layers: layers.collect::<Result<_, BundleError>>()?,
     })
 }
 
-/// The step of each layer, where the history knows of as many.
+/// The build step of each layer, if the history has the same number of steps.
 fn steps(history: Vec<Step>, layers: usize) -> Vec<Option<String>> {
     let steps: Vec<String> = history
         .into_iter()
@@ -232,17 +232,17 @@ fn steps(history: Vec<Step>, layers: usize) -> Vec<Option<String>> {
     }
     let shown = |step: String| {
         let words: Vec<&str> = step.split_whitespace().collect();
-        let step: String = harmless(&words.join(" "))
+        let step: String = escape_unprintable(&words.join(" "))
             .chars()
-            .take(STEP_SHOWN)
+            .take(STEP_MAX_CHARS)
             .collect();
         (!step.is_empty()).then_some(step)
     };
     steps.into_iter().map(shown).collect()
 }
 
-fn of_docker(archive: &mut Archive<'_>) -> Result<DockerImage, BundleError> {
-    let all: Vec<DockerImage> = archive.document(DOCKER_LIST).map_err(no_image)?;
+fn read_docker_list(archive: &mut Archive<'_>) -> Result<DockerImage, BundleError> {
+    let all: Vec<DockerImage> = archive.document(DOCKER_LIST).map_err(with_image_hint)?;
     let tags: BTreeSet<String> = all
         .iter()
         .flat_map(|image| image.tags.iter().flatten().cloned())
@@ -257,44 +257,44 @@ fn of_docker(archive: &mut Archive<'_>) -> Result<DockerImage, BundleError> {
     match (images.pop_first(), images.len()) {
         (Some(image), 0) => Ok(image),
         (Some(_), more) => Err(several(more + 1, &tags)),
-        (None, _) => Err(no_image(invalid("is missing: manifest.json names none"))),
+        (None, _) => Err(with_image_hint(invalid("is missing: manifest.json names none"))),
     }
 }
 
-fn of_layout(archive: &mut Archive<'_>) -> Result<(DockerImage, Config), BundleError> {
-    let list: OciList = archive.document(OCI_INDEX).map_err(no_image)?;
-    let image = choose(images_of(archive, list)?)?;
-    let image: OciImage = archive.document(&Digest::parse(&image.digest)?.blob())?;
-    let blob = |part: &Descriptor| Digest::parse(&part.digest).map(|digest| digest.blob());
+fn read_oci_layout(archive: &mut Archive<'_>) -> Result<(DockerImage, Config), BundleError> {
+    let list: OciList = archive.document(OCI_INDEX).map_err(with_image_hint)?;
+    let image = choose(collect_images(archive, list)?)?;
+    let image: OciImage = archive.document(&Digest::parse(&image.digest)?.blob_path())?;
+    let blob_path = |part: &Descriptor| Digest::parse(&part.digest).map(|digest| digest.blob_path());
     let layers = image.layers.unwrap_or_default();
     let image = DockerImage {
-        config: blob(&image.config)?,
-        layers: layers.iter().map(blob).collect::<Result<_, _>>()?,
+        config: blob_path(&image.config)?,
+        layers: layers.iter().map(blob_path).collect::<Result<_, _>>()?,
         tags: None,
     };
     let config = archive.document(&image.config)?;
     Ok((image, config))
 }
 
-/// All images of a list and of the lists in it, each once.
-fn images_of(archive: &mut Archive<'_>, list: OciList) -> Result<Vec<Descriptor>, BundleError> {
+/// All images of a list and of its nested lists, each once.
+fn collect_images(archive: &mut Archive<'_>, list: OciList) -> Result<Vec<Descriptor>, BundleError> {
     let mut images = Vec::new();
     let mut seen = BTreeSet::new();
     let mut todo = list.manifests.unwrap_or_default();
     let mut entries = todo.len();
     while let Some(entry) = todo.pop() {
-        if entries > MOST_ENTRIES {
+        if entries > MAX_ENTRIES {
             return Err(invalid(format_args!(
-                "is one of more than {MOST_ENTRIES} in the archive's lists: save it alone"
+                "is one of more than {MAX_ENTRIES} in the archive's lists: save it alone"
             )));
         }
         let digest = Digest::parse(&entry.digest)?;
-        if entry.annotations.tells_of_another.is_some() || !seen.insert(digest.clone()) {
+        if entry.annotations.reference_type.is_some() || !seen.insert(digest.clone()) {
             continue;
         }
         if LIST_TYPES.contains(&entry.media_type.as_str()) {
-            // How many documents are read is bounded.
-            let inner: OciList = archive.document(&digest.blob())?;
+            // The number of documents is limited, so nested lists end.
+            let inner: OciList = archive.document(&digest.blob_path())?;
             let inner = inner.manifests.unwrap_or_default();
             entries += inner.len();
             todo.extend(inner);
@@ -305,8 +305,8 @@ fn images_of(archive: &mut Archive<'_>, list: OciList) -> Result<Vec<Descriptor>
     Ok(images)
 }
 
-/// The only image, or of several the only one for this host, or the only one that says so, or the only one of
-/// these that needs no particular processor.
+/// Chooses the only image. Of several images: the only one for this host, or the only one that declares this platform,
+/// or the only one of these that needs no particular CPU variant.
 fn choose(mut images: Vec<Descriptor>) -> Result<Descriptor, BundleError> {
     let count = images.len();
     if count > 1 {
@@ -314,15 +314,15 @@ fn choose(mut images: Vec<Descriptor>) -> Result<Descriptor, BundleError> {
             .iter()
             .filter_map(|image| image.platform.as_ref().map(ToString::to_string))
             .collect();
-        let ours = |image: &Descriptor| image.platform.as_ref().map(Platform::is_of_this_host);
+        let is_for_host = |image: &Descriptor| image.platform.as_ref().map(Platform::matches_host);
         let general = |image: &Descriptor| image.platform.as_ref().is_none_or(Platform::is_general);
-        images.retain(|image| ours(image) != Some(false));
+        images.retain(|image| is_for_host(image) != Some(false));
         if images.is_empty() {
             let others: Vec<String> = others.into_iter().take(8).collect();
-            return Err(of_another_host(&others.join(", ")));
+            return Err(wrong_platform(&others.join(", ")));
         }
-        if images.iter().any(|image| ours(image) == Some(true)) {
-            images.retain(|image| ours(image) == Some(true));
+        if images.iter().any(|image| is_for_host(image) == Some(true)) {
+            images.retain(|image| is_for_host(image) == Some(true));
         }
         if images.iter().any(general) {
             images.retain(general);
@@ -331,39 +331,39 @@ fn choose(mut images: Vec<Descriptor>) -> Result<Descriptor, BundleError> {
     match (images.pop(), images.len()) {
         (Some(image), 0) => Ok(image),
         (Some(_), more) => Err(several(more + 1, &BTreeSet::new())),
-        (None, _) => Err(no_image(invalid("is missing: index.json names none"))),
+        (None, _) => Err(with_image_hint(invalid("is missing: index.json names none"))),
     }
 }
 
-fn of_another_host(platforms: &str) -> BundleError {
-    let host = Platform::of_this_host();
+fn wrong_platform(platforms: &str) -> BundleError {
+    let host = Platform::host();
     invalid(format_args!(
         "is for {platforms}, and this server runs {host}: build it with --platform {host}, and save that one"
     ))
 }
 
-/// Who saves by a name without a tag gets all that have one.
+/// An error for an archive with several images. `docker save` with a name but no tag saves all tags.
 fn several(count: usize, tags: &BTreeSet<String>) -> BundleError {
-    let shown = |tag: &String| harmless(tag).chars().take(60).collect::<String>();
+    let shown = |tag: &String| escape_unprintable(tag).chars().take(60).collect::<String>();
     let tags: Vec<String> = tags.iter().take(8).map(shown).collect();
     let tags = match tags.is_empty() {
         true => String::new(),
         false => format!(" ({})", tags.join(", ")),
     };
     BundleError::Invalid(format!(
-        "the archive holds {count} container images{tags}: expected one; save the agent's alone, by its name and its \
+        "the archive contains {count} container images{tags}: expected one; save the agent's alone, by its name and its \
          tag: `docker save -o ours.tar ours:latest`"
     ))
 }
 
-/// What is no image may have been meant as a bundle of files.
-fn no_image(error: BundleError) -> BundleError {
+/// Adds a hint to an error, because the archive may have been meant as a bundle of files.
+fn with_image_hint(error: BundleError) -> BundleError {
     match error {
-        BundleError::Invalid(told) => BundleError::Invalid(format!(
-            "there is no agent.toml at the archive's root, and {told}. A bundle is a folder with an agent.toml, or \
+        BundleError::Invalid(message) => BundleError::Invalid(format!(
+            "there is no agent.toml at the archive's root, and {message}. A bundle is a folder with an agent.toml, or \
              a container image: {}",
-            what_to_write()
+            dockerfile_hint()
         )),
-        ours => ours,
+        other => other,
     }
 }

@@ -1,30 +1,31 @@
-use super::words::invalid;
+use super::messages::invalid;
 use crate::bundle::error::BundleError;
-use faceoff_types::harmless;
+use faceoff_types::escape_unprintable;
 use faceoff_wire::Manifest;
 use std::collections::BTreeMap;
 
 /// More than the images of large frameworks have.
-const MOST_VARIABLES: usize = 128;
-/// Of all names and values, in bytes: with what `agent.toml` adds far below what a program can be passed.
-const MOST_BYTES: usize = 64 << 10;
+const MAX_VARIABLES: usize = 128;
+/// Limit for all names and values together. With the variables of `agent.toml` this is far below the system's limit.
+const MAX_BYTES: usize = 64 << 10;
 
-/// The variables of an image's `ENV`, each `NAME=VALUE`. Of two of one name the later one holds. Names that no
-/// shell has are left out: an image has them from its base, and cannot be rid of them.
+/// Parses the variables of an image's `ENV`, each `NAME=VALUE`. Of two variables with the same name, the later one
+/// applies. Names that no shell supports are left out: an image inherits them from its base image and cannot remove
+/// them.
 pub(super) fn read(entries: &[String]) -> Result<BTreeMap<String, String>, BundleError> {
-    if entries.len() > MOST_VARIABLES {
+    if entries.len() > MAX_VARIABLES {
         return Err(invalid(format_args!(
-            "sets {} variables (ENV); at most {MOST_VARIABLES} are allowed",
+            "sets {} variables (ENV); at most {MAX_VARIABLES} are allowed",
             entries.len()
         )));
     }
-    if entries.iter().map(String::len).sum::<usize>() > MOST_BYTES {
+    if entries.iter().map(String::len).sum::<usize>() > MAX_BYTES {
         return Err(invalid(format_args!(
-            "sets variables (ENV) of more than {MOST_BYTES} bytes"
+            "sets variables (ENV) of more than {MAX_BYTES} bytes"
         )));
     }
     let read_one = |entry: &String| {
-        let shown = |text: &str| harmless(text).chars().take(80).collect::<String>();
+        let shown = |text: &str| escape_unprintable(text).chars().take(80).collect::<String>();
         let Some((name, value)) = entry.split_once('=') else {
             return Err(invalid(format_args!(
                 "sets the variable {:?} (ENV): expected NAME=VALUE",
@@ -53,7 +54,7 @@ pub(super) fn read(entries: &[String]) -> Result<BTreeMap<String, String>, Bundl
 mod tests {
     use super::*;
 
-    fn told(entries: &[&str]) -> String {
+    fn result_text(entries: &[&str]) -> String {
         let entries: Vec<String> = entries.iter().map(|&entry| entry.to_owned()).collect();
         match read(&entries) {
             Ok(read) => format!("{read:?}"),
@@ -62,10 +63,10 @@ mod tests {
     }
 
     #[test]
-    fn variables_are_those_that_a_program_can_be_given() {
-        assert_eq!(told(&["A=b=c", "B=", "A=d"]), r#"{"A": "d", "B": ""}"#);
+    fn env_accepts_only_variables_for_programs() {
+        assert_eq!(result_text(&["A=b=c", "B=", "A=d"]), r#"{"A": "d", "B": ""}"#);
         for wrong in ["", "A"] {
-            assert!(told(&[wrong]).contains("expected NAME=VALUE"), "{wrong:?}");
+            assert!(result_text(&[wrong]).contains("expected NAME=VALUE"), "{wrong:?}");
         }
         for odd in [
             "=x",
@@ -75,14 +76,14 @@ mod tests {
             "A\u{202e}=x",
             "A\0=x",
         ] {
-            assert_eq!(told(&[odd, "A=b"]), r#"{"A": "b"}"#, "{odd:?}");
+            assert_eq!(result_text(&[odd, "A=b"]), r#"{"A": "b"}"#, "{odd:?}");
         }
         let long = format!("A={}", "x".repeat(4097));
-        assert!(told(&[&long]).contains("too long"));
-        assert!(told(&["A=\0"]).contains("NUL"));
-        let many = vec!["A=b"; MOST_VARIABLES + 1];
-        assert!(told(&many).contains("at most 128"));
+        assert!(result_text(&[&long]).contains("too long"));
+        assert!(result_text(&["A=\0"]).contains("NUL"));
+        let many = vec!["A=b"; MAX_VARIABLES + 1];
+        assert!(result_text(&many).contains("at most 128"));
         let half = format!("A={}", "x".repeat(4000));
-        assert!(told(&vec![half.as_str(); 20]).contains("more than 65536 bytes"));
+        assert!(result_text(&vec![half.as_str(); 20]).contains("more than 65536 bytes"));
     }
 }

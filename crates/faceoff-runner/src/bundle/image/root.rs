@@ -1,8 +1,8 @@
-use super::words::{invalid, what_to_write};
+use super::messages::{invalid, dockerfile_hint};
 use crate::bundle::{
     budget::Budget,
     entry::{
-        PATH_MAX_BYTES, check_target, invalid as invalid_entry, make_folder, normalise, write_name,
+        PATH_MAX_BYTES, check_target, invalid as invalid_entry, make_folder, normalise, add_hard_link,
         write_new,
     },
     error::BundleError,
@@ -16,11 +16,11 @@ use std::{
 };
 
 /// As many links as Linux follows on one path.
-const MOST_LINKS: usize = 40;
-/// The sandbox's own: empty folders in every image, in which it shows what belongs there. What layers have in them
-/// is unpacked and counted as all else, since other names of it may lie elsewhere, and removed at the end.
+const MAX_LINKS: usize = 40;
+/// Folders of the sandbox: empty in every image, used as mount points. Files of layers in them are unpacked and
+/// counted like others, because hard links to them may exist elsewhere, and removed at the end.
 const SANDBOX_FOLDERS: [&str; 5] = ["dev", "proc", "run", "sys", "tmp"];
-/// Files that the sandbox covers, and what there is of the network: nothing but the agent itself.
+/// Files that the sandbox covers, and network configuration files, which contain only the agent itself.
 const SANDBOX_FILES: [(&str, &str); 5] = [
     ("group", ""),
     ("hostname", "agent\n"),
@@ -28,27 +28,27 @@ const SANDBOX_FILES: [(&str, &str); 5] = [
     ("passwd", ""),
     ("resolv.conf", ""),
 ];
-/// Where an agent is in its image.
+/// Folder of the agent in its image.
 const AGENT: &str = "agent";
-/// What a layer calls that which it takes away from those below.
+/// Name prefix of a whiteout, with which a layer removes an entry of the layers below.
 const WHITEOUT: &str = ".wh.";
-/// Takes away all that a folder has from layers below.
+/// Whiteout that removes all entries that a folder has from layers below.
 const OPAQUE: &str = ".wh..wh..opq";
-/// Notes of the file system that whiteouts come from; container engines skip them, too.
-const WHITEOUT_NOTE: &str = ".wh..wh.";
+/// Name prefix of metadata of aufs, the origin of whiteouts; container engines skip them, too.
+const WHITEOUT_METADATA: &str = ".wh..wh.";
 
-/// The root that grows while layers are applied. What is in it is known from memory, never asked back from
-/// the disk, where there are folders and files only until all layers are applied: symbolic links are followed
-/// in memory, as they lead inside of the root, and made last. So nothing of the host's can be reached
-/// through one, whatever it says. A folder is made when a file is put into it, or at the end: too many of them are
-/// refused before there is one to be made and removed.
+/// The root folder to which layers are applied. Its content is known from memory and never read back from the disk,
+/// which contains only folders and files until all layers are applied. Symbolic links are resolved in memory, inside
+/// of the root, and created last. So no link can reach a file of the host, whatever its target is. A folder is created
+/// when a file is put into it, or at the end. So too many folders are refused before any is created and must be
+/// removed.
 pub(super) struct Root<'a> {
-    place: PathBuf,
+    disk_path: PathBuf,
     budget: &'a Budget<'a>,
     top: Folder,
     /// The layer that is being applied, from 1.
     layer: u32,
-    /// Ever made, links among them.
+    /// Number of files and links created so far.
     files: u64,
     folders: u64,
 }
@@ -56,13 +56,13 @@ pub(super) struct Root<'a> {
 #[derive(Debug, Default)]
 struct Folder {
     children: BTreeMap<String, Node>,
-    /// It is on the disk, and so is what leads to it.
-    is_made: bool,
+    /// It exists on the disk, and so do its parents.
+    is_created: bool,
 }
 
 #[derive(Debug)]
 struct Node {
-    /// The last one that had an entry for it: whiteouts hide what is of the layers below theirs.
+    /// The last layer with an entry for it: a whiteout hides nodes of the layers below its own.
     layer: u32,
     kind: Kind,
 }
@@ -72,17 +72,17 @@ enum Kind {
     Folder(Folder),
     File,
     Link(String),
-    /// A device, pipe or socket: only its name is known, and nothing on the disk.
+    /// A device, pipe or socket: it has a name but does not exist on the disk.
     Special,
 }
 
-/// Where something is to be: in a folder of the root, by its parts, none of them a link.
-struct Spot {
+/// Location of a node: its folder in the root, as path components without links, and its name.
+struct Location {
     folder: Vec<String>,
     name: String,
 }
 
-impl Spot {
+impl Location {
     fn path(&self) -> String {
         let mut path = self.folder.join("/");
         if !path.is_empty() {
@@ -115,49 +115,49 @@ impl Folder {
             })
     }
 
-    /// Removes what is of layers below `layer`.
-    fn hide_all(
+    /// Removes the nodes of layers below `layer`.
+    fn remove_children_below(
         &mut self,
-        place: &Path,
+        disk_path: &Path,
         layer: u32,
         budget: &Budget<'_>,
     ) -> Result<(), BundleError> {
-        let mut hidden = Ok(());
+        let mut result = Ok(());
         self.children.retain(|name, node| {
-            hidden.is_err()
-                || match node.stays(&place.join(name), layer, budget) {
-                    Ok(stays) => stays,
+            result.is_err()
+                || match node.remove_lower_layers(&disk_path.join(name), layer, budget) {
+                    Ok(remains) => remains,
                     Err(error) => {
-                        hidden = Err(error);
+                        result = Err(error);
                         true
                     }
                 }
         });
-        hidden
+        result
     }
 }
 
 impl Node {
-    /// Removes from the disk what of this is of layers below `layer`; is anything left?
-    fn stays(
+    /// Removes the parts of this node that belong to layers below `layer`; returns whether the node remains.
+    fn remove_lower_layers(
         &mut self,
-        place: &Path,
+        disk_path: &Path,
         layer: u32,
         budget: &Budget<'_>,
     ) -> Result<bool, BundleError> {
-        budget.looked_up(place.as_os_str().len())?;
+        budget.count_lookup(disk_path.as_os_str().len())?;
         match &mut self.kind {
             Kind::Folder(folder) => {
-                folder.hide_all(place, layer, budget)?;
-                let stays = self.layer == layer || !folder.children.is_empty();
-                if !stays && folder.is_made {
-                    fs::remove_dir(place)?;
+                folder.remove_children_below(disk_path, layer, budget)?;
+                let remains = self.layer == layer || !folder.children.is_empty();
+                if !remains && folder.is_created {
+                    fs::remove_dir(disk_path)?;
                 }
-                Ok(stays)
+                Ok(remains)
             }
             _ if self.layer == layer => Ok(true),
             Kind::File => {
-                fs::remove_file(place)?;
+                fs::remove_file(disk_path)?;
                 Ok(false)
             }
             Kind::Link(_) | Kind::Special => Ok(false),
@@ -166,15 +166,15 @@ impl Node {
 }
 
 impl<'a> Root<'a> {
-    /// An empty root in a new folder.
-    pub(super) fn new(place: &Path, budget: &'a Budget<'a>) -> Result<Self, BundleError> {
-        make_folder(place)?;
+    /// Creates an empty root in a new folder.
+    pub(super) fn new(disk_path: &Path, budget: &'a Budget<'a>) -> Result<Self, BundleError> {
+        make_folder(disk_path)?;
         Ok(Self {
-            place: place.to_owned(),
+            disk_path: disk_path.to_owned(),
             budget,
             top: Folder {
                 children: BTreeMap::new(),
-                is_made: true,
+                is_created: true,
             },
             layer: 0,
             files: 0,
@@ -182,30 +182,30 @@ impl<'a> Root<'a> {
         })
     }
 
-    /// What comes from now on is of the next layer.
+    /// Starts the next layer.
     pub(super) const fn begin_layer(&mut self) {
         self.layer += 1;
     }
 
-    fn on_disk(&self, folder: &[String]) -> PathBuf {
-        self.place.join(folder.join("/"))
+    fn path_on_disk(&self, folder: &[String]) -> PathBuf {
+        self.disk_path.join(folder.join("/"))
     }
 
-    /// Where the parts of a path lead: links are followed inside of the root, whose parent is itself; what is
-    /// not there is where it would be made.
+    /// Resolves a path: links are followed inside of the root, and the parent of the root is the root itself. Missing
+    /// components resolve to the location where they would be created.
     fn resolve(&self, entry: &str, path: &str) -> Result<Vec<String>, BundleError> {
         let mut at: Vec<(String, Option<&Folder>)> = Vec::new();
-        // What is still to be walked, the next part last.
+        // The remaining parts of the walk, the next one last.
         let mut todo: Vec<String> = parts(path);
         let mut links = 0;
         while let Some(part) = todo.pop() {
-            self.budget.looked_up(part.len())?;
+            self.budget.count_lookup(part.len())?;
             if part == ".." {
                 at.pop();
                 continue;
             }
-            let here = at.last().map_or(Some(&self.top), |(_, folder)| *folder);
-            match here.and_then(|here| here.children.get(&part)) {
+            let current = at.last().map_or(Some(&self.top), |(_, folder)| *folder);
+            match current.and_then(|current| current.children.get(&part)) {
                 None => at.push((part, None)),
                 Some(node) => match &node.kind {
                     Kind::Folder(folder) => at.push((part, Some(folder))),
@@ -218,13 +218,13 @@ impl<'a> Root<'a> {
                     }
                     Kind::Link(target) => {
                         links += 1;
-                        if links > MOST_LINKS {
+                        if links > MAX_LINKS {
                             return Err(invalid_entry(
                                 entry,
-                                format_args!("goes through more than {MOST_LINKS} links"),
+                                format_args!("goes through more than {MAX_LINKS} links"),
                             ));
                         }
-                        self.budget.looked_up(target.len())?;
+                        self.budget.count_lookup(target.len())?;
                         if target.starts_with('/') {
                             at.clear();
                         }
@@ -243,9 +243,9 @@ impl<'a> Root<'a> {
         Ok(path)
     }
 
-    /// Where a path of a layer is: its folders resolved, its last part taken as it is. `None` for the root. Some
-    /// builders write paths that begin with a slash, which is the root's.
-    fn spot(&self, entry: &str, path: &str) -> Result<Option<Spot>, BundleError> {
+    /// Location of a path in a layer: its folders resolved, its last component not followed. `None` for the root. Some
+    /// builders write paths that begin with a slash, which means the image's root.
+    fn location(&self, entry: &str, path: &str) -> Result<Option<Location>, BundleError> {
         let path = match path.trim_start_matches('/') {
             "" if !path.is_empty() => return Ok(None),
             path => normalise(path)?,
@@ -254,97 +254,97 @@ impl<'a> Root<'a> {
             return Ok(None);
         }
         let (folder, name) = path.rsplit_once('/').unwrap_or(("", &path));
-        Ok(Some(Spot {
+        Ok(Some(Location {
             folder: self.resolve(entry, folder)?,
             name: name.to_owned(),
         }))
     }
 
-    /// Where an entry is to be placed. `None` if there is nothing to place: it is the root, or a whiteout,
-    /// which is carried out.
-    fn spot_for(&mut self, entry: &str) -> Result<Option<Spot>, BundleError> {
-        let Some(spot) = self.spot(entry, entry)? else {
+    /// Location for an entry. `None` if there is nothing to create: the entry is the root, or a whiteout, which is
+    /// applied here.
+    fn location_for(&mut self, entry: &str) -> Result<Option<Location>, BundleError> {
+        let Some(location) = self.location(entry, entry)? else {
             return Ok(None);
         };
-        if let Some(hidden) = spot.name.strip_prefix(WHITEOUT) {
-            self.white_out(entry, &spot, hidden)?;
+        if let Some(hidden) = location.name.strip_prefix(WHITEOUT) {
+            self.white_out(entry, &location, hidden)?;
             return Ok(None);
         }
-        Ok(Some(spot))
+        Ok(Some(location))
     }
 
-    /// Takes away what layers below have there, wherever in its layer the whiteout stands.
-    fn white_out(&mut self, entry: &str, spot: &Spot, hidden: &str) -> Result<(), BundleError> {
-        let (layer, budget, place) = (self.layer, self.budget, self.on_disk(&spot.folder));
-        let Some(folder) = self.top.at_mut(&spot.folder) else {
+    /// Removes the nodes of layers below, regardless of the whiteout's position in its own layer.
+    fn white_out(&mut self, entry: &str, at: &Location, hidden: &str) -> Result<(), BundleError> {
+        let (layer, budget, dir) = (self.layer, self.budget, self.path_on_disk(&at.folder));
+        let Some(folder) = self.top.at_mut(&at.folder) else {
             return Ok(());
         };
-        if spot.name == OPAQUE {
-            return folder.hide_all(&place, layer, budget);
+        if at.name == OPAQUE {
+            return folder.remove_children_below(&dir, layer, budget);
         }
-        if spot.name.starts_with(WHITEOUT_NOTE) {
+        if at.name.starts_with(WHITEOUT_METADATA) {
             return Ok(());
         }
         if matches!(hidden, "" | "." | "..") {
             return Err(invalid_entry(entry, "is a whiteout of no possible name"));
         }
         if let Some(node) = folder.children.get_mut(hidden)
-            && !node.stays(&place.join(hidden), layer, budget)?
+            && !node.remove_lower_layers(&dir.join(hidden), layer, budget)?
         {
             folder.children.remove(hidden);
         }
         Ok(())
     }
 
-    /// Adds the folders on the way, and clears the spot of what is there.
-    fn clear(&mut self, entry: &str, spot: &Spot) -> Result<&mut Folder, BundleError> {
-        self.add_folders(&spot.folder)?;
-        let place = self.on_disk(&spot.folder).join(&spot.name);
+    /// Adds the parent folders, and removes the existing node at the location.
+    fn clear(&mut self, entry: &str, location: &Location) -> Result<&mut Folder, BundleError> {
+        self.add_folders(&location.folder)?;
+        let disk_path = self.path_on_disk(&location.folder).join(&location.name);
         let folder = self
             .top
-            .at_mut(&spot.folder)
-            .ok_or_else(|| invalid_entry(entry, "needs a folder that is none"))?;
-        match folder.children.remove(&spot.name).map(|node| node.kind) {
-            Some(Kind::Folder(there)) if there.is_made => fs::remove_dir_all(place)?,
-            Some(Kind::File) => fs::remove_file(place)?,
+            .at_mut(&location.folder)
+            .ok_or_else(|| invalid_entry(entry, "needs a folder that does not exist"))?;
+        match folder.children.remove(&location.name).map(|node| node.kind) {
+            Some(Kind::Folder(existing)) if existing.is_created => fs::remove_dir_all(disk_path)?,
+            Some(Kind::File) => fs::remove_file(disk_path)?,
             Some(Kind::Folder(_) | Kind::Link(_) | Kind::Special) | None => {}
         }
         Ok(folder)
     }
 
-    /// Takes a spot for something that is no folder. Whatever is there goes, as the later entry of an archive
-    /// replaces the earlier one; a file is made anew, since other names of the old one keep its content.
-    fn put(&mut self, entry: &str, spot: &Spot, kind: Kind) -> Result<PathBuf, BundleError> {
+    /// Adds a node that is not a folder. An existing node is removed, because the later entry of an archive replaces
+    /// the earlier one. A file is always created as a new one, because other names of the old file keep its content.
+    fn put(&mut self, entry: &str, at: &Location, kind: Kind) -> Result<PathBuf, BundleError> {
         self.files += 1;
-        let most = self.budget.limits().files;
-        if self.files > most {
+        let max = self.budget.limits().files;
+        if self.files > max {
             return Err(invalid(format_args!(
-                "has more than {most} files in all layers"
+                "has more than {max} files in all layers"
             )));
         }
         let layer = self.layer;
         let is_written = matches!(kind, Kind::File);
-        let folder = self.clear(entry, spot)?;
+        let folder = self.clear(entry, at)?;
         folder
             .children
-            .insert(spot.name.clone(), Node { layer, kind });
+            .insert(at.name.clone(), Node { layer, kind });
         if is_written {
-            self.make_way(&spot.folder)?;
+            self.make_parents(&at.folder)?;
         }
-        Ok(self.on_disk(&spot.folder).join(&spot.name))
+        Ok(self.path_on_disk(&at.folder).join(&at.name))
     }
 
     fn add_folders(&mut self, path: &[String]) -> Result<(), BundleError> {
-        let most = self.budget.limits().files;
+        let max = self.budget.limits().files;
         let mut at = &mut self.top;
         for name in path {
             let node = match at.children.entry(name.clone()) {
-                Entry::Occupied(there) => there.into_mut(),
+                Entry::Occupied(existing) => existing.into_mut(),
                 Entry::Vacant(free) => {
                     self.folders += 1;
-                    if self.folders > most {
+                    if self.folders > max {
                         return Err(invalid(format_args!(
-                            "has more than {most} folders in all layers"
+                            "has more than {max} folders in all layers"
                         )));
                     }
                     free.insert(Node {
@@ -363,11 +363,11 @@ impl<'a> Root<'a> {
         Ok(())
     }
 
-    /// Makes the folders of a path that are not on the disk yet.
-    fn make_way(&mut self, path: &[String]) -> Result<(), BundleError> {
-        let (mut at, mut place) = (&mut self.top, self.place.clone());
+    /// Creates the folders of a path that do not exist on the disk yet.
+    fn make_parents(&mut self, path: &[String]) -> Result<(), BundleError> {
+        let (mut at, mut disk_path) = (&mut self.top, self.disk_path.clone());
         for name in path {
-            place.push(name);
+            disk_path.push(name);
             let Some(Node {
                 kind: Kind::Folder(folder),
                 ..
@@ -375,31 +375,31 @@ impl<'a> Root<'a> {
             else {
                 return Err(invalid(format_args!("needs {name:?} to be a folder")));
             };
-            if !folder.is_made {
-                make_folder(&place)?;
-                folder.is_made = true;
+            if !folder.is_created {
+                make_folder(&disk_path)?;
+                folder.is_created = true;
             }
             at = folder;
         }
         Ok(())
     }
 
-    /// Completes the root when all layers are applied: what the sandbox needs, the folders that hold no file, and
-    /// the links. Returns the agent's folder, which is one, with a file `manifest`: no link leads to either.
+    /// Completes the root after all layers: creates the sandbox's files and folders, the empty folders, and the links.
+    /// Returns the agent's folder, which is a real folder with a real file `manifest`; neither is a link.
     pub(super) fn finish(mut self, manifest: &str) -> Result<PathBuf, BundleError> {
         self.begin_layer();
         let agent = match self.top.children.get(AGENT).map(|node| &node.kind) {
             Some(Kind::Folder(agent)) => agent,
             Some(Kind::File | Kind::Link(_) | Kind::Special) => {
                 return Err(invalid(format_args!(
-                    "has something else than a folder as /{AGENT}; {}",
-                    what_to_write()
+                    "has something other than a folder as /{AGENT}; {}",
+                    dockerfile_hint()
                 )));
             }
             None => {
                 return Err(invalid(format_args!(
                     "has no /{AGENT}; {}",
-                    what_to_write()
+                    dockerfile_hint()
                 )));
             }
         };
@@ -407,90 +407,90 @@ impl<'a> Root<'a> {
             Some(Kind::File) => {}
             Some(Kind::Folder(_) | Kind::Link(_) | Kind::Special) => {
                 return Err(invalid(format_args!(
-                    "has something else than a file as /{AGENT}/{manifest}"
+                    "has something other than a file as /{AGENT}/{manifest}"
                 )));
             }
             None => {
                 return Err(invalid(format_args!(
                     "has no /{AGENT}/{manifest}; {}",
-                    what_to_write()
+                    dockerfile_hint()
                 )));
             }
         }
         if let Some(Kind::File | Kind::Link(_) | Kind::Special) =
             self.top.children.get("etc").map(|node| &node.kind)
         {
-            return Err(invalid("has something else than a folder as /etc"));
+            return Err(invalid("has something other than a folder as /etc"));
         }
         for (name, content) in SANDBOX_FILES {
-            let spot = Spot {
+            let location = Location {
                 folder: vec!["etc".to_owned()],
                 name: name.to_owned(),
             };
-            let place = self.put(name, &spot, Kind::File)?;
-            write_new(name, &place, 0o644, &mut content.as_bytes(), self.budget)?;
+            let disk_path = self.put(name, &location, Kind::File)?;
+            write_new(name, &disk_path, 0o644, &mut content.as_bytes(), self.budget)?;
         }
         for name in SANDBOX_FOLDERS {
-            let spot = Spot {
+            let location = Location {
                 folder: Vec::new(),
                 name: name.to_owned(),
             };
-            self.clear(name, &spot)?;
+            self.clear(name, &location)?;
             self.add_folders(&[name.to_owned()])?;
         }
-        make_folders(&mut self.top, &self.place, self.budget)?;
-        make_links(&self.top, &self.place)?;
-        Ok(self.place.join(AGENT))
+        make_folders(&mut self.top, &self.disk_path, self.budget)?;
+        make_links(&self.top, &self.disk_path)?;
+        Ok(self.disk_path.join(AGENT))
     }
 }
 
 impl Sink for Root<'_> {
-    /// A folder that is there stays as it is: all have one mode.
+    /// An existing folder stays unchanged, because all folders have the same mode.
     fn folder(&mut self, entry: &str, _mode: u32) -> Result<(), BundleError> {
-        let Some(spot) = self.spot_for(entry)? else {
+        let Some(location) = self.location_for(entry)? else {
             return Ok(());
         };
         let layer = self.layer;
-        let mut path = spot.folder.clone();
-        path.push(spot.name.clone());
-        if let Some(parent) = self.top.at_mut(&spot.folder)
-            && let Some(node) = parent.children.get_mut(&spot.name)
+        let mut path = location.folder.clone();
+        path.push(location.name.clone());
+        if let Some(parent) = self.top.at_mut(&location.folder)
+            && let Some(node) = parent.children.get_mut(&location.name)
             && matches!(node.kind, Kind::Folder(_))
         {
             node.layer = layer;
             return Ok(());
         }
-        self.clear(entry, &spot)?;
+        self.clear(entry, &location)?;
         self.add_folders(&path)
     }
 
-    /// Set-id bits are left out: they would do nothing in the sandbox, and many images have some.
+    /// Set-id bits are dropped: they have no effect in the sandbox, and many images have some.
     fn file(&mut self, entry: &str, mode: u32, content: &mut dyn Read) -> Result<(), BundleError> {
-        let Some(spot) = self.spot_for(entry)? else {
+        let Some(location) = self.location_for(entry)? else {
             return Ok(());
         };
-        let place = self.put(entry, &spot, Kind::File)?;
-        write_new(entry, &place, mode, content, self.budget)
+        let disk_path = self.put(entry, &location, Kind::File)?;
+        write_new(entry, &disk_path, mode, content, self.budget)
     }
 
-    /// Made by [`Root::finish`]; it may lead anywhere, for it is followed inside of the sandbox only.
+    /// Created by [`Root::finish`]. It may point anywhere, because it is followed only inside of the sandbox.
     fn link(&mut self, entry: &str, target: &str) -> Result<(), BundleError> {
-        let Some(spot) = self.spot_for(entry)? else {
+        let Some(location) = self.location_for(entry)? else {
             return Ok(());
         };
         check_target(entry, target)?;
-        self.put(entry, &spot, Kind::Link(target.to_owned()))?;
+        self.put(entry, &location, Kind::Link(target.to_owned()))?;
         Ok(())
     }
 
-    /// Another name of a file or link of this layer or one below. The folders of both names are resolved, the
-    /// last parts are not followed.
+    /// Adds another name of a file or link of this layer or a layer below. The folders of both names are resolved; the
+    /// last components are not followed.
     fn hard_link(&mut self, entry: &str, target: &str) -> Result<(), BundleError> {
-        let Some(spot) = self.spot_for(entry)? else {
+        let Some(location) = self.location_for(entry)? else {
             return Ok(());
         };
         let shown: String = target.chars().take(200).collect();
-        let no_file = || {
+        let missing_file = || {
             invalid_entry(
                 entry,
                 format_args!(
@@ -498,41 +498,41 @@ impl Sink for Root<'_> {
                 ),
             )
         };
-        let existing = self.spot(entry, target)?.ok_or_else(no_file)?;
-        let folder = self.top.at(&existing.folder).ok_or_else(no_file)?;
+        let existing = self.location(entry, target)?.ok_or_else(missing_file)?;
+        let folder = self.top.at(&existing.folder).ok_or_else(missing_file)?;
         let kind = match folder.children.get(&existing.name).map(|node| &node.kind) {
             Some(Kind::File) => Kind::File,
             Some(Kind::Link(target)) => Kind::Link(target.clone()),
             Some(Kind::Special) => Kind::Special,
-            Some(Kind::Folder(_)) | None => return Err(no_file()),
+            Some(Kind::Folder(_)) | None => return Err(missing_file()),
         };
-        // Archivers that are told of a file twice write it so.
-        if existing.path() == spot.path() {
+        // Archivers write a hard link to itself if a file is given twice.
+        if existing.path() == location.path() {
             return Ok(());
         }
-        // What is at its own place would go first.
-        if format!("{}/", existing.path()).starts_with(&format!("{}/", spot.path())) {
+        // The link would first remove its own target.
+        if format!("{}/", existing.path()).starts_with(&format!("{}/", location.path())) {
             return Err(invalid_entry(
                 entry,
                 format_args!("is a hard link to what it replaces: {shown:?}"),
             ));
         }
         let is_file = matches!(kind, Kind::File);
-        let place = self.put(entry, &spot, kind)?;
+        let disk_path = self.put(entry, &location, kind)?;
         if is_file {
-            let existing = self.on_disk(&existing.folder).join(&existing.name);
-            write_name(entry, &existing, &place)?;
+            let existing = self.path_on_disk(&existing.folder).join(&existing.name);
+            add_hard_link(entry, &existing, &disk_path)?;
         }
         Ok(())
     }
 
-    /// Devices, pipes and sockets are left out: in the sandbox none could be opened. What an overlay's own
-    /// folder marks as hidden is no part of a layer as engines save it.
+    /// Devices, pipes and sockets are left out, because they could not be opened in the sandbox. Whiteouts in the
+    /// format of overlayfs are refused, because layers saved by container engines do not contain them.
     fn special(&mut self, entry: &str, special: Special) -> Result<(), BundleError> {
-        let Some(spot) = self.spot_for(entry)? else {
+        let Some(location) = self.location_for(entry)? else {
             return Ok(());
         };
-        let top = spot.folder.first().unwrap_or(&spot.name);
+        let top = location.folder.first().unwrap_or(&location.name);
         if special == Special::NullDevice && !SANDBOX_FOLDERS.contains(&top.as_str()) {
             return Err(invalid_entry(
                 entry,
@@ -540,7 +540,7 @@ impl Sink for Root<'_> {
                  what `docker save` writes",
             ));
         }
-        self.put(entry, &spot, Kind::Special)?;
+        self.put(entry, &location, Kind::Special)?;
         Ok(())
     }
 }
@@ -551,29 +551,29 @@ fn parts(path: &str) -> Vec<String> {
     path.rsplit('/').filter_map(part).collect()
 }
 
-/// Makes the folders in `folder` that are not on the disk yet.
-fn make_folders(folder: &mut Folder, place: &Path, budget: &Budget<'_>) -> Result<(), BundleError> {
+/// Creates the subfolders of `folder` that do not exist on the disk yet.
+fn make_folders(folder: &mut Folder, dir: &Path, budget: &Budget<'_>) -> Result<(), BundleError> {
     for (name, node) in &mut folder.children {
         if let Kind::Folder(folder) = &mut node.kind {
-            let place = place.join(name);
-            if !folder.is_made {
+            let dir = dir.join(name);
+            if !folder.is_created {
                 budget.check()?;
-                make_folder(&place)?;
-                folder.is_made = true;
+                make_folder(&dir)?;
+                folder.is_created = true;
             }
-            make_folders(folder, &place, budget)?;
+            make_folders(folder, &dir, budget)?;
         }
     }
     Ok(())
 }
 
-fn make_links(folder: &Folder, place: &Path) -> Result<(), BundleError> {
+fn make_links(folder: &Folder, disk_path: &Path) -> Result<(), BundleError> {
     for (name, node) in &folder.children {
-        let place = place.join(name);
+        let disk_path = disk_path.join(name);
         match &node.kind {
-            Kind::Folder(folder) => make_links(folder, &place)?,
+            Kind::Folder(folder) => make_links(folder, &disk_path)?,
             Kind::File | Kind::Special => {}
-            Kind::Link(target) => symlink(target, place)?,
+            Kind::Link(target) => symlink(target, disk_path)?,
         }
     }
     Ok(())

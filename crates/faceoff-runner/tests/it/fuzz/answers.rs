@@ -1,5 +1,5 @@
-use super::{assert_met, fuzz, mutation::mutate};
-use faceoff_types::{ACTION_LIMIT, AgentFaultKind, Interpolation, harmless};
+use super::{assert_outcomes, fuzz, mutation::mutate};
+use faceoff_types::{ACTION_LIMIT, AgentFaultKind, Interpolation, escape_unprintable};
 use faceoff_wire::{
     MAX_LINE_BYTES,
     answer::{parse_act, parse_ready, parse_reset_ready},
@@ -51,33 +51,33 @@ fn act(interpolation: Interpolation) -> String {
     )
 }
 
-/// What is told of a fault is text that can be shown.
+/// The kind of a fault, whose message must be printable.
 fn label(fault: &AgentFaultKind) -> String {
-    let told = fault.to_string();
-    assert_eq!(harmless(&told), told);
-    assert!(told.chars().count() < 1000, "{told}");
+    let message = fault.to_string();
+    assert_eq!(escape_unprintable(&message), message);
+    assert!(message.chars().count() < 1000, "{message}");
     let name = format!("{fault:?}");
     name.split([' ', '{']).next().unwrap().to_owned()
 }
 
 #[test]
-fn answers_are_whole_or_the_agents_fault() {
+fn answers_are_valid_or_an_agent_fault() {
     let codes: Vec<_> = [1, 2, 3, 4, 5, -1]
         .map(Some)
         .into_iter()
         .chain([None])
         .map(|code| Interpolation::from_code(code).unwrap())
         .collect();
-    let met = fuzz("answers", 60_000, |draws| {
-        let interpolation = *draws.pick(&codes);
-        let kind = draws.below(6);
+    let outcomes = fuzz("answers", 60_000, |rng| {
+        let interpolation = *rng.pick(&codes);
+        let kind = rng.below(6);
         let mut line = match kind {
             0 => br#"{"type":"ready","protocol":1,"interpolation":3,"name":"a","version":"1"}"#
                 .to_vec(),
             1 => br#"{"type":"ready","episode":7}"#.to_vec(),
             _ => act(interpolation).into_bytes(),
         };
-        mutate(&mut line, &WORDS, draws);
+        mutate(&mut line, &WORDS, rng);
         assert!(quote_line(&line).chars().count() <= 400);
         let outcome = match kind {
             0 => parse_ready(&line).map(drop),
@@ -95,7 +95,7 @@ fn answers_are_whole_or_the_agents_fault() {
         match outcome {
             Ok(()) => {
                 assert!(line.len() <= MAX_LINE_BYTES);
-                // Whatever else it holds: this much another reader agrees to, unless it overflows.
+                // Another JSON reader must agree on the type, unless a number overflows.
                 if let Ok(value) = serde_json::from_slice::<Value>(&line) {
                     assert_eq!(value["type"], if kind < 2 { "ready" } else { "act" });
                 }
@@ -104,8 +104,8 @@ fn answers_are_whole_or_the_agents_fault() {
             Err(fault) => label(&fault),
         }
     });
-    assert_met(
-        &met,
+    assert_outcomes(
+        &outcomes,
         &[
             "accepted",
             "NotJson",

@@ -1,4 +1,4 @@
-use super::{assert_met, draws::Draws, fuzz, mutation::mutate};
+use super::{assert_outcomes, rng::Rng, fuzz, mutation::mutate};
 use crate::archives::{MANIFEST, Tar, write};
 use faceoff_runner::bundle::{BundleError, BundleLimits, unpack};
 use flate2::{Compression, write::GzEncoder};
@@ -68,8 +68,8 @@ struct Entry {
     content: Vec<u8>,
 }
 
-/// A valid bundle's entries, of which some become others.
-fn entries(draws: &mut Draws) -> Vec<Entry> {
+/// Entries of a valid bundle, with mutations.
+fn entries(rng: &mut Rng) -> Vec<Entry> {
     let file = |name: &str, content: &[u8]| Entry {
         kind: EntryType::Regular,
         name: name.to_owned(),
@@ -77,16 +77,16 @@ fn entries(draws: &mut Draws) -> Vec<Entry> {
         target: String::new(),
         content: content.to_vec(),
     };
-    let top = *draws.pick(&["", "top/"]);
+    let top = *rng.pick(&["", "top/"]);
     let mut entries = vec![
         file(&format!("{top}agent.toml"), MANIFEST.as_bytes()),
         file(&format!("{top}agent.py"), b"print()"),
         file(&format!("{top}weights/w.bin"), &[7; 600]),
     ];
-    for _ in 0..draws.below(4) {
-        let at = draws.below(entries.len() + 1);
-        let mut entry = file(draws.pick::<&str>(&NAMES), b"x");
-        entry.kind = *draws.pick(&[
+    for _ in 0..rng.below(4) {
+        let at = rng.below(entries.len() + 1);
+        let mut entry = file(rng.pick::<&str>(&NAMES), b"x");
+        entry.kind = *rng.pick(&[
             EntryType::Regular,
             EntryType::Directory,
             EntryType::Symlink,
@@ -98,33 +98,33 @@ fn entries(draws: &mut Draws) -> Vec<Entry> {
             EntryType::GNULongName,
             EntryType::GNUSparse,
         ]);
-        entry.mode = *draws.pick(&MODES);
-        entry.target = draws.pick(&TARGETS).to_string();
-        match draws.below(12) {
-            0 => entry.name = "n".repeat(draws.below(1200)),
-            1 => entry.content = vec![0; draws.below(30_000)],
+        entry.mode = *rng.pick(&MODES);
+        entry.target = rng.pick(&TARGETS).to_string();
+        match rng.below(12) {
+            0 => entry.name = "n".repeat(rng.below(1200)),
+            1 => entry.content = vec![0; rng.below(30_000)],
             2 => entry.content = b"20 path=../escape\n20 linkpath=/etc/x\n".to_vec(),
             3 => entry.name = format!("{top}agent.toml"),
-            4 => mutate(&mut entry.content, &["name = 3"], draws),
+            4 => mutate(&mut entry.content, &["name = 3"], rng),
             _ => {}
         }
         entries.insert(at, entry);
     }
-    if draws.once_in(10) {
-        entries[0].kind = *draws.pick(&[EntryType::Directory, EntryType::Symlink]);
-        entries[0].target = draws.pick(&TARGETS).to_string();
+    if rng.once_in(10) {
+        entries[0].kind = *rng.pick(&[EntryType::Directory, EntryType::Symlink]);
+        entries[0].target = rng.pick(&TARGETS).to_string();
     }
-    if draws.once_in(12) {
+    if rng.once_in(12) {
         entries.extend((0..14).map(|i| file(&format!("many/{i}"), b"")));
     }
-    if draws.once_in(12) {
+    if rng.once_in(12) {
         entries.extend((0..14).map(|i| Entry {
             kind: EntryType::Directory,
             ..file(&format!("folders/{i}"), b"")
         }));
     }
-    if draws.once_in(8) {
-        entries.remove(draws.below(entries.len()));
+    if rng.once_in(8) {
+        entries.remove(rng.below(entries.len()));
     }
     entries
 }
@@ -138,7 +138,7 @@ fn tar_of(entries: &[Entry]) -> Vec<u8> {
             target,
             content,
         } = entry;
-        // The fields of a plain header; what is longer needs a header of its own, as in `content`.
+        // The name must fit into a plain header; longer names need an extension header, as in `content`.
         let name: String = name.chars().take(80).filter(|c| c.is_ascii()).collect();
         match kind {
             EntryType::GNULongName => {
@@ -157,11 +157,11 @@ fn tar_of(entries: &[Entry]) -> Vec<u8> {
     tar.bytes()
 }
 
-fn zip_of(entries: &[Entry], draws: &mut Draws) -> Vec<u8> {
+fn zip_of(entries: &[Entry], rng: &mut Rng) -> Vec<u8> {
     let mut zip = ZipWriter::new(Cursor::new(Vec::new()));
     for entry in entries {
         let options = SimpleFileOptions::default().unix_permissions(entry.mode);
-        // The writer refuses some of what a forger would write: those entries are left out.
+        // The zip library refuses to write some malicious entries; they are left out.
         let _ = match entry.kind {
             EntryType::Directory => zip.add_directory(&*entry.name, options),
             EntryType::Symlink => zip.add_symlink(&*entry.name, &*entry.target, options),
@@ -171,20 +171,20 @@ fn zip_of(entries: &[Entry], draws: &mut Draws) -> Vec<u8> {
         };
     }
     let mut bytes = zip.finish().unwrap().into_inner();
-    if draws.once_in(3) {
-        mutate(&mut bytes, &["PK\u{1}\u{2}", "../", "/"], draws);
+    if rng.once_in(3) {
+        mutate(&mut bytes, &["PK\u{1}\u{2}", "../", "/"], rng);
     }
     bytes
 }
 
-fn archive(draws: &mut Draws) -> Vec<u8> {
-    let entries = entries(draws);
-    let mut bytes = match draws.below(3) {
-        0 => return zip_of(&entries, draws),
+fn archive(rng: &mut Rng) -> Vec<u8> {
+    let entries = entries(rng);
+    let mut bytes = match rng.below(3) {
+        0 => return zip_of(&entries, rng),
         kind => {
             let mut tar = tar_of(&entries);
-            if draws.once_in(6) {
-                mutate(&mut tar, &["ustar", "0000644"], draws);
+            if rng.once_in(6) {
+                mutate(&mut tar, &["ustar", "0000644"], rng);
             }
             if kind == 1 {
                 let mut encoder = GzEncoder::new(Vec::new(), Compression::fast());
@@ -195,13 +195,13 @@ fn archive(draws: &mut Draws) -> Vec<u8> {
             }
         }
     };
-    if draws.once_in(6) {
-        mutate(&mut bytes, &["\u{1f}"], draws);
+    if rng.once_in(6) {
+        mutate(&mut bytes, &["\u{1f}"], rng);
     }
     bytes
 }
 
-/// Everything that was unpacked lies inside, is no more than allowed, and has harmless modes.
+/// Checks that all unpacked files are inside and have harmless modes; adds up their bytes.
 fn check_tree(root: &Path, folder: &Path, bytes: &mut u64) {
     for entry in fs::read_dir(folder).unwrap() {
         let entry = entry.unwrap();
@@ -225,11 +225,11 @@ fn check_tree(root: &Path, folder: &Path, bytes: &mut u64) {
 }
 
 #[test]
-fn an_archive_is_unpacked_inside_or_refused_by_the_teams_fault() {
+fn archive_is_unpacked_inside_or_refused_as_invalid() {
     let scratch = tempfile::tempdir().unwrap();
     let root = scratch.path().canonicalize().unwrap();
-    let met = fuzz("archives", 4000, |draws| {
-        let bytes = archive(draws);
+    let outcomes = fuzz("archives", 4000, |rng| {
+        let bytes = archive(rng);
         let packed = write(&root, "upload", &bytes);
         let into = root.join("out");
         let outcome = unpack(&packed, &into, &LIMITS, &|| false);
@@ -241,19 +241,19 @@ fn an_archive_is_unpacked_inside_or_refused_by_the_teams_fault() {
                 assert!(unpacked <= LIMITS.unpacked_bytes);
                 "accepted".to_owned()
             }
-            Err(BundleError::Invalid(told)) => {
-                // Without the entry's name.
-                let told = match told.split_once("\" ") {
+            Err(BundleError::Invalid(message)) => {
+                // The label does not contain the entry's name.
+                let message = match message.split_once("\" ") {
                     Some((entry, problem)) if entry.starts_with("entry") => problem.to_owned(),
-                    _ => told,
+                    _ => message,
                 };
-                let mut label: Vec<char> = told.chars().collect();
+                let mut label: Vec<char> = message.chars().collect();
                 label.dedup_by(|a, b| a.is_ascii_digit() && b.is_ascii_digit());
                 let shown = |c: char| if c.is_ascii_digit() { '#' } else { c };
                 label.into_iter().map(shown).take(24).collect()
             }
             Err(error @ (BundleError::Io(_) | BundleError::Cancelled)) => {
-                panic!("our fault: {error}")
+                panic!("platform fault: {error}")
             }
         };
         if into.exists() {
@@ -261,8 +261,8 @@ fn an_archive_is_unpacked_inside_or_refused_by_the_teams_fault() {
         }
         label
     });
-    assert_met(
-        &met,
+    assert_outcomes(
+        &outcomes,
         &[
             "accepted",
             "has an absolute path",

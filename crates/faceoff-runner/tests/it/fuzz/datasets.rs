@@ -1,11 +1,11 @@
-use super::{assert_met, draws::Draws, fuzz, mutation::mutate};
+use super::{assert_outcomes, rng::Rng, fuzz, mutation::mutate};
 use faceoff_dataset::{
     Dataset, DatasetError, Recorder, ShardFolder, ShardReport, assemble,
     verify::{VerifyError, verify},
 };
-use faceoff_episode::{Answered, Arena, Course, StepSink};
+use faceoff_episode::{AnswerTiming, Arena, RunningEpisode, StepSink};
 use faceoff_types::{Interpolation, Phase, Profile, Ruleset, Seed, Task};
-use faceoff_wire::work::{EvaluationMeta, ShardSpec};
+use faceoff_wire::job::{EvaluationMeta, ShardSpec};
 use serde_json::{Value, json};
 use std::{
     collections::BTreeMap,
@@ -35,8 +35,8 @@ const WORDS: [&str; 16] = [
     "\u{202e}",
 ];
 
-/// The dataset of two short episodes.
-fn recorded(dir: &Path) {
+/// Records a dataset of two short episodes.
+fn record_dataset(dir: &Path) {
     let seed = Seed::from_number(5);
     let spec = ShardSpec {
         ruleset: Ruleset::CURRENT,
@@ -52,7 +52,7 @@ fn recorded(dir: &Path) {
     let shard = dir.join("shard");
     let folder = ShardFolder::create(&shard).unwrap();
     let mut recorder = Recorder::create(&folder, spec.task).unwrap();
-    let arena = Arena::by(
+    let arena = Arena::with_ruleset(
         spec.ruleset,
         spec.profile,
         &spec.perturbations,
@@ -62,16 +62,16 @@ fn recorded(dir: &Path) {
     let mut outcomes = Vec::new();
     for episode in spec.episodes.clone() {
         let interpolation = Some(Interpolation::Linear);
-        let mut course = Course::begin(&arena, spec.task, episode, interpolation, &mut recorder);
+        let mut course = RunningEpisode::begin(&arena, spec.task, episode, interpolation, &mut recorder);
         let outcome = loop {
             let question = course.question().unwrap();
             if question.step == 30 {
                 let line = Some("oops".to_owned());
                 let fault = faceoff_types::AgentFaultKind::NonFinite;
-                break course.failed(Phase::Step, fault, line);
+                break course.outcome_after_fault(Phase::Step, fault, line);
             }
             let action = question.observation[6..13].to_vec();
-            let answered = Answered {
+            let answered = AnswerTiming {
                 computation_time_s: 0.001,
                 host_time_s: 0.0,
                 cpu_time_s: None,
@@ -102,14 +102,14 @@ fn recorded(dir: &Path) {
     assemble(&meta, &[shard], &dir.join("dataset.zip"), None).unwrap();
 }
 
-/// The files of a dataset, or of a game's recording, by name, and the archive.
-pub(super) struct Valid {
+/// A dataset or a game's recording: its files by name, and its archive.
+pub(super) struct ValidRecording {
     files: BTreeMap<String, Vec<u8>>,
     archive: Vec<u8>,
 }
 
-impl Valid {
-    pub(super) fn of(archive: &Path, scratch: &Path) -> Self {
+impl ValidRecording {
+    pub(super) fn read(archive: &Path, scratch: &Path) -> Self {
         let folder = scratch.join("unpacked");
         ZipArchive::new(File::open(archive).unwrap())
             .unwrap()
@@ -130,28 +130,28 @@ impl Valid {
         }
     }
 
-    /// Writes a changed one and returns what is to be opened.
-    pub(super) fn changed(&self, dir: &Path, draws: &mut Draws) -> std::path::PathBuf {
-        if draws.once_in(3) {
+    /// Writes a mutation and returns the path to open.
+    pub(super) fn write_mutated(&self, dir: &Path, rng: &mut Rng) -> std::path::PathBuf {
+        if rng.once_in(3) {
             let mut archive = self.archive.clone();
-            mutate(&mut archive, &WORDS, draws);
+            mutate(&mut archive, &WORDS, rng);
             let path = dir.join("dataset.zip");
             fs::write(&path, archive).unwrap();
             return path;
         }
         let mut files = self.files.clone();
         let names: Vec<_> = files.keys().cloned().collect();
-        let name = draws.pick(&names);
-        match draws.below(10) {
+        let name = rng.pick(&names);
+        match rng.below(10) {
             0 => drop(files.remove(name)),
             1 => drop(files.insert("extra".to_owned(), Vec::new())),
-            _ => mutate(files.get_mut(name).unwrap(), &WORDS, draws),
+            _ => mutate(files.get_mut(name).unwrap(), &WORDS, rng),
         }
-        // A forger makes the hashes fit.
+        // Usually the hashes are updated, as an attacker would do.
         let manifest = files.get("manifest.json").map(Vec::as_slice);
         let manifest = manifest.map(serde_json::from_slice::<Value>);
         if let Some(Ok(mut manifest)) = manifest
-            && !draws.once_in(4)
+            && !rng.once_in(4)
         {
             let listed = manifest.get_mut("files").and_then(Value::as_object_mut);
             for (name, digest) in listed.into_iter().flatten() {
@@ -172,9 +172,9 @@ impl Valid {
     }
 }
 
-/// Reads all of it, as far as it goes.
-fn read(path: &Path, draws: &mut Draws) -> Result<(), VerifyError> {
-    let dataset = if draws.once_in(2) {
+/// Reads everything until the first error.
+fn read(path: &Path, rng: &mut Rng) -> Result<(), VerifyError> {
+    let dataset = if rng.once_in(2) {
         Dataset::open(path)?
     } else {
         Dataset::open_unread(path)?
@@ -182,30 +182,30 @@ fn read(path: &Path, draws: &mut Draws) -> Result<(), VerifyError> {
     dataset.results()?;
     dataset.calibration()?;
     dataset.episodes()?;
-    let episode = *draws.pick(&[0, 1, 7]);
-    dataset.episode(*draws.pick(&[Task::Defend, Task::Hit]), episode, None)?;
+    let episode = *rng.pick(&[0, 1, 7]);
+    dataset.episode(*rng.pick(&[Task::Defend, Task::Hit]), episode, None)?;
     verify(&dataset, NonZero::<usize>::MIN, &|| ()).map(drop)
 }
 
 #[test]
-fn a_dataset_is_read_or_refused() {
+fn dataset_is_read_or_refused() {
     let scratch = TempDir::new().unwrap();
-    recorded(scratch.path());
+    record_dataset(scratch.path());
     let fixture = concat!(
         env!("CARGO_MANIFEST_DIR"),
         "/../../tests/fixtures/dataset-layout-2.zip"
     );
     let valid = [
-        Valid::of(&scratch.path().join("dataset.zip"), scratch.path()),
-        Valid::of(Path::new(fixture), scratch.path()),
+        ValidRecording::read(&scratch.path().join("dataset.zip"), scratch.path()),
+        ValidRecording::read(Path::new(fixture), scratch.path()),
     ];
-    let met = fuzz("datasets", 1500, |draws| {
+    let outcomes = fuzz("datasets", 1500, |rng| {
         let dir = scratch.path().join("changed");
         fs::create_dir(&dir).unwrap();
-        // The larger one is simulated now and then only.
-        let valid = &valid[usize::from(draws.once_in(20))];
-        let path = valid.changed(&dir, draws);
-        let label = match read(&path, draws) {
+        // The larger dataset is simulated only occasionally.
+        let valid = &valid[usize::from(rng.once_in(20))];
+        let path = valid.write_mutated(&dir, rng);
+        let label = match read(&path, rng) {
             Ok(()) => "read",
             Err(VerifyError::Differs(_)) => "differs",
             Err(VerifyError::Dataset(DatasetError::Io(_))) => "io",
@@ -228,5 +228,5 @@ fn a_dataset_is_read_or_refused() {
         "altered",
         "absent",
     ];
-    assert_met(&met, &kinds);
+    assert_outcomes(&outcomes, &kinds);
 }

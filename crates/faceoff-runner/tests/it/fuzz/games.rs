@@ -1,10 +1,10 @@
-use super::{assert_met, datasets::Valid, draws::Draws, fuzz};
+use super::{assert_outcomes, datasets::ValidRecording, rng::Rng, fuzz};
 use faceoff_dataset::{
     DatasetError,
     game::{GAME_FILE, GameRecorder, GameRecording, RecordedGame, verify_game},
     verify::VerifyError,
 };
-use faceoff_episode::{Answered, Arena, Entry, GameCourse, Response, SideFault};
+use faceoff_episode::{AnswerTiming, Arena, RallyEntry, RunningGame, Response, SideFault};
 use faceoff_types::{
     AgentFaultKind, GameLimits, Interpolation, Profile, Ruleset, Seed, Side, SlotTiming,
 };
@@ -12,8 +12,8 @@ use faceoff_wire::game::{GameCalibration, GameSpec};
 use std::{fs, path::Path};
 use tempfile::TempDir;
 
-/// A short game, in which an answer is late and a side has a fault.
-fn recorded(out: &Path) {
+/// Records a short game with a late answer and a fault of one side.
+fn record_game(out: &Path) {
     let seed = Seed::from_number(5);
     let spec = GameSpec {
         ruleset: Ruleset::CURRENT,
@@ -27,9 +27,9 @@ fn recorded(out: &Path) {
     };
     let arena = Arena::new(spec.profile, spec.seed, spec.mismatch_seed);
     let recorder = GameRecorder::create(&out.join("tables")).unwrap();
-    let mut course = GameCourse::begin(&arena, spec.steps, spec.limits.clone(), recorder);
+    let mut course = RunningGame::begin(&arena, spec.steps, spec.limits.clone(), recorder);
     while course.end().is_none() {
-        let entries = Side::BOTH.map(|side| Entry::Plays {
+        let entries = Side::BOTH.map(|side| RallyEntry::Ready {
             startup_s: course.needs_start(side).then_some(0.25),
             interpolation: Interpolation::Linear,
             reset_s: 0.125,
@@ -42,7 +42,7 @@ fn recorded(out: &Path) {
                 Some(question.observation[6..13].to_vec())
             });
             let responses = Side::BOTH.map(|side| {
-                let answered = Answered {
+                let answered = AnswerTiming {
                     computation_time_s: if step == 7 { 0.03125 } else { 0.001953125 },
                     host_time_s: 0.0,
                     cpu_time_s: None,
@@ -54,15 +54,15 @@ fn recorded(out: &Path) {
                             kind: AgentFaultKind::NonFinite,
                             line: Some("oops".to_owned()),
                         },
-                        answered,
+                        timing: answered,
                     },
-                    Some(action) => Response::Answer { action, answered },
+                    Some(action) => Response::Answer { action, timing: answered },
                 }
             });
             course.answer(responses).unwrap();
         }
     }
-    let recorded = RecordedGame {
+    let record_game = RecordedGame {
         spec: &spec,
         agents: &["one".to_owned(), "other".to_owned()],
         played: course.finish(),
@@ -71,10 +71,10 @@ fn recorded(out: &Path) {
         },
         logs: &["log of one\n".to_owned(), "log of the other\n".to_owned()],
     };
-    recorded.write(out).unwrap();
+    record_game.write(out).unwrap();
 }
 
-/// Reads all of it, as far as it goes.
+/// Reads everything until the first error.
 fn read(path: &Path) -> Result<(), VerifyError> {
     GameRecording::is_at(path)?;
     let recording = GameRecording::open(path)?;
@@ -83,8 +83,8 @@ fn read(path: &Path) -> Result<(), VerifyError> {
     verify_game(&recording, &|_| ()).map(drop)
 }
 
-fn changed(valid: &Valid, dir: &Path, draws: &mut Draws) -> &'static str {
-    match read(&valid.changed(dir, draws)) {
+fn read_mutated(valid: &ValidRecording, dir: &Path, rng: &mut Rng) -> &'static str {
+    match read(&valid.write_mutated(dir, rng)) {
         Ok(()) => "read",
         Err(VerifyError::Differs(_)) => "differs",
         Err(VerifyError::Dataset(DatasetError::Io(_))) => "io",
@@ -98,17 +98,17 @@ fn changed(valid: &Valid, dir: &Path, draws: &mut Draws) -> &'static str {
 }
 
 #[test]
-fn a_games_recording_is_read_or_refused() {
+fn game_recording_is_read_or_refused() {
     let scratch = TempDir::new().unwrap();
-    recorded(scratch.path());
-    let valid = Valid::of(&scratch.path().join(GAME_FILE), scratch.path());
-    let met = fuzz("games", 800, |draws| {
+    record_game(scratch.path());
+    let valid = ValidRecording::read(&scratch.path().join(GAME_FILE), scratch.path());
+    let outcomes = fuzz("games", 800, |rng| {
         let dir = scratch.path().join("changed");
         fs::create_dir(&dir).unwrap();
-        let label = changed(&valid, &dir, draws);
+        let label = read_mutated(&valid, &dir, rng);
         fs::remove_dir_all(&dir).unwrap();
         label.to_owned()
     });
     let kinds = ["read", "differs", "unreadable", "foreign", "altered"];
-    assert_met(&met, &kinds);
+    assert_outcomes(&outcomes, &kinds);
 }

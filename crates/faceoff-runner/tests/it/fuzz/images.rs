@@ -1,4 +1,4 @@
-use super::{assert_met, draws::Draws, fuzz, mutation::mutate};
+use super::{assert_outcomes, rng::Rng, fuzz, mutation::mutate};
 use crate::{
     archives::{Tar, write},
     image_archives::{Packing, TestImage, agent_layer, host_folder},
@@ -14,7 +14,7 @@ const LIMITS: BundleLimits = BundleLimits {
     unpack_s: 600,
 };
 
-/// Few, so that entries and layers meet.
+/// Few names, so that entries of different layers collide.
 const NAMES: [&str; 32] = [
     "a",
     "a/",
@@ -50,7 +50,7 @@ const NAMES: [&str; 32] = [
     "",
 ];
 
-/// `HOST` becomes a folder of the host's.
+/// `HOST` is replaced by a folder of the host.
 const TARGETS: [&str; 16] = [
     "a",
     "b",
@@ -70,11 +70,11 @@ const TARGETS: [&str; 16] = [
     "",
 ];
 
-fn layer(draws: &mut Draws, host: &str) -> Tar {
-    (0..draws.below(10)).fold(Tar::new(), |tar, _| {
-        let name = *draws.pick::<&str>(&NAMES);
-        let target = draws.pick::<&str>(&TARGETS).replace("HOST", host);
-        let kind = *draws.pick(&[
+fn layer(rng: &mut Rng, host: &str) -> Tar {
+    (0..rng.below(10)).fold(Tar::new(), |tar, _| {
+        let name = *rng.pick::<&str>(&NAMES);
+        let target = rng.pick::<&str>(&TARGETS).replace("HOST", host);
+        let kind = *rng.pick(&[
             EntryType::Regular,
             EntryType::Regular,
             EntryType::Directory,
@@ -84,17 +84,17 @@ fn layer(draws: &mut Draws, host: &str) -> Tar {
             EntryType::Block,
             EntryType::Char,
         ]);
-        // Whiteouts would be rare otherwise; devices refuse the layer.
+        // Makes whiteouts more frequent, and devices, which are refused, less frequent.
         let kind = match kind {
-            _ if name.contains(".wh.") && !draws.once_in(8) => EntryType::Regular,
-            EntryType::Char if !draws.once_in(8) => EntryType::Fifo,
+            _ if name.contains(".wh.") && !rng.once_in(8) => EntryType::Regular,
+            EntryType::Char if !rng.once_in(8) => EntryType::Fifo,
             kind => kind,
         };
         let size = match () {
-            () if draws.once_in(20) => 30_000,
-            // More than is allowed, wherever it goes.
-            () if draws.once_in(60) => 70_000,
-            () => draws.below(20),
+            () if rng.once_in(20) => 30_000,
+            // More than the limit.
+            () if rng.once_in(60) => 70_000,
+            () => rng.below(20),
         };
         let content = match kind {
             EntryType::Regular => vec![b'x'; size],
@@ -103,35 +103,35 @@ fn layer(draws: &mut Draws, host: &str) -> Tar {
         tar.entry(
             kind,
             name,
-            *draws.pick(&[0o644, 0o755, 0, 0o6755]),
+            *rng.pick(&[0o644, 0o755, 0, 0o6755]),
             &target,
             &content,
         )
     })
 }
 
-fn archive(draws: &mut Draws, host: &str) -> Vec<u8> {
-    let mut layers: Vec<Tar> = (0..draws.below(5)).map(|_| layer(draws, host)).collect();
-    let at = draws.below(layers.len() + 1);
+fn archive(rng: &mut Rng, host: &str) -> Vec<u8> {
+    let mut layers: Vec<Tar> = (0..rng.below(5)).map(|_| layer(rng, host)).collect();
+    let at = rng.below(layers.len() + 1);
     layers.insert(at, agent_layer());
     let image =
-        TestImage::of(layers).packed(*draws.pick(&[Packing::Plain, Packing::Gzip, Packing::Zstd]));
-    let tar = if draws.once_in(2) {
+        TestImage::new(layers).packed(*rng.pick(&[Packing::Plain, Packing::Gzip, Packing::Zstd]));
+    let tar = if rng.once_in(2) {
         image.docker()
     } else {
         image.layout()
     };
     let mut bytes = tar.bytes();
-    if draws.once_in(3) {
+    if rng.once_in(3) {
         let words = [
             "sha256:", "layer0", "[]", "null", "manifest", "../", "linux", "0000644",
         ];
-        mutate(&mut bytes, &words, draws);
+        mutate(&mut bytes, &words, rng);
     }
     bytes
 }
 
-/// No device, no set-id bit, and of what can be written no more than allowed. Links are not followed.
+/// Checks that there are no devices and no set-id bits; adds up the bytes. Links are not followed.
 fn check_tree(folder: &Path, bytes: &mut u64) {
     for entry in fs::read_dir(folder).unwrap() {
         let path = entry.unwrap().path();
@@ -150,15 +150,15 @@ fn check_tree(folder: &Path, bytes: &mut u64) {
 }
 
 #[test]
-fn an_image_is_unpacked_inside_or_refused_by_the_teams_fault() {
+fn image_is_unpacked_inside_or_refused_as_invalid() {
     let scratch = host_folder();
     let root = scratch.path().canonicalize().unwrap();
     let host = root.join("h");
     fs::create_dir(&host).unwrap();
     fs::write(host.join("secret"), "secret").unwrap();
     let shown = host.to_str().unwrap();
-    let met = fuzz("images", 3000, |draws| {
-        let packed = write(&root, "upload", &archive(draws, shown));
+    let outcomes = fuzz("images", 3000, |rng| {
+        let packed = write(&root, "upload", &archive(rng, shown));
         let into = root.join("out");
         let label = match unpack(&packed, &into, &LIMITS, &|| false) {
             Ok(bundle) => {
@@ -173,22 +173,22 @@ fn an_image_is_unpacked_inside_or_refused_by_the_teams_fault() {
                 }
                 "accepted".to_owned()
             }
-            Err(BundleError::Invalid(told)) => {
-                let told = told.split_once(": ").map_or(&*told, |(start, rest)| {
+            Err(BundleError::Invalid(message)) => {
+                let message = message.split_once(": ").map_or(&*message, |(start, rest)| {
                     if start.starts_with("layer ") {
                         rest
                     } else {
-                        &told
+                        &message
                     }
                 });
-                let told = match told.split_once("\" ") {
+                let message = match message.split_once("\" ") {
                     Some((entry, problem)) if entry.starts_with("entry") => problem,
-                    _ => told,
+                    _ => message,
                 };
-                told.chars().take(24).collect()
+                message.chars().take(24).collect()
             }
             Err(error @ (BundleError::Io(_) | BundleError::Cancelled)) => {
-                panic!("our fault: {error}")
+                panic!("platform fault: {error}")
             }
         };
         if into.exists() {
@@ -199,15 +199,15 @@ fn an_image_is_unpacked_inside_or_refused_by_the_teams_fault() {
         assert_eq!(secret, "secret");
         label
     });
-    assert_met(
-        &met,
+    assert_outcomes(
+        &outcomes,
         &[
             "accepted",
             "has '..' in its path",
             "is a whiteout of no poss",
             "is a hard link to \"",
             "is a hard link to what i",
-            "what the image's layers ",
+            "the image's layers conta",
             "goes through more than 4",
             "the container image has ",
             "needs \"",

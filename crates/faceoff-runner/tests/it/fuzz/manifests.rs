@@ -1,5 +1,5 @@
-use super::{assert_met, fuzz, mutation::mutate};
-use faceoff_types::is_harmless;
+use super::{assert_outcomes, fuzz, mutation::mutate};
+use faceoff_types::is_printable;
 use faceoff_wire::{Manifest, ManifestError};
 
 const VALID: [&str; 2] = [
@@ -36,23 +36,23 @@ const WORDS: [&str; 24] = [
 ];
 
 #[test]
-fn an_agent_toml_is_read_or_its_key_is_named() {
-    let met = fuzz("manifests", 30_000, |draws| {
-        let mut text = draws.pick(&VALID).as_bytes().to_vec();
-        mutate(&mut text, &WORDS, draws);
+fn manifest_is_parsed_or_its_key_is_named() {
+    let outcomes = fuzz("manifests", 30_000, |rng| {
+        let mut text = rng.pick(&VALID).as_bytes().to_vec();
+        mutate(&mut text, &WORDS, rng);
         let text = String::from_utf8_lossy(&text);
         match Manifest::parse(&text) {
             Ok(manifest) => {
-                assert!(manifest.name.chars().all(is_harmless));
-                let again = Manifest::parse(&toml_of(&manifest)).unwrap();
-                assert_eq!(again, manifest);
+                assert!(manifest.name.chars().all(is_printable));
+                let reparsed = Manifest::parse(&toml_of(&manifest)).unwrap();
+                assert_eq!(reparsed, manifest);
                 "accepted".to_owned()
             }
             Err(error) => {
-                let told = error.to_string();
+                let message = error.to_string();
                 assert!(
-                    told.chars().all(|c| is_harmless(c) || "\n\t\r".contains(c)),
-                    "{told:?}"
+                    message.chars().all(|c| is_printable(c) || "\n\t\r".contains(c)),
+                    "{message:?}"
                 );
                 match error {
                     ManifestError::Toml(_) => "not toml".to_owned(),
@@ -64,8 +64,8 @@ fn an_agent_toml_is_read_or_its_key_is_named() {
             }
         }
     });
-    assert_met(
-        &met,
+    assert_outcomes(
+        &outcomes,
         &[
             "accepted",
             "not toml",
@@ -78,7 +78,7 @@ fn an_agent_toml_is_read_or_its_key_is_named() {
     );
 }
 
-/// TOML's basic strings are JSON's, but for one character.
+/// TOML's basic strings are the same as JSON's, except for one character.
 fn toml_of(manifest: &Manifest) -> String {
     fn json<T: serde::Serialize>(value: &T) -> String {
         serde_json::to_string(value)

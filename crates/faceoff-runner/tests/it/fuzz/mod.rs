@@ -1,24 +1,23 @@
-//! What strangers send, mutated from what is valid: nothing may panic, none of it may be our fault, and
-//! every kind of refusal is met. A fixed number of runs with every test, as long as one likes with
-//! `make fuzz MINUTES=60`.
+//! Fuzz tests with mutations of valid input: nothing may panic, nothing may be reported as a platform fault, and every
+//! kind of refusal must occur. Tests run a fixed number of inputs; `make fuzz MINUTES=60` runs longer.
 
 mod answers;
 mod archives;
 mod datasets;
-mod draws;
+mod rng;
 mod games;
 mod images;
 mod manifests;
 mod mutation;
 
-use draws::Draws;
+use rng::Rng;
 use std::{
     collections::BTreeMap,
     env,
     time::{Duration, Instant},
 };
 
-/// Says how to have a failed run again.
+/// Prints how to repeat a failed run.
 struct Run<'a> {
     target: &'a str,
     seed: u64,
@@ -34,7 +33,7 @@ impl Drop for Run<'_> {
                 seed,
                 number,
             } = self;
-            eprintln!("fuzz target {target}: again with FUZZ_SEED={seed} FUZZ_RUN={number}");
+            eprintln!("fuzz target {target}: repeat with FUZZ_SEED={seed} FUZZ_RUN={number}");
         }
     }
 }
@@ -44,27 +43,27 @@ fn number(variable: &str) -> Option<u64> {
     Some(value.parse().expect("a whole number"))
 }
 
-/// Runs a target that says what came of it, and counts what was said. Each run depends on the seed and
-/// its number alone.
-#[expect(clippy::print_stdout, reason = "an hour's run tells what it met")]
+/// Runs a target, which returns the label of its outcome, and counts the labels. Each run depends only on the seed and
+/// its number.
+#[expect(clippy::print_stdout, reason = "a long run reports its outcomes")]
 fn fuzz(
     target: &str,
     runs: u64,
-    mut once: impl FnMut(&mut Draws) -> String,
+    mut once: impl FnMut(&mut Rng) -> String,
 ) -> BTreeMap<String, u64> {
     let seed = number("FUZZ_SEED").unwrap_or(1);
     let minutes = number("FUZZ_MINUTES").map(|minutes| Duration::from_secs(60 * minutes));
     let started = Instant::now();
     let first = number("FUZZ_RUN");
-    let mut met = BTreeMap::new();
-    let mut played = 0;
+    let mut outcomes = BTreeMap::new();
+    let mut runs_done = 0;
     for number in first.unwrap_or(0).. {
-        let over = match (first, minutes) {
-            (Some(_), _) => played == 1,
-            (None, Some(minutes)) => started.elapsed() >= minutes && played >= runs,
-            (None, None) => played >= runs,
+        let is_done = match (first, minutes) {
+            (Some(_), _) => runs_done == 1,
+            (None, Some(minutes)) => started.elapsed() >= minutes && runs_done >= runs,
+            (None, None) => runs_done >= runs,
         };
-        if over {
+        if is_done {
             break;
         }
         let run = Run {
@@ -72,24 +71,24 @@ fn fuzz(
             seed,
             number,
         };
-        *met.entry(once(&mut Draws::of(target, seed, number)))
+        *outcomes.entry(once(&mut Rng::new(target, seed, number)))
             .or_default() += 1;
         drop(run);
-        played += 1;
+        runs_done += 1;
     }
-    println!("fuzz target {target}: {played} runs with seed {seed}: {met:#?}");
-    met
+    println!("fuzz target {target}: {runs_done} runs with seed {seed}: {outcomes:#?}");
+    outcomes
 }
 
-/// Every kind was met. (One run that is had again meets one.)
+/// Asserts that every kind occurred. A repeated single run is not checked.
 #[track_caller]
-fn assert_met(met: &BTreeMap<String, u64>, kinds: &[&str]) {
+fn assert_outcomes(outcomes: &BTreeMap<String, u64>, kinds: &[&str]) {
     if number("FUZZ_RUN").is_some() {
         return;
     }
-    let missed: Vec<_> = kinds
+    let missing: Vec<_> = kinds
         .iter()
-        .filter(|kind| !met.keys().any(|label| label.contains(*kind)))
+        .filter(|kind| !outcomes.keys().any(|label| label.contains(*kind)))
         .collect();
-    assert!(missed.is_empty(), "never met: {missed:?}, but {met:#?}");
+    assert!(missing.is_empty(), "missing: {missing:?}, found: {outcomes:#?}");
 }

@@ -1,79 +1,79 @@
-use super::draws::Draws;
+use super::rng::Rng;
 use std::ops::Range;
 
-/// Changes `input` in one to six places: bits, bytes, ranges, words.
-pub fn mutate(input: &mut Vec<u8>, words: &[&str], draws: &mut Draws) {
-    for _ in 0..=draws.below(6) {
-        once(input, words, draws);
+/// Mutates `input` in one to six positions: bits, bytes, ranges, words.
+pub fn mutate(input: &mut Vec<u8>, words: &[&str], rng: &mut Rng) {
+    for _ in 0..=rng.below(6) {
+        once(input, words, rng);
     }
 }
 
-fn once(input: &mut Vec<u8>, words: &[&str], draws: &mut Draws) {
+fn once(input: &mut Vec<u8>, words: &[&str], rng: &mut Rng) {
     let word = || words.iter().map(|word| word.as_bytes());
-    match draws.below(11) {
+    match rng.below(11) {
         0 => {
-            let at = draws.below(input.len());
+            let at = rng.below(input.len());
             if let Some(byte) = input.get_mut(at) {
-                *byte ^= 1 << draws.below(8);
+                *byte ^= 1 << rng.below(8);
             }
         }
         1 => {
-            let at = draws.below(input.len());
-            let value = *draws.pick(&[0, 0x7f, 0x80, 0xff, b'"', b'\\', b'{', b'[', b'\n']);
+            let at = rng.below(input.len());
+            let value = *rng.pick(&[0, 0x7f, 0x80, 0xff, b'"', b'\\', b'{', b'[', b'\n']);
             if let Some(byte) = input.get_mut(at) {
                 *byte = value;
             }
         }
         2 => {
-            let range = range(input.len(), draws);
+            let range = range(input.len(), rng);
             input.drain(range);
         }
         3 => {
-            let copy = input[range(input.len(), draws)].to_vec();
-            let at = draws.below(input.len() + 1);
+            let copy = input[range(input.len(), rng)].to_vec();
+            let at = rng.below(input.len() + 1);
             input.splice(at..at, copy);
         }
         4 => {
-            let at = draws.below(input.len() + 1);
-            let word = word().nth(draws.below(words.len())).unwrap_or_default();
+            let at = rng.below(input.len() + 1);
+            let word = word().nth(rng.below(words.len())).unwrap_or_default();
             input.splice(at..at, word.iter().copied());
         }
         5 | 6 => {
-            let token = token(input, draws);
-            let word = word().nth(draws.below(words.len())).unwrap_or_default();
+            let token = token(input, rng);
+            let word = word().nth(rng.below(words.len())).unwrap_or_default();
             input.splice(token, word.iter().copied());
         }
         7 => {
-            let token = token(input, draws);
+            let token = token(input, rng);
             input.drain(token);
         }
         8 => {
-            let token = token(input, draws);
+            let token = token(input, rng);
             let copy = input[token.clone()].to_vec();
-            let at = *draws.pick(&[token.start, token.end, 0, input.len()]);
+            let at = *rng.pick(&[token.start, token.end, 0, input.len()]);
             input.splice(at..at, copy);
         }
-        9 => input.truncate(draws.below(input.len() + 1)),
+        9 => input.truncate(rng.below(input.len() + 1)),
         _ => {
-            // Now and then very long.
-            let len = if draws.once_in(8) { 70_000 } else { 40 };
-            let at = draws.below(input.len() + 1);
-            let byte = *draws.pick(b" 09[{a\"");
-            input.splice(at..at, std::iter::repeat_n(byte, draws.below(len)));
+            // Occasionally very long.
+            let len = if rng.once_in(8) { 70_000 } else { 40 };
+            let at = rng.below(input.len() + 1);
+            let byte = *rng.pick(b" 09[{a\"");
+            input.splice(at..at, std::iter::repeat_n(byte, rng.below(len)));
         }
     }
 }
 
-fn range(len: usize, draws: &mut Draws) -> Range<usize> {
-    let start = draws.below(len + 1);
-    let longest = if draws.once_in(3) { len } else { 16 };
-    start..(start + draws.below(longest + 1)).min(len)
+fn range(len: usize, rng: &mut Rng) -> Range<usize> {
+    let start = rng.below(len + 1);
+    let longest = if rng.once_in(3) { len } else { 16 };
+    start..(start + rng.below(longest + 1)).min(len)
 }
 
 /// A number, a word, or a sign between them.
-fn token(input: &[u8], draws: &mut Draws) -> Range<usize> {
+fn token(input: &[u8], rng: &mut Rng) -> Range<usize> {
     let in_word = |byte: &u8| byte.is_ascii_alphanumeric() || b"._-+".contains(byte);
-    let at = draws.below(input.len());
+    let at = rng.below(input.len());
     match input.get(at) {
         Some(byte) if in_word(byte) => {
             let start = input[..at].iter().rposition(|byte| !in_word(byte));

@@ -9,31 +9,31 @@ const HYBRID_MOUNTS: &str = "\
 const HYBRID_OWN: &str = "4:memory:/no-such-cgroup\n2:cpu,cpuacct:/\n0::/\n";
 
 #[test]
-fn each_controller_is_found_where_it_is_on_a_hybrid_host() {
-    let find = |controller| Home::find(controller, HYBRID_MOUNTS, HYBRID_OWN).expect(controller);
-    // The kernel's name for our cgroup is not visible here: the mount itself is all there is.
+fn controllers_are_found_on_a_hybrid_host() {
+    let find = |controller| Hierarchy::find(controller, HYBRID_MOUNTS, HYBRID_OWN).expect(controller);
+    // The kernel's name of the service's cgroup is not visible here, so the mount point is used.
     assert_eq!(
         find("memory"),
-        Home {
+        Hierarchy {
             version: Version::V1,
-            top: "/sys/fs/cgroup/memory".into(),
-            own: "/sys/fs/cgroup/memory".into()
+            mount_point: "/sys/fs/cgroup/memory".into(),
+            service_dir: "/sys/fs/cgroup/memory".into()
         }
     );
     assert_eq!(find("cpuacct"), find("cpu"));
     assert_eq!(find("cpu").version, Version::V1);
     assert_eq!(
         find("pids"),
-        Home {
+        Hierarchy {
             version: Version::V2,
-            top: "/sys/fs/cgroup/unified".into(),
-            own: "/sys/fs/cgroup/unified".into()
+            mount_point: "/sys/fs/cgroup/unified".into(),
+            service_dir: "/sys/fs/cgroup/unified".into()
         }
     );
 }
 
 #[test]
-fn a_unified_host_has_all_controllers_in_the_services_own_cgroup() {
+fn unified_host_has_all_controllers_in_one_cgroup() {
     let host = tempfile::tempdir().unwrap();
     let own = host.path().join("system.slice/faceoff.service");
     std::fs::create_dir_all(own.join(SERVICE_LEAF)).unwrap();
@@ -45,34 +45,34 @@ fn a_unified_host_has_all_controllers_in_the_services_own_cgroup() {
         "/system.slice/faceoff.service",
         "/system.slice/faceoff.service/faceoff-service",
     ] {
-        let home = Home::find("memory", &mounts, &format!("0::{cgroup}\n")).unwrap();
+        let hierarchy = Hierarchy::find("memory", &mounts, &format!("0::{cgroup}\n")).unwrap();
         assert_eq!(
-            home,
-            Home {
+            hierarchy,
+            Hierarchy {
                 version: Version::V2,
-                top: host.path().into(),
-                own: own.clone()
+                mount_point: host.path().into(),
+                service_dir: own.clone()
             }
         );
     }
 }
 
 #[test]
-fn a_container_that_mounts_its_own_part_finds_itself() {
+fn container_with_a_partial_mount_finds_its_cgroup() {
     let host = tempfile::tempdir().unwrap();
     std::fs::create_dir(host.path().join("inner")).unwrap();
     let mounts = format!(
         "29 22 0:26 /docker/abc {} rw - cgroup cgroup rw,pids\n",
         host.path().display()
     );
-    let home = Home::find("pids", &mounts, "8:pids:/docker/abc/inner\n").unwrap();
-    assert_eq!(home.own, host.path().join("inner"));
+    let hierarchy = Hierarchy::find("pids", &mounts, "8:pids:/docker/abc/inner\n").unwrap();
+    assert_eq!(hierarchy.service_dir, host.path().join("inner"));
 }
 
 #[test]
-fn no_hierarchy_no_home() {
+fn missing_hierarchy_is_not_found() {
     assert_eq!(
-        Home::find(
+        Hierarchy::find(
             "memory",
             "23 27 0:22 / /sys rw - sysfs sysfs rw\n",
             "0::/\n"
@@ -82,16 +82,16 @@ fn no_hierarchy_no_home() {
 }
 
 #[test]
-fn agents_weigh_ten_times_as_much_as_others() {
+fn agents_have_ten_times_the_default_weight() {
     let host = tempfile::tempdir().unwrap();
-    let home = Home {
+    let hierarchy = Hierarchy {
         version: Version::V1,
-        top: host.path().into(),
-        own: host.path().into(),
+        mount_point: host.path().into(),
+        service_dir: host.path().into(),
     };
-    let folder = home.prepare_folder(&["memory"]).unwrap();
+    let folder = hierarchy.prepare_folder(&["memory"]).unwrap();
     assert!(!folder.join("cpu.shares").exists(), "another controller's");
-    assert_eq!(home.prepare_folder(&["cpu"]).unwrap(), folder);
+    assert_eq!(hierarchy.prepare_folder(&["cpu"]).unwrap(), folder);
     let written = std::fs::read_to_string(folder.join("cpu.shares")).unwrap();
     assert_eq!(written, "10240");
 }

@@ -1,38 +1,38 @@
-//! The Bradley–Terry model: side a wins a trial against b with probability 1 / (1 + e^(θ_b − θ_a)), with
-//! strengths θ that are independent and normal around 0 beforehand. Fitted is the most probable θ.
+//! The Bradley–Terry model: side a wins a trial against b with probability 1 / (1 + e^(θ_b − θ_a)). The prior of the
+//! strengths θ is independent and normal around 0; the fit is the most probable θ.
 //!
-//! Written out here in one fixed order of operations, with `libm`, so that published ratings have the
-//! same bits on every machine; products of matrices of the libraries choose instructions by the CPU.
+//! The order of operations is fixed and functions are those of `libm`, so that published ratings have the same bits on
+//! every machine. Matrix products of libraries select instructions by the CPU.
 
-use super::contest::Contest;
+use super::trial_counts::TrialCounts;
 
-/// The strengths are exact to this, a millionth of a point of the rating.
+/// Tolerance of the strengths, a millionth of a rating point.
 const TOLERANCE: f64 = 1e-9;
-/// Newton's method needs fewer than ten; a bound, so that nothing can hang.
+/// Newton's method needs fewer than ten steps; the bound guarantees termination.
 const MAX_STEPS: usize = 200;
 
-/// All contests of a pool, by pair.
+/// The trials of a pool, by pair of submissions.
 #[derive(Debug, Clone)]
 pub(super) struct Model {
     submissions: usize,
-    /// Each pair once, with how many trials each side won.
+    /// Each pair of submissions once, with the number of trials that each side won.
     pairs: Vec<([usize; 2], [f64; 2])>,
     prior_precision: f64,
 }
 
 impl Model {
-    /// `value` is the trials that one won count of a contest stands for: ½ of a half game, 1 of a goal.
+    /// `value` is the number of trials per count of [`TrialCounts`]: ½ for half games, 1 for goals.
     pub(super) fn new<'a>(
         submissions: usize,
-        contests: impl Iterator<Item = &'a Contest>,
+        trial_counts: impl Iterator<Item = &'a TrialCounts>,
         value: f64,
         prior_sd: f64,
     ) -> Self {
         let mut won = vec![0_u64; submissions * submissions];
-        for contest in contests {
-            let [a, b] = contest.sides;
-            won[a * submissions + b] += u64::from(contest.won[0]);
-            won[b * submissions + a] += u64::from(contest.won[1]);
+        for counts in trial_counts {
+            let [a, b] = counts.sides;
+            won[a * submissions + b] += u64::from(counts.won[0]);
+            won[b * submissions + a] += u64::from(counts.won[1]);
         }
         let mut pairs = Vec::new();
         for a in 0..submissions {
@@ -50,32 +50,32 @@ impl Model {
         }
     }
 
-    /// The most probable strengths, by Newton's method from `start`. There is exactly one such point,
-    /// since the logarithm of the posterior is strictly concave.
+    /// The most probable strengths, by Newton's method from `start`. The maximum is unique, since the logarithm of the
+    /// posterior is strictly concave.
     pub(super) fn fit(&self, start: &[f64]) -> Vec<f64> {
         let mut strengths = start.to_vec();
-        let mut height = self.log_posterior(&strengths);
+        let mut log_posterior = self.log_posterior(&strengths);
         for _ in 0..MAX_STEPS {
             let step = self.newton_step(&strengths);
             if step.iter().all(|change| change.abs() < TOLERANCE) {
                 break;
             }
-            // Far from the top a whole step may lead below where it began, by more than rounding does.
-            let floor = height - 1e-12 * height.abs();
+            // Far from the maximum a full step may decrease the posterior by more than rounding errors.
+            let floor = log_posterior - 1e-12 * log_posterior.abs();
             let mut scale = 1.0;
-            let (moved, risen) = loop {
+            let (moved, moved_log_posterior) = loop {
                 let moved: Vec<f64> = strengths
                     .iter()
                     .zip(&step)
                     .map(|(strength, change)| strength + scale * change)
                     .collect();
-                let risen = self.log_posterior(&moved);
-                if risen >= floor || scale < 1e-6 {
-                    break (moved, risen);
+                let moved_log_posterior = self.log_posterior(&moved);
+                if moved_log_posterior >= floor || scale < 1e-6 {
+                    break (moved, moved_log_posterior);
                 }
                 scale /= 2.0;
             };
-            (strengths, height) = (moved, risen);
+            (strengths, log_posterior) = (moved, moved_log_posterior);
         }
         strengths
     }
@@ -96,7 +96,7 @@ impl Model {
             .iter()
             .map(|strength| -self.prior_precision * strength)
             .collect();
-        // The negative second derivatives: the lower triangle, row by row.
+        // Negative second derivatives, of which only the lower triangle is used, row by row.
         let mut curvature = vec![0.0; n * n];
         for i in 0..n {
             curvature[i * n + i] = self.prior_precision;
@@ -121,8 +121,8 @@ fn log1p_exp(x: f64) -> f64 {
     x.max(0.0) + libm::log1p(libm::exp(-x.abs()))
 }
 
-/// Solves `matrix · x = right` by Cholesky's method. The matrix is given by its lower triangle and is
-/// positive definite: a sum of the prior's diagonal and of the pairs' squares.
+/// Solves `matrix · x = right` by Cholesky decomposition of the lower triangle. The matrix is positive definite, as a sum
+/// of the prior's diagonal and the squares of the pairs.
 fn solve(matrix: &mut [f64], mut right: Vec<f64>) -> Vec<f64> {
     let n = right.len();
     for row in 0..n {
@@ -158,44 +158,44 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    fn fitted(submissions: usize, contests: &[Contest], prior_sd: f64) -> Vec<f64> {
-        Model::new(submissions, contests.iter(), 1.0, prior_sd).fit(&vec![0.0; submissions])
+    fn fitted(submissions: usize, trial_counts: &[TrialCounts], prior_sd: f64) -> Vec<f64> {
+        Model::new(submissions, trial_counts.iter(), 1.0, prior_sd).fit(&vec![0.0; submissions])
     }
 
-    /// With a flat prior two sides' odds are those of their wins.
+    /// With a flat prior the odds of two sides are the ratio of their wins.
     #[test]
-    fn two_sides_have_the_odds_of_their_wins() {
-        let strengths = fitted(2, &[Contest::new([0, 1], [30, 10])], 1e4);
+    fn strengths_match_odds_of_wins_with_flat_prior() {
+        let strengths = fitted(2, &[TrialCounts::new([0, 1], [30, 10])], 1e4);
         assert!((strengths[0] - strengths[1] - 3f64.ln()).abs() < 1e-6);
         assert!((strengths[0] + strengths[1]).abs() < 1e-9, "around zero");
     }
 
     #[test]
-    fn who_never_lost_stays_finite_and_nobody_played_is_the_prior() {
-        let strengths = fitted(3, &[Contest::new([0, 1], [1_000_000, 0])], 2.0);
+    fn unbeaten_side_is_finite_and_unplayed_side_is_prior() {
+        let strengths = fitted(3, &[TrialCounts::new([0, 1], [1_000_000, 0])], 2.0);
         assert!(strengths[0] > 3.0 && strengths[0] < 30.0, "{strengths:?}");
         assert_eq!(strengths[2], 0.0);
     }
 
     proptest! {
-        /// At the top the slope is zero: each side won as much as its strength expects, less the pull
+        /// At the maximum the slope is zero: each side won as many trials as its strength predicts, minus the effect
         /// of the prior.
         #[test]
-        fn the_fit_is_the_top(
+        fn fit_is_the_maximum(
             won in proptest::collection::vec([0u32..2000, 0u32..2000], 10),
             prior_sd in 0.1..10.0f64,
         ) {
             let pairs = (0..5).flat_map(|a| (a + 1..5).map(move |b| [a, b]));
-            let contests: Vec<_> = pairs
+            let trial_counts: Vec<_> = pairs
                 .zip(won)
-                .map(|(sides, won)| Contest::new(sides, won))
+                .map(|(sides, won)| TrialCounts::new(sides, won))
                 .collect();
-            let strengths = fitted(5, &contests, prior_sd);
+            let strengths = fitted(5, &trial_counts, prior_sd);
             for side in 0..5 {
                 let mut slope = -strengths[side] / (prior_sd * prior_sd);
-                for contest in &contests {
-                    let [a, b] = contest.sides;
-                    let [won_a, won_b] = contest.won.map(f64::from);
+                for counts in &trial_counts {
+                    let [a, b] = counts.sides;
+                    let [won_a, won_b] = counts.won.map(f64::from);
                     let expected = (won_a + won_b) / (1.0 + (strengths[b] - strengths[a]).exp());
                     if side == a { slope += won_a - expected; }
                     if side == b { slope -= won_a - expected; }

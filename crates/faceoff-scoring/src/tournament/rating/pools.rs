@@ -1,36 +1,36 @@
-//! Which submissions can be compared: those that games connect.
+//! Pools of comparable submissions: those that games connect.
 
-use super::contest::Contest;
+use super::trial_counts::TrialCounts;
 
-/// For each submission the number of its pool, from 0, in the order of the pools' first members.
-/// Submissions are in one pool if a chain of contests leads from one to the other.
-pub(super) fn pools<'a>(
+/// For each submission the number of its pool, from 0, sorted by the first members of the pools. Two submissions are in
+/// one pool if a chain of trials connects them.
+pub(super) fn pool_numbers<'a>(
     submissions: usize,
-    contests: impl Iterator<Item = &'a Contest>,
+    trial_counts: impl Iterator<Item = &'a TrialCounts>,
 ) -> Vec<usize> {
-    // Each points to an earlier member of its pool, the first one to itself.
-    let mut leader: Vec<usize> = (0..submissions).collect();
-    for contest in contests {
-        let [a, b] = contest.sides.map(|side| first(&mut leader, side));
-        leader[a.max(b)] = a.min(b);
+    // Union–find: each submission refers to an earlier member of its pool, the first one to itself.
+    let mut parents: Vec<usize> = (0..submissions).collect();
+    for counts in trial_counts {
+        let [a, b] = counts.sides.map(|side| find_root(&mut parents, side));
+        parents[a.max(b)] = a.min(b);
     }
     let mut numbers = vec![0; submissions];
     let mut next = 0;
     for member in 0..submissions {
-        let first = first(&mut leader, member);
-        numbers[member] = if first == member {
+        let root = find_root(&mut parents, member);
+        numbers[member] = if root == member {
             next += 1;
             next - 1
         } else {
-            numbers[first]
+            numbers[root]
         };
     }
     numbers
 }
 
-fn first(leader: &mut [usize], mut member: usize) -> usize {
+fn find_root(leader: &mut [usize], mut member: usize) -> usize {
     while leader[member] != member {
-        leader[member] = leader[leader[member]]; // the next search has half the way
+        leader[member] = leader[leader[member]]; // Path halving.
         member = leader[member];
     }
     member
@@ -41,9 +41,9 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_chain_of_contests_is_one_pool() {
-        let contests = [[4, 2], [3, 5], [2, 0]].map(|sides| Contest::new(sides, [1, 0]));
-        assert_eq!(pools(6, contests.iter()), [0, 1, 0, 2, 0, 2]);
-        assert_eq!(pools(2, [].iter()), [0, 1]);
+    fn chain_of_trials_is_one_pool() {
+        let trial_counts = [[4, 2], [3, 5], [2, 0]].map(|sides| TrialCounts::new(sides, [1, 0]));
+        assert_eq!(pool_numbers(6, trial_counts.iter()), [0, 1, 0, 2, 0, 2]);
+        assert_eq!(pool_numbers(2, [].iter()), [0, 1]);
     }
 }

@@ -1,72 +1,71 @@
 use super::{
     bootstrap::{RESAMPLES, Samples, fit_from},
     bradley_terry::Model,
-    contest::Contest,
-    pools::pools,
+    trial_counts::TrialCounts,
+    pools::pool_numbers,
     scale::{CENTRE, PRIOR_SD, PRIOR_SD_STRENGTH, rating_of},
-    units::{InvalidPair, units},
+    sampling_units::{InvalidPair, sampling_units},
 };
 use crate::tournament::{game::PlayedGame, side::Side, submission_label::SubmissionLabel};
 use faceoff_types::TeamName;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// The most submissions that one pool may have: the work grows with their number's cube, a thousand
-/// times for the intervals.
+/// Maximum number of submissions in a pool: the computation is cubic in it, times a thousand for the intervals.
 const MAX_POOL: usize = 200;
 
-/// Ratings by both ways.
+/// Ratings from results and from goals.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct Ratings {
-    /// Mean and standard deviation of the prior, in points.
+    /// The prior of all ratings, in rating points.
     pub prior: Prior,
-    /// Samples drawn for each pool's intervals.
+    /// Number of bootstrap samples for the intervals of each pool.
     pub resamples: u32,
-    /// From who won: a win is a game won, a draw half a game for each.
+    /// Ratings from results: a win is a trial won, a draw is half a trial for each side.
     pub results: Vec<Pool>,
-    /// From goals alone: every goal is a trial, whoever won the game. Forfeited games are left out.
+    /// Ratings from goals: each goal is a trial, regardless of the result. Forfeited games are left out.
     pub goals: Vec<Pool>,
 }
 
-/// What is taken for known of a submission before its first game.
+/// The normal prior of a submission's rating.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct Prior {
-    /// Mean rating.
+    /// Mean, in rating points.
     pub mean: f64,
-    /// Standard deviation.
+    /// Standard deviation, in rating points.
     pub sd: f64,
 }
 
-/// Submissions that games connect, the strongest first. Ratings of different pools cannot be compared:
-/// each pool's mean is that of the prior.
+/// Submissions that games connect, the strongest first. Ratings of different pools are not comparable: the mean of each
+/// pool is that of the prior.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct Pool {
-    /// What the bootstrap draws: games and mirrored pairs that say something about the pool.
+    /// Number of sampling units of the bootstrap: games and mirrored pairs with an influence on the pool.
     pub units: u32,
-    /// Samples that the intervals are of: those that still connected the pool.
+    /// Number of bootstrap samples that connect the pool; the intervals are from these.
     pub usable_samples: u32,
-    /// The ratings.
+    /// Ratings, highest first.
     pub ratings: Vec<Rating>,
 }
 
-/// What is rated: a submission, or, where games do not name submissions, all that a team played.
+/// A rated submission or, if games have no submission labels, a team.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
-pub struct Rated {
-    /// The team.
+pub struct RatedSubmission {
+    /// Name of the team.
     pub team: TeamName,
-    /// Which of its submissions.
+    /// Label of the submission; absent if games have none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[cfg_attr(feature = "openapi", schema(value_type = Option<String>))]
     pub submission: Option<SubmissionLabel>,
 }
 
-impl Rated {
-    /// Who played a side of a game.
-    pub(in crate::tournament) fn of(game: &PlayedGame, side: Side) -> Self {
+impl RatedSubmission {
+    /// The submission on one side of a game.
+    pub(in crate::tournament) fn from_side(game: &PlayedGame, side: Side) -> Self {
         Self {
             team: game.teams()[side as usize].clone(),
             submission: game.submissions()[side as usize].cloned(),
@@ -78,75 +77,74 @@ impl Rated {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct Rating {
-    /// Whose.
+    /// The rated submission.
     #[serde(flatten)]
-    pub rated: Rated,
-    /// On Elo's scale: 400 points more are odds of ten to one, 1500 is the pool's mean.
+    pub rated: RatedSubmission,
+    /// Rating on the Elo scale: 400 points more are odds of ten to one, 1500 is the mean of the pool.
     pub rating: f64,
-    /// 95 % interval. An end is missing where the games have none: above for a side that lost nothing,
-    /// below for one that won nothing, both where there were too few games for a bootstrap.
+    /// 95 % interval in rating points. A bound is `None` if the games do not determine it: the upper one for a submission
+    /// that never lost, the lower one for one that never won, both if there are too few games for a bootstrap.
     pub ci95: [Option<f64>; 2],
-    /// Games that it is of.
+    /// Number of games with an influence on the rating.
     pub games: u32,
 }
 
-/// Why there are no ratings.
+/// Why ratings cannot be computed.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum RatingError {
-    /// What is called a mirrored pair is none.
+    /// Games with the same pair number are not a mirrored pair.
     #[error(transparent)]
     Pair(#[from] InvalidPair),
-    /// More than can be rated together.
+    /// A pool has too many submissions.
     #[error(
         "ratings are for at most {MAX_POOL} submissions that games connect, got {0}; leave out rounds or teams"
     )]
     TooMany(usize),
 }
 
-/// Rates the submissions that played `games`, which are those that count.
+/// Rates the submissions of `games`, which are those that count.
 ///
-/// Bradley and Terry's model: a beats b with probability 1 / (1 + 10^((R_b − R_a) / 400)). Beforehand
-/// each rating is normal around [`CENTRE`] with standard deviation [`PRIOR_SD`], independently;
-/// given are the most probable ratings afterwards. Intervals are percentiles of the same estimate
-/// over games drawn with replacement, mirrored pairs as a whole.
+/// In the Bradley–Terry model, a beats b with probability 1 / (1 + 10^((R_b − R_a) / 400)). The prior of each rating is
+/// normal around [`CENTRE`] with standard deviation [`PRIOR_SD`]; ratings are the maximum of the posterior. Intervals are
+/// percentiles of the same estimate over games drawn with replacement; a mirrored pair is drawn as a whole.
 ///
 /// # Errors
-/// If what is called a mirrored pair is none, or a pool is too large.
+/// If games with the same pair number are not a mirrored pair, or a pool is too large.
 pub fn rate<'a>(games: impl IntoIterator<Item = &'a PlayedGame>) -> Result<Ratings, RatingError> {
-    let units = units(games)?;
-    let mut numbers = BTreeMap::<Rated, usize>::new();
+    let units = sampling_units(games)?;
+    let mut numbers = BTreeMap::<RatedSubmission, usize>::new();
     for game in units.iter().flatten() {
         for side in Side::BOTH {
-            numbers.insert(Rated::of(game, side), 0);
+            numbers.insert(RatedSubmission::from_side(game, side), 0);
         }
     }
-    for (number, of) in numbers.values_mut().enumerate() {
-        *of = number;
+    for (number, entry) in numbers.values_mut().enumerate() {
+        *entry = number;
     }
-    let field = Field { units, numbers };
+    let input = RatingInput { units, numbers };
     Ok(Ratings {
         prior: Prior {
             mean: CENTRE,
             sd: PRIOR_SD,
         },
         resamples: RESAMPLES,
-        results: field.pools(RatedBy::Results)?,
-        goals: field.pools(RatedBy::Goals)?,
+        results: input.pools(RatingBasis::Results)?,
+        goals: input.pools(RatingBasis::Goals)?,
     })
 }
 
-/// What a rating is from.
+/// What ratings are computed from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum RatedBy {
+enum RatingBasis {
     /// Games won.
     Results,
     /// Goals scored.
     Goals,
 }
 
-impl RatedBy {
-    /// What each side won of a game, in this way's smallest parts; `None` if the game says nothing.
-    fn won(self, game: &PlayedGame) -> Option<[u32; 2]> {
+impl RatingBasis {
+    /// Trials or half trials that each side won in a game; `None` if the game has no influence.
+    fn trials_won(self, game: &PlayedGame) -> Option<[u32; 2]> {
         match self {
             Self::Results => Some(match game.winner() {
                 Some(Side::Home) => [2, 0],
@@ -157,7 +155,7 @@ impl RatedBy {
         }
     }
 
-    /// How many trials the smallest part is.
+    /// Trials per count of [`Self::trials_won`].
     const fn value(self) -> f64 {
         match self {
             Self::Results => 0.5,
@@ -166,86 +164,86 @@ impl RatedBy {
     }
 }
 
-/// All games, and the submissions that played them, numbered by name.
-struct Field<'a> {
+/// All games in sampling units, and their submissions, numbered by name.
+struct RatingInput<'a> {
     units: Vec<Vec<&'a PlayedGame>>,
-    numbers: BTreeMap<Rated, usize>,
+    numbers: BTreeMap<RatedSubmission, usize>,
 }
 
-impl Field<'_> {
-    fn pools(&self, by: RatedBy) -> Result<Vec<Pool>, RatingError> {
-        let units: Vec<Vec<Contest>> = self
+impl RatingInput<'_> {
+    fn pools(&self, basis: RatingBasis) -> Result<Vec<Pool>, RatingError> {
+        let units: Vec<Vec<TrialCounts>> = self
             .units
             .iter()
             .map(|unit| {
                 unit.iter()
-                    .filter_map(|game| self.contest(game, by))
+                    .filter_map(|game| self.trial_counts(game, basis))
                     .collect::<Vec<_>>()
             })
             .filter(|unit| !unit.is_empty())
             .collect();
-        let of_pools = pools(self.numbers.len(), units.iter().flatten());
-        // By pool: its members, and its units, whose contests are all between the same two.
-        let count = of_pools.iter().max().map_or(0, |last| last + 1);
+        let pool_of = pool_numbers(self.numbers.len(), units.iter().flatten());
+        // For each pool its members and units; all games of a unit are between the same two submissions.
+        let count = pool_of.iter().max().map_or(0, |last| last + 1);
         let mut members = vec![Vec::new(); count];
-        let mut place = vec![0; self.numbers.len()];
-        for (submission, pool) in of_pools.iter().enumerate() {
-            place[submission] = members[*pool].len();
+        let mut index_in_pool = vec![0; self.numbers.len()];
+        for (submission, pool) in pool_of.iter().enumerate() {
+            index_in_pool[submission] = members[*pool].len();
             members[*pool].push(submission);
         }
-        let mut units_of = vec![Vec::new(); count];
+        let mut units_by_pool = vec![Vec::new(); count];
         for unit in units {
-            let pool = of_pools[unit[0].sides[0]];
-            let in_pool = |contest: &Contest| {
-                Contest::new(contest.sides.map(|side| place[side]), contest.won)
+            let pool = pool_of[unit[0].sides[0]];
+            let in_pool = |counts: &TrialCounts| {
+                TrialCounts::new(counts.sides.map(|side| index_in_pool[side]), counts.won)
             };
-            units_of[pool].push(unit.iter().map(in_pool).collect::<Vec<_>>());
+            units_by_pool[pool].push(unit.iter().map(in_pool).collect::<Vec<_>>());
         }
-        let rated: Vec<&Rated> = self.numbers.keys().collect();
+        let rated: Vec<&RatedSubmission> = self.numbers.keys().collect();
         members
             .into_iter()
-            .zip(units_of)
-            // Alone in its pool is who played nobody that this way can tell anything of.
+            .zip(units_by_pool)
+            // A pool of one submission has no informative games.
             .filter(|(members, _)| members.len() > 1)
             .map(|(members, units)| {
                 if members.len() > MAX_POOL {
                     return Err(RatingError::TooMany(members.len()));
                 }
-                let rated: Vec<&Rated> = members.iter().map(|member| rated[*member]).collect();
-                Ok(rate_pool(&rated, units, by))
+                let rated: Vec<&RatedSubmission> = members.iter().map(|member| rated[*member]).collect();
+                Ok(rate_pool(&rated, units, basis))
             })
             .collect()
     }
 
-    fn contest(&self, game: &PlayedGame, by: RatedBy) -> Option<Contest> {
-        let sides = Side::BOTH.map(|side| self.numbers[&Rated::of(game, side)]);
-        Some(Contest::new(sides, by.won(game)?)).filter(Contest::is_informative)
+    fn trial_counts(&self, game: &PlayedGame, basis: RatingBasis) -> Option<TrialCounts> {
+        let sides = Side::BOTH.map(|side| self.numbers[&RatedSubmission::from_side(game, side)]);
+        Some(TrialCounts::new(sides, basis.trials_won(game)?)).filter(TrialCounts::is_informative)
     }
 }
 
-fn rate_pool(rated: &[&Rated], units: Vec<Vec<Contest>>, by: RatedBy) -> Pool {
+fn rate_pool(rated: &[&RatedSubmission], units: Vec<Vec<TrialCounts>>, basis: RatingBasis) -> Pool {
     let mut games = vec![0; rated.len()];
     let mut lost_and_won = vec![[false; 2]; rated.len()];
-    for contest in units.iter().flatten() {
+    for counts in units.iter().flatten() {
         for (own, other) in [(0, 1), (1, 0)] {
-            let side = contest.sides[own];
+            let side = counts.sides[own];
             games[side] += 1;
-            lost_and_won[side][0] |= contest.won[other] > 0;
-            lost_and_won[side][1] |= contest.won[own] > 0;
+            lost_and_won[side][0] |= counts.won[other] > 0;
+            lost_and_won[side][1] |= counts.won[own] > 0;
         }
     }
     let strengths = Model::new(
         rated.len(),
         units.iter().flatten(),
-        by.value(),
+        basis.value(),
         PRIOR_SD_STRENGTH,
     )
     .fit(&vec![0.0; rated.len()]);
-    let count = u32::try_from(units.len()).expect("a file of games is far shorter");
+    let unit_count = u32::try_from(units.len()).expect("a file of games is far shorter");
     let samples = Samples::draw(
         rated.len(),
         units,
-        fit_from(&strengths, by.value(), PRIOR_SD_STRENGTH),
+        fit_from(&strengths, basis.value(), PRIOR_SD_STRENGTH),
     );
     let mut ratings: Vec<Rating> = rated
         .iter()
@@ -253,23 +251,23 @@ fn rate_pool(rated: &[&Rated], units: Vec<Vec<Contest>>, by: RatedBy) -> Pool {
         .map(|(number, rated)| {
             let [lost, won] = lost_and_won[number];
             let interval = samples.interval95(number);
-            let end = |end: usize, is_held: bool| {
+            let bound = |index: usize, is_determined: bool| {
                 interval
-                    .filter(|_| is_held)
-                    .map(|ends| rating_of(ends[end]))
+                    .filter(|_| is_determined)
+                    .map(|bounds| rating_of(bounds[index]))
             };
             Rating {
                 rated: (*rated).clone(),
                 rating: rating_of(strengths[number]),
-                ci95: [end(0, won), end(1, lost)],
+                ci95: [bound(0, won), bound(1, lost)],
                 games: games[number],
             }
         })
         .collect();
-    // The stable sort leaves equals in the order of names.
+    // The sort is stable: ties stay sorted by name.
     ratings.sort_by(|a, b| b.rating.total_cmp(&a.rating));
     Pool {
-        units: count,
+        units: unit_count,
         usable_samples: samples.usable,
         ratings,
     }

@@ -1,68 +1,68 @@
 use faceoff_types::{RoundNumber, TeamName};
 
-/// Why there is no schedule, or no next round.
+/// Why a schedule or the next round is impossible.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum ScheduleError {
-    /// A game needs two.
+    /// The tournament has fewer than two teams.
     #[error("a tournament needs at least two teams, there are {0}; enter more")]
     TooFew(usize),
-    /// Of those who reached it too few are left.
+    /// Fewer than two finalists are left.
     #[error(
-        "a final needs at least two teams, there are {0} left of those who reached it; nothing more is to be played"
+        "a final needs at least two teams, {0} of the finalists are left; no more games are played"
     )]
     TooFewFinalists(usize),
-    /// More than anybody could wait for.
+    /// The tournament has too many teams.
     #[error("a tournament has at most {most} teams, there are {got}; divide them")]
     TooMany {
-        /// The most.
+        /// The maximum number of teams.
         most: usize,
-        /// What came.
+        /// The number of teams.
         got: usize,
     },
-    /// A team that would meet itself.
+    /// A team is listed twice.
     #[error("{0} is entered twice; enter each team once")]
     Duplicate(TeamName),
-    /// Somebody who is not in the tournament.
-    #[error("{team} is {place}, but was never entered; enter it or take it out there")]
+    /// A team is not an entrant.
+    #[error("{team} is in {place}, but is not entered; enter the team or remove it there")]
     UnknownTeam {
-        /// Who.
+        /// Name of the team.
         team: TeamName,
-        /// Where it occurs.
+        /// The round, game or list that refers to it.
         place: String,
     },
-    /// A game that was not to be played.
-    #[error("{home} against {away} is no game of round {round}; take its result out")]
+    /// A game is not in the schedule.
+    #[error("{home} against {away} is no game of round {round}; remove its result")]
     UnknownGame {
-        /// The round.
+        /// Number of the round.
         round: u32,
-        /// At home.
+        /// The home team.
         home: TeamName,
-        /// Away.
+        /// The away team.
         away: TeamName,
     },
-    /// A result is missing.
+    /// A game of an earlier round has no result.
     #[error(
         "round {round} is under way: {open} of its games have no result, {home} against {away} for one; play them first"
     )]
     Unfinished {
-        /// The round.
+        /// The unfinished round.
         round: RoundNumber,
-        /// Games without a result.
+        /// Number of games without a result.
         open: usize,
-        /// At home in the first of them.
+        /// The home team of the first such game.
         home: TeamName,
-        /// Away.
+        /// The away team.
         away: TeamName,
     },
-    /// Rounds have numbers without gaps.
+    /// The numbers of the rounds have a gap.
     #[error("expected round {expected}, got {got}; give all earlier rounds in order")]
     OutOfOrder {
-        /// What should have come.
+        /// The expected number.
         expected: u32,
-        /// What came.
+        /// The given number.
         got: RoundNumber,
     },
-    /// Numbers that no tournament has.
+    /// Invalid numbers of groups or finalists.
     #[error("{0}")]
     Format(String),
 }

@@ -10,26 +10,26 @@ use super::{
 use crate::{draws::Draws, tournament::bye::Bye};
 use faceoff_types::{Seed, TeamName, TournamentFormat};
 
-/// What follows from a format.
+/// The schedule of a tournament format.
 pub trait Schedule {
     /// The next round; `None` after the last one.
     ///
-    /// All that is drawn follows from `seed` and the round's number, whatever was drawn before.
+    /// Random draws depend only on `seed` and the round's number, not on earlier draws.
     ///
     /// # Errors
-    /// If fewer than two teams are left, the groups do not fit the teams, a game of an earlier round has
-    /// no result, or rounds and games do not belong together.
+    /// If fewer than two teams are left, the number of groups does not fit the teams, a game of an earlier round has no
+    /// result, or rounds and games do not match.
     fn next_round(
         &self,
         seed: &Seed,
         progress: &Progress<'_>,
     ) -> Result<Option<Round>, ScheduleError>;
 
-    /// The byes that give points: those of a Swiss tournament.
+    /// The byes that give points, which only Swiss tournaments have.
     #[must_use]
     fn byes(&self, rounds: &[Round]) -> Vec<Bye>;
 
-    /// The standings, the deciding ones first: one table, or the final's and each group's.
+    /// The standings, the decisive table first: one table, or those of the final and of each group.
     #[must_use]
     fn tables(&self, progress: &Progress<'_>) -> Vec<Table>;
 }
@@ -47,18 +47,18 @@ impl Schedule for TournamentFormat {
         else {
             return Ok(None);
         };
-        let playing: Vec<&TeamName> = progress.playing().collect();
-        if playing.len() < 2 {
-            return Err(ScheduleError::TooFew(playing.len()));
+        let active: Vec<&TeamName> = progress.active_teams().collect();
+        if active.len() < 2 {
+            return Err(ScheduleError::TooFew(active.len()));
         }
         let mut draws = Draws::from_seed(&seed.derive("schedule", &number.get().to_le_bytes()));
-        let meetings = progress.meetings();
+        let pairing_counts = progress.pairing_counts();
         let mut groups = Vec::new();
         let matchdays = match self {
             Self::RoundRobin { .. } => {
-                let mut teams = playing;
+                let mut teams = active;
                 draws.shuffle(&mut teams);
-                round_robin(&teams, &meetings)
+                round_robin(&teams, &pairing_counts)
             }
             Self::Swiss { .. } => vec![swiss(progress, &mut draws)],
             Self::Groups {
@@ -66,19 +66,19 @@ impl Schedule for TournamentFormat {
                 advance,
             } => match progress.rounds.first() {
                 None => {
-                    let count = check_groups(playing.len(), *count, *advance)?;
-                    groups = draw_groups(playing, count, &mut draws);
-                    group_matchdays(&groups, &meetings)
+                    let count = check_groups(active.len(), *count, *advance)?;
+                    groups = draw_groups(active, count, &mut draws);
+                    group_matchdays(&groups, &pairing_counts)
                 }
                 Some(first) => {
-                    let through = finalists(progress, first, *advance as usize);
-                    if through.len() < 2 {
-                        return Err(ScheduleError::TooFewFinalists(through.len()));
+                    let finalists = finalists(progress, first, *advance as usize);
+                    if finalists.len() < 2 {
+                        return Err(ScheduleError::TooFewFinalists(finalists.len()));
                     }
-                    let mut teams = playing;
-                    teams.retain(|team| through.contains(team));
+                    let mut teams = active;
+                    teams.retain(|team| finalists.contains(team));
                     draws.shuffle(&mut teams);
-                    round_robin(&teams, &meetings)
+                    round_robin(&teams, &pairing_counts)
                 }
             },
         };
@@ -98,15 +98,15 @@ impl Schedule for TournamentFormat {
 
     fn tables(&self, progress: &Progress<'_>) -> Vec<Table> {
         match self {
-            Self::Groups { .. } => tables::of_groups(progress),
+            Self::Groups { .. } => tables::group_tables(progress),
             Self::RoundRobin { .. } | Self::Swiss { .. } => {
-                vec![tables::of_all(progress, &self.byes(progress.rounds))]
+                vec![tables::overall_table(progress, &self.byes(progress.rounds))]
             }
         }
     }
 }
 
-/// The number of groups, if it fits.
+/// Checks the numbers of groups and finalists against the number of teams.
 fn check_groups(teams: usize, groups: u32, advance: u32) -> Result<usize, ScheduleError> {
     let count = groups as usize;
     if count < 1 || teams / count.max(1) < 2 {

@@ -1,5 +1,5 @@
 use super::{
-    progress::{Meetings, Progress},
+    progress::{PairingCounts, Progress},
     round::{Matchday, Round},
     round_robin::round_robin,
 };
@@ -8,12 +8,12 @@ use crate::{
     tournament::{
         departures::Departures,
         game::PlayedGame,
-        standings::{Standing, score_tournament_with},
+        standings::{StandingsRow, score_tournament_with},
     },
 };
 use faceoff_types::TeamName;
 
-/// Deals the teams into groups whose sizes differ by one at most, by a draw.
+/// Draws groups whose sizes differ by at most one.
 pub(super) fn draw_groups(
     teams: Vec<&TeamName>,
     groups: usize,
@@ -22,18 +22,18 @@ pub(super) fn draw_groups(
     let mut teams = teams;
     draws.shuffle(&mut teams);
     let mut all = vec![Vec::new(); groups];
-    for (place, team) in teams.into_iter().enumerate() {
-        all[place % groups].push(team.clone());
+    for (index, team) in teams.into_iter().enumerate() {
+        all[index % groups].push(team.clone());
     }
     all
 }
 
-/// A round robin in each group; the first matchdays of all groups are the round's first, and so on.
-pub(super) fn group_matchdays(groups: &[Vec<TeamName>], meetings: &Meetings<'_>) -> Vec<Matchday> {
+/// A round robin in each group; matchday n of the round combines matchday n of all groups.
+pub(super) fn group_matchdays(groups: &[Vec<TeamName>], pairing_counts: &PairingCounts<'_>) -> Vec<Matchday> {
     let mut all = Vec::<Matchday>::new();
     for group in groups {
         let group: Vec<&TeamName> = group.iter().collect();
-        for (day, mut matchday) in round_robin(&group, meetings).into_iter().enumerate() {
+        for (day, mut matchday) in round_robin(&group, pairing_counts).into_iter().enumerate() {
             if all.len() == day {
                 all.push(Matchday::default());
             }
@@ -44,14 +44,14 @@ pub(super) fn group_matchdays(groups: &[Vec<TeamName>], meetings: &Meetings<'_>)
     all
 }
 
-/// The standings of a group: games among its members alone.
+/// The standings of a group, from the games between its members.
 pub(super) fn group_standings(
     group: &[TeamName],
     round: &Round,
     games: &[PlayedGame],
     departures: &Departures,
-) -> Vec<Standing> {
-    let of_group: Vec<PlayedGame> = games
+) -> Vec<StandingsRow> {
+    let group_games: Vec<PlayedGame> = games
         .iter()
         .filter(|game| {
             game.round() == round.number.get()
@@ -59,26 +59,26 @@ pub(super) fn group_standings(
         })
         .cloned()
         .collect();
-    score_tournament_with(&of_group, departures, &[]).standings
+    score_tournament_with(&group_games, departures, &[]).standings
 }
 
-/// The best `advance` of each group that are still in the tournament, groups in order. A team that is
-/// alone in its group, since the others left, has no standing and advances last.
+/// The best `advance` active teams of each group, in the order of the groups. A team without a row in the standings, since
+/// all others of its group left, is the last of its group.
 pub(super) fn finalists(progress: &Progress<'_>, round: &Round, advance: usize) -> Vec<TeamName> {
     let mut all = Vec::new();
     for group in &round.groups {
         let standings = group_standings(group, round, progress.games, progress.departures);
-        let ranked = standings.into_iter().map(|standing| standing.team);
+        let ranked = standings.into_iter().map(|row| row.team);
         let mut order: Vec<TeamName> = ranked.collect();
         for team in group {
             if !order.contains(team) {
                 order.push(team.clone());
             }
         }
-        let playing = order
+        let active = order
             .into_iter()
             .filter(|team| !progress.departures.contains(team));
-        all.extend(playing.take(advance));
+        all.extend(active.take(advance));
     }
     all
 }

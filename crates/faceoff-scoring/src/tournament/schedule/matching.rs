@@ -3,14 +3,14 @@ use petgraph::{
     graph::{NodeIndex, UnGraph},
 };
 
-/// How many pairs can be made of `members` at most, if only those may be paired that `may_meet`.
+/// The maximum number of disjoint pairs of `members`, if only those with `may_meet` may be paired.
 pub(super) fn most_pairs(members: &[usize], may_meet: impl Fn(usize, usize) -> bool) -> usize {
     let mut graph = UnGraph::<(), ()>::with_capacity(members.len(), 0);
     let nodes: Vec<NodeIndex> = members.iter().map(|_| graph.add_node(())).collect();
-    for (place, a) in members.iter().enumerate() {
-        for (other, b) in members.iter().enumerate().skip(place + 1) {
+    for (index_a, a) in members.iter().enumerate() {
+        for (index_b, b) in members.iter().enumerate().skip(index_a + 1) {
             if may_meet(*a, *b) {
-                graph.add_edge(nodes[place], nodes[other], ());
+                graph.add_edge(nodes[index_a], nodes[index_b], ());
             }
         }
     }
@@ -22,16 +22,16 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    fn by_trying(members: &[usize], may_meet: &impl Fn(usize, usize) -> bool) -> usize {
+    fn most_pairs_by_enumeration(members: &[usize], may_meet: &impl Fn(usize, usize) -> bool) -> usize {
         let Some((first, rest)) = members.split_first() else {
             return 0;
         };
-        let mut best = by_trying(rest, may_meet);
-        for (place, other) in rest.iter().enumerate() {
+        let mut best = most_pairs_by_enumeration(rest, may_meet);
+        for (index, other) in rest.iter().enumerate() {
             if may_meet(*first, *other) {
                 let mut left = rest.to_vec();
-                left.remove(place);
-                best = best.max(1 + by_trying(&left, may_meet));
+                left.remove(index);
+                best = best.max(1 + most_pairs_by_enumeration(&left, may_meet));
             }
         }
         best
@@ -39,10 +39,10 @@ mod tests {
 
     proptest! {
         #[test]
-        fn as_many_pairs_as_trying_everything_finds(edges in proptest::collection::vec(any::<bool>(), 64)) {
+        fn most_pairs_agrees_with_enumeration(edges in proptest::collection::vec(any::<bool>(), 64)) {
             let members: Vec<usize> = (0..8).collect();
             let may_meet = |a: usize, b: usize| edges[8 * a.min(b) + a.max(b)];
-            prop_assert_eq!(most_pairs(&members, may_meet), by_trying(&members, &may_meet));
+            prop_assert_eq!(most_pairs(&members, may_meet), most_pairs_by_enumeration(&members, &may_meet));
         }
     }
 }

@@ -1,9 +1,9 @@
-//! Who meets whom: from the entrants, a seed and the rounds so far to the next round.
+//! The schedule: computes the next round from the entrants, a seed and the earlier rounds.
 //!
-//! A *round* is what is played with one set of frozen submissions: a whole round robin, the groups or
-//! the final of a tournament with groups, one pairing of a Swiss tournament. In a *matchday* nobody
-//! plays twice, so that its games can be played side by side. The same entrants, seed and results give the
-//! same schedule, in whatever order the entrants are listed.
+//! A *round* consists of the games with one set of frozen submissions: a whole round robin, the groups or the final of a
+//! tournament with groups, or one pairing of a Swiss tournament. In a *matchday* each team has at most one game, so that
+//! its games can run in parallel. The same entrants, seed and results give the same schedule, regardless of the order of
+//! the entrants.
 
 mod entrants;
 mod error;
@@ -22,4 +22,4 @@ pub use faceoff_types::TournamentFormat as Format;
 pub use format::Schedule;
 pub use progress::Progress;
 pub use round::{Matchday, Pairing, Round};
-pub use tables::{Table, TableOf};
+pub use tables::{Table, TableScope};

@@ -7,61 +7,61 @@ use crate::tournament::{departures::Departures, game::PlayedGame};
 use faceoff_types::{RoundNumber, TeamName};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// What has happened in a tournament so far.
+/// The state of a tournament: entrants, departures, rounds and results.
 #[derive(Debug, Clone, Copy)]
 pub struct Progress<'a> {
-    /// Everybody that has been in it.
+    /// All teams that ever entered, including those that left.
     pub entrants: &'a Entrants,
-    /// Who left.
+    /// Teams that left.
     pub departures: &'a Departures,
-    /// All rounds that were drawn, in order.
+    /// All rounds so far, in order.
     pub rounds: &'a [Round],
-    /// All results.
+    /// All games with a result.
     pub games: &'a [PlayedGame],
 }
 
 impl<'a> Progress<'a> {
-    /// The teams that are still in it, by name.
-    pub(super) fn playing(&self) -> impl Iterator<Item = &'a TeamName> + use<'a> {
+    /// The teams that have not left, sorted by name.
+    pub(super) fn active_teams(&self) -> impl Iterator<Item = &'a TeamName> + use<'a> {
         let departures = self.departures;
         self.entrants
             .iter()
             .filter(move |team| !departures.contains(team))
     }
 
-    /// The round that a team leaves from that leaves now: the first one with an open game, else the one
-    /// after all that were drawn. `None` if a tournament cannot have so many rounds.
+    /// The first round with an open game, otherwise the next one; a departure now excludes games from this round on.
+    /// `None` if a tournament cannot have another round.
     #[must_use]
-    pub fn round_under_way(&self) -> Option<RoundNumber> {
-        let played = self.played();
-        let open = self
+    pub fn current_round(&self) -> Option<RoundNumber> {
+        let finished = self.finished_pairings();
+        let unfinished = self
             .rounds
             .iter()
-            .find(|round| self.open(round, &played).next().is_some());
-        match open {
+            .find(|round| self.open_pairings(round, &finished).next().is_some());
+        match unfinished {
             Some(round) => Some(round.number),
             None => self.next_number(),
         }
     }
 
-    /// Which pairs of teams, by name, have a result in which round.
-    fn played(&self) -> BTreeSet<(u32, [&'a TeamName; 2])> {
+    /// Round and pair of teams, sorted by name, of each game with a result.
+    fn finished_pairings(&self) -> BTreeSet<(u32, [&'a TeamName; 2])> {
         self.games
             .iter()
-            .map(|game| (game.round(), by_name(game.teams())))
+            .map(|game| (game.round(), sorted_by_name(game.teams())))
             .collect()
     }
 
-    /// The games of a round that have no result and still can get one.
-    fn open<'b>(
+    /// The games of a round without a result, except those of teams that left.
+    fn open_pairings<'b>(
         &'b self,
         round: &'a Round,
-        played: &'b BTreeSet<(u32, [&'a TeamName; 2])>,
+        finished: &'b BTreeSet<(u32, [&'a TeamName; 2])>,
     ) -> impl Iterator<Item = &'a Pairing> + 'b {
         let number = round.number.get();
         round.pairings().filter(move |pairing| {
             let teams = pairing.teams();
-            !played.contains(&(number, by_name(teams)))
+            !finished.contains(&(number, sorted_by_name(teams)))
                 && !teams.iter().any(|team| self.departures.contains(team))
         })
     }
@@ -71,12 +71,12 @@ impl<'a> Progress<'a> {
         next.try_into().ok()
     }
 
-    /// That rounds and games fit to each other and to the entrants, and that nothing is open.
+    /// Checks that rounds, games and entrants match and that no game is open.
     pub(super) fn check(&self) -> Result<(), ScheduleError> {
         for team in self.departures.teams() {
-            self.known(team, || "said to have left".to_owned())?;
+            self.check_entrant(team, || "the list of departures".to_owned())?;
         }
-        let mut drawn = BTreeSet::new();
+        let mut scheduled = BTreeSet::new();
         for (expected, round) in (1..).zip(self.rounds) {
             if round.number.get() != expected {
                 return Err(ScheduleError::OutOfOrder {
@@ -85,19 +85,19 @@ impl<'a> Progress<'a> {
                 });
             }
             for pairing in round.pairings() {
-                drawn.insert((expected, by_name(pairing.teams())));
+                scheduled.insert((expected, sorted_by_name(pairing.teams())));
             }
             let paired = round.pairings().flat_map(Pairing::teams);
             for team in paired.chain(round.byes()) {
-                self.known(team, || format!("in round {expected}"))?;
+                self.check_entrant(team, || format!("round {expected}"))?;
             }
         }
         for game in self.games {
             let [home, away] = game.teams();
             for team in [home, away] {
-                self.known(team, || format!("in a game of round {}", game.round()))?;
+                self.check_entrant(team, || format!("a game of round {}", game.round()))?;
             }
-            if !drawn.contains(&(game.round(), by_name([home, away]))) {
+            if !scheduled.contains(&(game.round(), sorted_by_name([home, away]))) {
                 return Err(ScheduleError::UnknownGame {
                     round: game.round(),
                     home: home.clone(),
@@ -105,9 +105,9 @@ impl<'a> Progress<'a> {
                 });
             }
         }
-        let played = self.played();
+        let finished = self.finished_pairings();
         for round in self.rounds {
-            let mut open = self.open(round, &played);
+            let mut open = self.open_pairings(round, &finished);
             if let Some(first) = open.next() {
                 return Err(ScheduleError::Unfinished {
                     round: round.number,
@@ -120,7 +120,7 @@ impl<'a> Progress<'a> {
         Ok(())
     }
 
-    fn known(&self, team: &TeamName, place: impl FnOnce() -> String) -> Result<(), ScheduleError> {
+    fn check_entrant(&self, team: &TeamName, place: impl FnOnce() -> String) -> Result<(), ScheduleError> {
         if self.entrants.contains(team) {
             return Ok(());
         }
@@ -130,39 +130,39 @@ impl<'a> Progress<'a> {
         })
     }
 
-    /// For each ordered pair of teams, how often the first was at home against the second.
-    pub(super) fn meetings(&self) -> Meetings<'a> {
-        let mut homes = BTreeMap::new();
+    /// Counts for each ordered pair of teams how often the first was the home team.
+    pub(super) fn pairing_counts(&self) -> PairingCounts<'a> {
+        let mut home_games = BTreeMap::new();
         for pairing in self.rounds.iter().flat_map(Round::pairings) {
-            *homes.entry(pairing.teams()).or_default() += 1;
+            *home_games.entry(pairing.teams()).or_default() += 1;
         }
-        Meetings { homes }
+        PairingCounts { home_games }
     }
 }
 
-/// How often teams were drawn against each other.
-pub(super) struct Meetings<'a> {
-    homes: BTreeMap<[&'a TeamName; 2], u32>,
+/// Numbers of scheduled games between teams.
+pub(super) struct PairingCounts<'a> {
+    home_games: BTreeMap<[&'a TeamName; 2], u32>,
 }
 
-impl<'a> Meetings<'a> {
-    fn homes(&self, home: &'a TeamName, away: &'a TeamName) -> u32 {
-        self.homes.get(&[home, away]).copied().unwrap_or(0)
+impl<'a> PairingCounts<'a> {
+    fn home_games(&self, home: &'a TeamName, away: &'a TeamName) -> u32 {
+        self.home_games.get(&[home, away]).copied().unwrap_or(0)
     }
 
-    /// How often two teams were drawn against each other.
-    pub(super) fn of(&self, a: &'a TeamName, b: &'a TeamName) -> u32 {
-        self.homes(a, b) + self.homes(b, a)
+    /// Number of games between two teams.
+    pub(super) fn games(&self, a: &'a TeamName, b: &'a TeamName) -> u32 {
+        self.home_games(a, b) + self.home_games(b, a)
     }
 
-    /// How much more often the first was at home against the second than away.
+    /// Home games minus away games of the first team against the second.
     pub(super) fn home_lead(&self, a: &'a TeamName, b: &'a TeamName) -> i64 {
-        i64::from(self.homes(a, b)) - i64::from(self.homes(b, a))
+        i64::from(self.home_games(a, b)) - i64::from(self.home_games(b, a))
     }
 
-    /// How much more often a team was at home than away, against anybody.
+    /// Home games minus away games of a team against all opponents.
     pub(super) fn home_balance(&self, team: &TeamName) -> i64 {
-        self.homes
+        self.home_games
             .iter()
             .map(|([home, away], games)| {
                 i64::from(*games) * (i64::from(*home == team) - i64::from(*away == team))
@@ -171,7 +171,7 @@ impl<'a> Meetings<'a> {
     }
 }
 
-fn by_name(mut teams: [&TeamName; 2]) -> [&TeamName; 2] {
+fn sorted_by_name(mut teams: [&TeamName; 2]) -> [&TeamName; 2] {
     teams.sort();
     teams
 }

@@ -1,7 +1,7 @@
 use faceoff_types::{RoundNumber, TeamName};
 use serde::{Deserialize, Serialize};
 
-/// A game to be played.
+/// A scheduled game.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Pairing {
     /// The team of the first robot.
@@ -11,13 +11,13 @@ pub struct Pairing {
 }
 
 impl Pairing {
-    /// Both teams, home first.
+    /// Both teams, home team first.
     #[must_use]
     pub const fn teams(&self) -> [&TeamName; 2] {
         [&self.home, &self.away]
     }
 
-    /// Whether these two meet, whoever is at home.
+    /// Whether the game is between these two teams, regardless of the home side.
     #[must_use]
     pub fn is_between(&self, teams: [&TeamName; 2]) -> bool {
         let [home, away] = self.teams();
@@ -25,24 +25,24 @@ impl Pairing {
     }
 }
 
-/// Games that can be played side by side: no team is in two of them.
+/// Games that can run in parallel: each team has at most one.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Matchday {
-    /// The games.
+    /// The games of the day.
     pub pairings: Vec<Pairing>,
-    /// Who has nobody to play.
+    /// Teams without an opponent on this day.
     pub byes: Vec<TeamName>,
 }
 
-/// A round, as it was drawn.
+/// The schedule of a round.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Round {
-    /// From 1.
+    /// Number of the round, from 1.
     pub number: RoundNumber,
-    /// Who plays in which group, where there are groups.
+    /// The teams of each group; absent for formats without groups.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub groups: Vec<Vec<TeamName>>,
-    /// The games in the order of play.
+    /// The matchdays in the order of play.
     pub matchdays: Vec<Matchday>,
 }
 

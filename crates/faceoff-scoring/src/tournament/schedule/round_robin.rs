@@ -1,16 +1,16 @@
 use super::{
-    progress::Meetings,
+    progress::PairingCounts,
     round::{Matchday, Pairing},
 };
 use faceoff_types::TeamName;
 
-/// Everybody meets everybody once, by the circle method: all but one team stand in a circle that turns by
-/// one place a matchday, and those who face each other play. With an odd number the empty place faces
-/// one team a day, which has a bye; each team has exactly one.
+/// A single round robin by the circle method: all teams but one are on a circle that turns by one position per matchday,
+/// and teams at opposite positions play. With an odd number of teams one position is empty; the team opposite has a bye,
+/// so that each team has exactly one.
 ///
-/// At home is who was so less often against the same opponent; at the first meeting it follows from the
-/// places, so that no team is at home more than once more, or once less, than away.
-pub(super) fn round_robin<'a>(teams: &[&'a TeamName], meetings: &Meetings<'a>) -> Vec<Matchday> {
+/// The home team is the one with fewer home games against this opponent. In their first game it follows from the positions,
+/// so that the numbers of home and away games of a team differ by at most one.
+pub(super) fn round_robin<'a>(teams: &[&'a TeamName], pairing_counts: &PairingCounts<'a>) -> Vec<Matchday> {
     let count = teams.len();
     if count < 2 {
         return Vec::new();
@@ -23,27 +23,27 @@ pub(super) fn round_robin<'a>(teams: &[&'a TeamName], meetings: &Meetings<'a>) -
     (0..circle)
         .map(|day| {
             let mut matchday = Matchday::default();
-            // Who turns up at the place that does not turn: the last team, or nobody.
+            // The position off the circle: the last team or, with an odd number of teams, empty.
             if circle < count {
                 matchday
                     .pairings
-                    .push(pairing(teams, [day, circle], meetings));
+                    .push(pairing(teams, [day, circle], pairing_counts));
             } else {
                 matchday.byes.push(teams[day].clone());
             }
             for step in 1..=(circle - 1) / 2 {
-                let places = [(day + step) % circle, (day + circle - step) % circle];
-                matchday.pairings.push(pairing(teams, places, meetings));
+                let positions = [(day + step) % circle, (day + circle - step) % circle];
+                matchday.pairings.push(pairing(teams, positions, pairing_counts));
             }
             matchday
         })
         .collect()
 }
 
-fn pairing<'a>(teams: &[&'a TeamName], places: [usize; 2], meetings: &Meetings<'a>) -> Pairing {
-    let [a, b] = places.map(|place| teams[place]);
-    let first_is_home = match meetings.home_lead(a, b) {
-        0 => is_home_at_first(places, teams.len()),
+fn pairing<'a>(teams: &[&'a TeamName], positions: [usize; 2], pairing_counts: &PairingCounts<'a>) -> Pairing {
+    let [a, b] = positions.map(|position| teams[position]);
+    let first_is_home = match pairing_counts.home_lead(a, b) {
+        0 => is_home_at_first(positions, teams.len()),
         lead => lead < 0,
     };
     let [home, away] = if first_is_home { [a, b] } else { [b, a] };
@@ -53,8 +53,8 @@ fn pairing<'a>(teams: &[&'a TeamName], places: [usize; 2], meetings: &Meetings<'
     }
 }
 
-/// All places in one circle: each is at home against the next half of it. With an even number the
-/// place right across belongs to neither half; there the lower number is at home.
+/// With all positions on one circle, each has home games against the next half of the circle. With an even number the
+/// opposite position is in neither half; there the lower number is the home team.
 fn is_home_at_first([a, b]: [usize; 2], count: usize) -> bool {
     let ahead = (b + count - a) % count;
     if 2 * ahead == count {

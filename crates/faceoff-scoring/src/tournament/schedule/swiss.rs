@@ -1,6 +1,6 @@
 use super::{
     matching::most_pairs,
-    progress::{Meetings, Progress},
+    progress::{PairingCounts, Progress},
     round::{Matchday, Pairing, Round},
 };
 use crate::{
@@ -10,28 +10,29 @@ use crate::{
 use faceoff_types::TeamName;
 use std::collections::BTreeMap;
 
-/// One pairing of a Swiss tournament. In the order of the standings, which in the first round is drawn,
-/// each team that has no opponent yet gets the next one that it has not met, unless that would force a
-/// repeat further down that can be avoided. With an odd number the last one among those with the fewest
-/// byes has a bye.
+/// One pairing of a Swiss tournament.
+///
+/// Teams are sorted by the standings; in the first round the order is random. Each team without an opponent is paired with
+/// the next one that it has not met, unless that would force an avoidable repeat further down. With an odd number of
+/// teams, the lowest of those with the fewest byes has a bye.
 pub(super) fn swiss(progress: &Progress<'_>, draws: &mut Draws) -> Matchday {
-    let mut order = in_order(progress, draws);
+    let mut teams = ranked_teams(progress, draws);
     let mut matchday = Matchday::default();
-    if !order.len().is_multiple_of(2) {
-        let bye = order.remove(next_bye(&order, progress.rounds));
+    if !teams.len().is_multiple_of(2) {
+        let bye = teams.remove(next_bye(&teams, progress.rounds));
         matchday.byes.push(bye.clone());
     }
-    let meetings = progress.meetings();
-    for [upper, lower] in pairs(&order, &meetings) {
-        let [a, b] = [order[upper], order[lower]];
-        matchday.pairings.push(pairing([a, b], &meetings, draws));
+    let pairing_counts = progress.pairing_counts();
+    for [upper, lower] in pairs(&teams, &pairing_counts) {
+        let [a, b] = [teams[upper], teams[lower]];
+        matchday.pairings.push(pairing([a, b], &pairing_counts, draws));
     }
     matchday
 }
 
 /// The byes of a Swiss tournament, which give points.
 pub(super) fn byes(rounds: &[Round]) -> Vec<Bye> {
-    let of = |round: &Round| {
+    let byes_of_round = |round: &Round| {
         let number = round.number;
         let byes = round.byes().map(move |team| Bye {
             round: number,
@@ -39,29 +40,30 @@ pub(super) fn byes(rounds: &[Round]) -> Vec<Bye> {
         });
         byes.collect::<Vec<_>>()
     };
-    rounds.iter().flat_map(of).collect()
+    rounds.iter().flat_map(byes_of_round).collect()
 }
 
-/// Who is still in it, the best first; those without a game or a bye last, in a drawn order.
-fn in_order<'a>(progress: &Progress<'a>, draws: &mut Draws) -> Vec<&'a TeamName> {
-    let mut teams: Vec<&TeamName> = progress.playing().collect();
+/// The active teams, best first; teams without a game or a bye are last, in random order.
+fn ranked_teams<'a>(progress: &Progress<'a>, draws: &mut Draws) -> Vec<&'a TeamName> {
+    let mut teams: Vec<&TeamName> = progress.active_teams().collect();
     draws.shuffle(&mut teams);
     let byes = byes(progress.rounds);
     let standings = score_tournament_with(progress.games, progress.departures, &byes).standings;
     let ranks: BTreeMap<&TeamName, u32> = standings
         .iter()
-        .map(|standing| (&standing.team, standing.rank))
+        .map(|row| (&row.team, row.rank))
         .collect();
     teams.sort_by_key(|team| ranks.get(team).copied().unwrap_or(u32::MAX));
     teams
 }
 
-fn next_bye(order: &[&TeamName], rounds: &[Round]) -> usize {
-    let had = |team: &TeamName| {
+/// Index of the team with the next bye.
+fn next_bye(teams: &[&TeamName], rounds: &[Round]) -> usize {
+    let bye_count = |team: &TeamName| {
         let byes = rounds.iter().flat_map(Round::byes);
         byes.filter(|other| *other == team).count()
     };
-    let counts: Vec<usize> = order.iter().map(|team| had(team)).collect();
+    let counts: Vec<usize> = teams.iter().map(|team| bye_count(team)).collect();
     let fewest = counts.iter().min().copied().unwrap_or(0);
     counts
         .iter()
@@ -69,17 +71,17 @@ fn next_bye(order: &[&TeamName], rounds: &[Round]) -> usize {
         .unwrap_or(0)
 }
 
-/// Pairs of places in `order`, whose length is even.
-fn pairs<'a>(order: &[&'a TeamName], meetings: &Meetings<'a>) -> Vec<[usize; 2]> {
-    let count = order.len();
-    let times: Vec<u32> = order
+/// Pairs of indices into `teams`, whose number is even.
+fn pairs<'a>(teams: &[&'a TeamName], pairing_counts: &PairingCounts<'a>) -> Vec<[usize; 2]> {
+    let count = teams.len();
+    let games: Vec<u32> = teams
         .iter()
-        .flat_map(|a| order.iter().map(|b| meetings.of(a, b)))
+        .flat_map(|a| teams.iter().map(|b| pairing_counts.games(a, b)))
         .collect();
-    let have_not_met = |a: usize, b: usize| times[count * a + b] == 0;
-    let mut left: Vec<usize> = (0..order.len()).collect();
-    // How many pairs of those left can be new ones.
-    let mut new = most_pairs(&left, have_not_met);
+    let have_not_met = |a: usize, b: usize| games[count * a + b] == 0;
+    let mut left: Vec<usize> = (0..count).collect();
+    // Maximum number of new pairs among the remaining teams.
+    let mut new_pairs = most_pairs(&left, have_not_met);
     let mut pairs = Vec::new();
     while let Some((upper, others)) = left.split_first() {
         let upper = *upper;
@@ -91,36 +93,36 @@ fn pairs<'a>(order: &[&'a TeamName], meetings: &Meetings<'a>) -> Vec<[usize; 2]>
             .iter()
             .copied()
             .filter(|other| have_not_met(upper, *other))
-            .find(|other| most_pairs(&without(*other), have_not_met) + 1 == new);
-        // Somebody must meet an opponent again, and it is this team: the one that it met least often.
+            .find(|other| most_pairs(&without(*other), have_not_met) + 1 == new_pairs);
+        // A repeat is unavoidable and falls to this team: it gets the opponent that it met least often.
         let opponent = opponent.or_else(|| {
-            new += 1; // this pair is none of the new ones
-            let mut again: Vec<usize> = others.to_vec();
-            again.sort_by_key(|other| times[count * upper + other]);
-            again
+            new_pairs += 1; // this pair is not new
+            let mut repeats: Vec<usize> = others.to_vec();
+            repeats.sort_by_key(|other| games[count * upper + other]);
+            repeats
                 .into_iter()
-                .find(|other| most_pairs(&without(*other), have_not_met) + 1 == new)
+                .find(|other| most_pairs(&without(*other), have_not_met) + 1 == new_pairs)
         });
         let opponent =
-            opponent.expect("of an even number, those outside of a largest matching come in twos");
-        new -= 1;
+            opponent.expect("the number of teams outside a maximum matching is even");
+        new_pairs -= 1;
         left = without(opponent);
         pairs.push([upper, opponent]);
     }
     pairs
 }
 
-/// At home is who was so less often, then who was so less often against this opponent, then who is drawn.
-fn pairing<'a>([a, b]: [&'a TeamName; 2], meetings: &Meetings<'a>, draws: &mut Draws) -> Pairing {
-    let lead = meetings.home_balance(a) - meetings.home_balance(b);
+/// The home team is the one with fewer home games, then with fewer home games against this opponent, then a random one.
+fn pairing<'a>([a, b]: [&'a TeamName; 2], pairing_counts: &PairingCounts<'a>, draws: &mut Draws) -> Pairing {
+    let lead = pairing_counts.home_balance(a) - pairing_counts.home_balance(b);
     let lead = if lead == 0 {
-        meetings.home_lead(a, b)
+        pairing_counts.home_lead(a, b)
     } else {
         lead
     };
-    // Drawn in any case, so that a draw does not depend on the others.
-    let drawn = draws.below(2) == 0;
-    let [home, away] = if lead < 0 || (lead == 0 && drawn) {
+    // Drawn in all cases, so that later draws do not depend on this one.
+    let coin = draws.below(2) == 0;
+    let [home, away] = if lead < 0 || (lead == 0 && coin) {
         [a, b]
     } else {
         [b, a]

@@ -2,55 +2,56 @@ use super::{groups::group_standings, progress::Progress};
 use crate::tournament::{
     bye::Bye,
     game::PlayedGame,
-    standings::{Standing, score_tournament_with},
+    standings::{StandingsRow, score_tournament_with},
 };
 use serde::{Deserialize, Serialize};
 
-/// Standings of a tournament, or of a part of it.
+/// The standings of a tournament or a part of it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct Table {
-    /// Of what.
-    pub of: TableOf,
-    /// Best first.
-    pub standings: Vec<Standing>,
+    /// The games that the standings are of.
+    #[serde(rename = "of")]
+    pub scope: TableScope,
+    /// Rows of the table, best first.
+    pub standings: Vec<StandingsRow>,
 }
 
-/// What standings are of.
+/// The part of a tournament that a table covers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[serde(rename_all = "snake_case")]
-pub enum TableOf {
-    /// All rounds.
+pub enum TableScope {
+    /// All rounds of a tournament without groups.
     Tournament,
-    /// A group, from 1.
+    /// The group with this number, from 1.
     Group(u32),
-    /// The final, whose first is the champion.
+    /// The final; its first team is the champion.
     Final,
 }
 
-/// Of all rounds, with the byes that give points.
-pub(super) fn of_all(progress: &Progress<'_>, byes: &[Bye]) -> Table {
+/// The table of all rounds, with the byes that give points.
+pub(super) fn overall_table(progress: &Progress<'_>, byes: &[Bye]) -> Table {
     let all = score_tournament_with(progress.games, progress.departures, byes);
     Table {
-        of: TableOf::Tournament,
+        scope: TableScope::Tournament,
         standings: all.standings,
     }
 }
 
-/// Of the final and each group.
-pub(super) fn of_groups(progress: &Progress<'_>) -> Vec<Table> {
+/// The tables of the final and of each group.
+pub(super) fn group_tables(progress: &Progress<'_>) -> Vec<Table> {
     let mut tables = Vec::new();
     if let Some(last) = progress.rounds.get(1) {
-        let of_final: Vec<PlayedGame> = progress
+        let final_games: Vec<PlayedGame> = progress
             .games
             .iter()
             .filter(|game| game.round() == last.number.get())
             .cloned()
             .collect();
         tables.push(Table {
-            of: TableOf::Final,
-            standings: score_tournament_with(&of_final, progress.departures, &[]).standings,
+            scope: TableScope::Final,
+            standings: score_tournament_with(&final_games, progress.departures, &[]).standings,
         });
     }
     let Some(first) = progress.rounds.first() else {
@@ -58,7 +59,7 @@ pub(super) fn of_groups(progress: &Progress<'_>) -> Vec<Table> {
     };
     for (number, group) in (1..).zip(&first.groups) {
         tables.push(Table {
-            of: TableOf::Group(number),
+            scope: TableScope::Group(number),
             standings: group_standings(group, first, progress.games, progress.departures),
         });
     }

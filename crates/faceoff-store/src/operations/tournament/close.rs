@@ -12,8 +12,8 @@ use faceoff_types::TournamentId;
 use jiff::Timestamp;
 
 impl Store {
-    /// Closes a tournament: nothing of it changes any more. [`StoreError::Conflict`] while a game is open, or one of a
-    /// round has no result and both its teams are in it.
+    /// Closes a tournament for good. [`StoreError::Conflict`] while a game is open, or a game of a round between two
+    /// remaining entrants has no result.
     #[boxed]
     pub async fn close_tournament(
         &self,
@@ -26,13 +26,13 @@ impl Store {
             let open = games::open(tx, id).await?.len();
             if open > 0 {
                 return Err(StoreError::Conflict(format!(
-                    "{open} games are queued or running: wait for their end, or call off those that do not count"
+                    "{open} games are queued or running: wait for their end, or cancel those that do not count"
                 )));
             }
-            if let Some(owed) = games::owed(tx, id).await?.first() {
+            if let Some(pending) = games::pending(tx, id).await?.first() {
                 return Err(StoreError::Conflict(format!(
                     "game {} has no result: play it again, or let one of its teams leave",
-                    owed.game
+                    pending.game
                 )));
             }
             tournament.closed_at = Some(now);

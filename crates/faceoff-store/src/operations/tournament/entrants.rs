@@ -2,52 +2,52 @@ use crate::{
     boxed,
     error::{Result, StoreError},
     event::{Actor, Event, Subject},
-    operations::tournament::play,
+    operations::tournament::game_lifecycle,
     store::Store,
     tables::{
-        entrants::{self, Leave},
+        entrants::{self, Departure},
         games::{self, GamePurpose, GameState},
         rounds, season, teams,
         tournaments::{self, Tournament},
     },
     write::Tx,
 };
-use faceoff_types::{LeftAs, RoundNumber, TeamId, TournamentFormat, TournamentId};
+use faceoff_types::{DepartureKind, RoundNumber, TeamId, TournamentFormat, TournamentId};
 use jiff::Timestamp;
 use std::collections::BTreeSet;
 
-/// A team that leaves.
+/// A team's departure from a tournament, to be carried out.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Leaving {
+pub struct DepartureRequest {
     pub team: TeamId,
-    pub left_as: LeftAs,
-    /// The first round whose games with it do not count, if it is another than the one that is under way or next.
+    pub kind: DepartureKind,
+    /// First round whose games with the team do not count; `None`: the current round, or the next one between rounds.
     pub from_round: Option<RoundNumber>,
-    /// As everybody may read it.
+    /// Public.
     pub reason: String,
 }
 
-/// Refuses who would enter while a round is under way, or when the groups are drawn.
-async fn check_enterable(tx: &mut Tx, tournament: &Tournament) -> Result<()> {
+/// Refuses new entrants while a round is open, or once the groups are drawn.
+async fn check_accepts_entrants(tx: &mut Tx, tournament: &Tournament) -> Result<()> {
     let is_drawn = rounds::count(tx, tournament.id).await? > 0;
     if is_drawn && matches!(tournament.rules.format, TournamentFormat::Groups { .. }) {
         return Err(StoreError::Conflict(
-            "the groups are drawn: nobody enters any more; open another tournament".into(),
+            "the groups are drawn, so no team can be added: open another tournament".into(),
         ));
     }
-    if !games::owed(tx, tournament.id).await?.is_empty() {
+    if !games::pending(tx, tournament.id).await?.is_empty() {
         return Err(StoreError::Conflict(
-            "a round is under way: teams enter before the first round, or between two".into(),
+            "a round is under way: teams can be added before the first round, or between two".into(),
         ));
     }
     Ok(())
 }
 
-/// Calls off the games of a team that have no result.
-async fn call_off(tx: &mut Tx, id: TournamentId, team: TeamId, reason: &str) -> Result<()> {
+/// Cancels a team's games that have no result.
+async fn cancel_open_games(tx: &mut Tx, id: TournamentId, team: TeamId, reason: &str) -> Result<()> {
     let mut games = games::of_rounds(tx, id).await?;
     games.extend(
-        games::free(tx, id, Some(team))
+        games::test_and_friendly(tx, id, Some(team))
             .await?
             .into_iter()
             .filter(|game| game.state.is_open()),
@@ -61,32 +61,32 @@ async fn call_off(tx: &mut Tx, id: TournamentId, team: TeamId, reason: &str) -> 
         if is_over || !game.teams.contains(&team) {
             continue;
         }
-        play::call_off(tx, &game, reason).await?;
+        game_lifecycle::cancel(tx, &game, reason).await?;
         if let GamePurpose::Round(meeting) = game.purpose {
             rounds.insert(meeting.round);
         }
     }
     for round in rounds {
-        play::end_round_if_over(tx, id, round).await?;
+        game_lifecycle::end_round_if_over(tx, id, round).await?;
     }
     Ok(())
 }
 
-/// The round that a team leaves from that leaves now: the newest if a result of it is owed, else the next. That a game of
-/// an earlier one is to be played again makes nothing of what was finished unfinished.
-async fn round_under_way(tx: &mut Tx, id: TournamentId) -> Result<RoundNumber> {
+/// The round from which a departure takes effect: the newest round if a result of it is missing, else the next one.
+/// Reruns of earlier rounds' games do not make those rounds current.
+async fn current_round(tx: &mut Tx, id: TournamentId) -> Result<RoundNumber> {
     let newest = rounds::count(tx, id).await?;
-    let owed = games::owed(tx, id).await?;
-    let is_under_way = owed.iter().any(|owed| owed.round.get() == newest);
+    let pending = games::pending(tx, id).await?;
+    let is_under_way = pending.iter().any(|pending| pending.round.get() == newest);
     RoundNumber::try_from(if is_under_way { newest } else { newest + 1 })
-        .map_err(|_| StoreError::Conflict("all rounds that there can be were played".into()))
+        .map_err(|_| StoreError::Conflict("all possible rounds have been played".into()))
 }
 
 impl Store {
-    /// Adds teams, from the next round on. [`StoreError::Conflict`] while a round is under way, once the groups of a tournament
-    /// with groups were drawn, and of a team that is in it or has left it.
+    /// Adds teams to a tournament, from the next round on. [`StoreError::Conflict`] while a round is open, once the groups
+    /// are drawn, or if a team is in the tournament already or has left it.
     #[boxed]
-    pub async fn enter_tournament(
+    pub async fn add_entrants(
         &self,
         actor: Actor,
         id: TournamentId,
@@ -96,14 +96,14 @@ impl Store {
         self.write(actor, now, async |tx| {
             season::check_open(tx).await?;
             let tournament = tournaments::find_open(tx, id).await?;
-            check_enterable(tx, &tournament).await?;
+            check_accepts_entrants(tx, &tournament).await?;
             let all = entrants::all(tx, id).await?;
             for team in new {
                 let team = teams::find(tx, *team).await?;
                 if let Some(entrant) = all.iter().find(|entrant| entrant.team == team.id) {
-                    let how = match entrant.left {
-                        None => "is in it already",
-                        Some(_) => "has left it, for good",
+                    let how = match entrant.departure {
+                        None => "is in the tournament already",
+                        Some(_) => "has left the tournament for good",
                     };
                     return Err(StoreError::Conflict(format!("{} {how}", team.name)));
                 }
@@ -116,56 +116,57 @@ impl Store {
         .await
     }
 
-    /// A team leaves for good: its games that have no result are called off, and no game with it counts from the round on
-    /// that is under way, or, between rounds, from the next; a disqualified one may lose earlier ones, too
-    /// (`from_round`). Before the first round it is just out (`None`), and may enter again. Who withdrew may be disqualified afterwards.
-    /// [`StoreError::Conflict`] if it has left otherwise, or is not in it, or the tournament is closed.
+    /// Removes a team from a tournament for good. Its games without a result are cancelled, and its games do not count
+    /// from the current round on (between rounds: from the next one). A disqualified team can lose earlier rounds, too
+    /// (`from_round`). Before the first round the team is only removed (`None`) and can be added again. A team that
+    /// withdrew can be disqualified later. [`StoreError::Conflict`] if it has left otherwise, is not an entrant, or the
+    /// tournament is closed.
     #[boxed]
     pub async fn leave_tournament(
         &self,
         actor: Actor,
         id: TournamentId,
-        leaving: &Leaving,
+        request: &DepartureRequest,
         now: Timestamp,
-    ) -> Result<Option<Leave>> {
+    ) -> Result<Option<Departure>> {
         self.write(actor, now, async |tx| {
             tournaments::find_open(tx, id).await?;
-            leave(tx, id, leaving).await
+            remove_entrant(tx, id, request).await
         })
         .await
     }
 }
 
-/// Takes a team out of a tournament that is not closed.
-pub(crate) async fn leave(
+/// Removes a team from a tournament that is not closed.
+pub(crate) async fn remove_entrant(
     tx: &mut Tx,
     id: TournamentId,
-    leaving: &Leaving,
-) -> Result<Option<Leave>> {
-    let Leaving {
+    request: &DepartureRequest,
+) -> Result<Option<Departure>> {
+    let DepartureRequest {
         team,
-        left_as,
+        kind,
         from_round,
         ref reason,
-    } = *leaving;
+    } = *request;
     let all = entrants::all(tx, id).await?;
     let Some(entrant) = all.iter().find(|entrant| entrant.team == team) else {
         return Err(StoreError::Conflict(
             "the team is not in the tournament".into(),
         ));
     };
-    let called_off = format!("{} has left the tournament", entrant.name);
-    let latest = match (&entrant.left, left_as) {
+    let cancel_reason = format!("{} has left the tournament", entrant.name);
+    let latest = match (&entrant.departure, kind) {
         (None, _) if rounds::count(tx, id).await? == 0 => {
             entrants::remove(tx, id, team).await?;
-            call_off(tx, id, team, &called_off).await?;
+            cancel_open_games(tx, id, team, &cancel_reason).await?;
             let reason = reason.clone();
             tx.record(Subject::Tournament(id), Event::TeamOut { team, reason });
             return Ok(None);
         }
-        (None, _) => round_under_way(tx, id).await?,
-        // Nobody escapes by going first.
-        (Some(left), LeftAs::Disqualified) if left.left_as == LeftAs::Withdrawn => left.from_round,
+        (None, _) => current_round(tx, id).await?,
+        // A team cannot avoid disqualification by withdrawing first.
+        (Some(left), DepartureKind::Disqualified) if left.kind == DepartureKind::Withdrawn => left.from_round,
         (Some(_), _) => {
             return Err(StoreError::Conflict(format!(
                 "{} has left the tournament already",
@@ -174,29 +175,29 @@ pub(crate) async fn leave(
         }
     };
     let from_round = from_round.unwrap_or(latest);
-    if from_round > latest || left_as == LeftAs::Withdrawn && from_round < latest {
-        let expected = match left_as {
-            LeftAs::Withdrawn => format!("{latest}: who withdraws keeps what was finished before"),
-            LeftAs::Disqualified => format!("1 to {latest}"),
+    if from_round > latest || kind == DepartureKind::Withdrawn && from_round < latest {
+        let expected = match kind {
+            DepartureKind::Withdrawn => format!("{latest}: a team that withdraws keeps its results of earlier rounds"),
+            DepartureKind::Disqualified => format!("1 to {latest}"),
         };
         return Err(StoreError::Conflict(format!(
             "from_round: expected {expected}; got {from_round}"
         )));
     }
-    let leave = Leave {
-        left_as,
+    let departure = Departure {
+        kind,
         from_round,
         at: tx.now,
         reason: reason.clone(),
     };
-    entrants::set_left(tx, id, team, &leave).await?;
-    call_off(tx, id, team, &called_off).await?;
+    entrants::set_departure(tx, id, team, &departure).await?;
+    cancel_open_games(tx, id, team, &cancel_reason).await?;
     let event = Event::TeamLeftTournament {
         team,
-        left_as,
+        left_as: kind,
         from_round,
         reason: reason.clone(),
     };
     tx.record(Subject::Tournament(id), event);
-    Ok(Some(leave))
+    Ok(Some(departure))
 }

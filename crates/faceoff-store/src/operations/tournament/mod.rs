@@ -1,11 +1,11 @@
-//! What organisers, teams and slots do in tournaments.
+//! Operations of organisers, teams and workers on tournaments.
 
 mod close;
 pub(crate) mod entrants;
-mod free_games;
+mod test_and_friendly_games;
 pub(crate) mod open;
-pub(crate) mod play;
-mod playing;
+pub(crate) mod game_lifecycle;
+mod current_entrants;
 pub(crate) mod replays;
 mod rounds;
 mod rulings;

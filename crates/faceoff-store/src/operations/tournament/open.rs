@@ -24,25 +24,25 @@ use jiff::Timestamp;
 #[derive(Debug, Clone, PartialEq)]
 pub struct NewTournament {
     pub name: StageName,
-    /// The stage whose tiers its entrants come from, if they do.
+    /// Stage whose tiers the entrants were selected by, if any.
     pub stage: Option<StageId>,
-    /// What results depend on.
+    /// Rules that results depend on.
     pub rules: TournamentRules,
-    /// What they do not depend on.
+    /// Settings that results do not depend on.
     pub settings: TournamentSettings,
-    /// Its first entrants.
+    /// Initial entrants.
     pub entrants: Vec<TeamId>,
 }
 
-/// What of a tournament is to be otherwise; what is none stays.
+/// Changes of a tournament; `None` leaves a value unchanged.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct TournamentChange {
     pub name: Option<StageName>,
-    /// What results depend on; not once a round was started.
+    /// Rules that results depend on; fixed once a round has started.
     pub rules: Option<TournamentRules>,
-    /// What they do not depend on.
+    /// Settings that results do not depend on.
     pub settings: Option<TournamentSettings>,
-    /// The organisers' agent: `Some(None)` for none.
+    /// Submission that test games are played against; `Some(None)` removes it.
     pub baseline: Option<Option<SubmissionId>>,
 }
 
@@ -53,18 +53,18 @@ fn invalid(error: InvalidTournament) -> StoreError {
 
 async fn check_baseline(tx: &mut Tx, id: SubmissionId) -> Result<()> {
     let baseline = submissions::find(tx, id).await?;
-    if baseline.state != SubmissionState::Valid || baseline.archive_removed.is_some() {
+    if baseline.state != SubmissionState::Valid || baseline.bundle_removed.is_some() {
         return Err(StoreError::Conflict(
-            "baseline: only a valid submission whose archive is kept can be played against".into(),
+            "baseline: expected a valid submission whose bundle is still stored".into(),
         ));
     }
     Ok(())
 }
 
 impl Store {
-    /// Opens a tournament: entrants can be changed and games that do not count played, until its first round fixes the
-    /// former. [`StoreError::TournamentNameTaken`] if another has its name, [`StoreError::NotFound`] for stage and teams,
-    /// [`StoreError::SeasonClosed`].
+    /// Opens a tournament. Rules can be changed until the first round starts; test and friendly games are possible at
+    /// once. [`StoreError::TournamentNameTaken`] if another one has its name, [`StoreError::NotFound`] for an unknown
+    /// stage or team, [`StoreError::SeasonClosed`].
     #[boxed]
     pub async fn open_tournament(
         &self,
@@ -108,7 +108,7 @@ impl Store {
         .await
     }
 
-    /// Changes a tournament. [`StoreError::Conflict`] once it is closed, and of rules once a round was started.
+    /// Changes a tournament. [`StoreError::Conflict`] once it is closed; for rules, once a round has started.
     #[boxed]
     pub async fn change_tournament(
         &self,
@@ -146,7 +146,7 @@ impl Store {
             }
             if after.rules != before.rules && rounds::count(tx, id).await? > 0 {
                 return Err(StoreError::Conflict(
-                    "rules: a round was started, and all rounds are played by the same rules: open another tournament"
+                    "rules: a round has started, and all rounds must have the same rules: open another tournament"
                         .into(),
                 ));
             }
@@ -163,8 +163,8 @@ impl Store {
         .await
     }
 
-    /// No game of it begins from now on; what is played meanwhile goes on to its end. [`StoreError::Conflict`] if it is
-    /// paused, or closed.
+    /// Pauses a tournament: no game starts, running games continue to their end. [`StoreError::Conflict`] if it is
+    /// paused already, or closed.
     #[boxed]
     pub async fn pause_tournament(
         &self,
@@ -192,7 +192,7 @@ impl Store {
         .await
     }
 
-    /// Its games begin again. [`StoreError::Conflict`] if it is not paused.
+    /// Resumes a tournament. [`StoreError::Conflict`] if it is not paused.
     #[boxed]
     pub async fn resume_tournament(
         &self,
@@ -204,13 +204,13 @@ impl Store {
             let mut tournament = tournaments::find_open(tx, id).await?;
             if tournament.paused.take().is_none() {
                 return Err(StoreError::Conflict(
-                    "the tournament is not paused: its games begin as slots are free".into(),
+                    "the tournament is not paused: its games start as slots become free".into(),
                 ));
             }
             tournaments::update(tx, &tournament).await?;
             for game in games::open(tx, id).await? {
-                let unit = games::unit_of(tx, game.id).await?;
-                queue::unpark(tx, unit).await?;
+                let job = games::job_of(tx, game.id).await?;
+                queue::unpark(tx, job).await?;
             }
             tx.record(Subject::Tournament(id), Event::TournamentResumed);
             Ok(tournament)

@@ -1,10 +1,10 @@
-//! The schedule played again: how sure is its champion?
+//! Replays of a tournament's whole schedule, which show how certain its winner is.
 
 use crate::{
     boxed,
     error::{Result, StoreError},
     event::{Actor, Event, Subject},
-    operations::{purpose, tournament::play},
+    operations::{purpose, tournament::game_lifecycle},
     store::Store,
     tables::{
         entrants,
@@ -13,27 +13,27 @@ use crate::{
     },
     write::Tx,
 };
-use faceoff_types::{GameId, GameSeed, RoundNumber, TeamId, TournamentId};
+use faceoff_types::{GameId, GameSeedLabel, RoundNumber, TeamId, TournamentId};
 use jiff::Timestamp;
 use std::collections::BTreeMap;
 
-/// The most times that a schedule is played again.
+/// Maximum number of replays of a schedule.
 pub const MAX_REPLAYS: u32 = 1000;
 
-/// The most games that a tournament's replays have in all: they are queued at once, and read at once.
+/// Maximum number of games in all replays of a tournament: they are queued at once, and read at once.
 pub const MAX_REPLAYED_GAMES: u32 = 10_000;
 
-/// The games that count: with a result, and of teams that had not left by their round.
-async fn counting(tx: &mut Tx, id: TournamentId, mut games: Vec<Game>) -> Result<Vec<Game>> {
+/// Games that count: they have a result, and both teams were entrants in that round.
+async fn counting_games(tx: &mut Tx, id: TournamentId, mut games: Vec<Game>) -> Result<Vec<Game>> {
     let left: BTreeMap<TeamId, RoundNumber> = entrants::all(tx, id)
         .await?
         .into_iter()
-        .filter_map(|entrant| Some((entrant.team, entrant.left?.from_round)))
+        .filter_map(|entrant| Some((entrant.team, entrant.departure?.from_round)))
         .collect();
     games.retain(|game| {
         let is_out = |team: &TeamId| {
-            let of = game.purpose.meeting().zip(left.get(team));
-            of.is_some_and(|(of, from)| of.round >= *from)
+            let played = game.purpose.schedule_entry().zip(left.get(team));
+            played.is_some_and(|(fixture, from)| fixture.round >= *from)
         };
         matches!(game.state, GameState::Played(_)) && !game.teams.iter().any(is_out)
     });
@@ -41,11 +41,11 @@ async fn counting(tx: &mut Tx, id: TournamentId, mut games: Vec<Game>) -> Result
 }
 
 impl Store {
-    /// Queues all games of all rounds `times` times more, with the same submissions and fresh seeds; they do not count and
-    /// keep no recordings. Returns how many games. [`StoreError::Conflict`] if a round is to come or under way, or
-    /// more than [`MAX_REPLAYS`], or [`MAX_REPLAYED_GAMES`], came of it.
+    /// Queues all games of all rounds again, `times` times, with the same submissions and new seeds. The games do not
+    /// count and are not recorded. Returns the number of games. [`StoreError::Conflict`] if not all rounds are over, or
+    /// beyond [`MAX_REPLAYS`] or [`MAX_REPLAYED_GAMES`].
     #[boxed]
-    pub async fn order_replays(
+    pub async fn request_replays(
         &self,
         actor: Actor,
         id: TournamentId,
@@ -59,45 +59,45 @@ impl Store {
             let (started, all) = (rounds::count(tx, id).await?, tournament.rules.format.last_round());
             if started < all.get() {
                 return Err(StoreError::Conflict(format!(
-                    "a schedule is played again when all of it was played: {started} of {all} rounds were started"
+                    "a schedule can be replayed once all its games are over: {started} of {all} rounds have started"
                 )));
             }
-            let owed = games::owed(tx, id).await?.len();
-            if owed > 0 {
+            let pending = games::pending(tx, id).await?.len();
+            if pending > 0 {
                 return Err(StoreError::Conflict(format!(
-                    "a schedule is played again when all of it was played: {owed} games have no result yet"
+                    "a schedule can be replayed once all its games are over: {pending} games have no result yet"
                 )));
             }
             let last = games::last_replay(tx, id).await?;
             if times == 0 || times > MAX_REPLAYS - last.min(MAX_REPLAYS) {
                 return Err(StoreError::Conflict(format!(
-                    "times: expected 1 to {}, {last} of {MAX_REPLAYS} were ordered before; got {times}",
+                    "times: expected 1 to {}, since {last} of {MAX_REPLAYS} replays exist; got {times}",
                     MAX_REPLAYS.saturating_sub(last)
                 )));
             }
-            let schedule = counting(tx, id, schedule).await?;
+            let schedule = counting_games(tx, id, schedule).await?;
             let queued = u32::try_from(schedule.len()).unwrap_or(u32::MAX);
             let games = queued.saturating_mul(last.saturating_add(times));
             if games > MAX_REPLAYED_GAMES {
                 return Err(StoreError::Conflict(format!(
-                    "times: {queued} games {} times are {games}, at most {MAX_REPLAYED_GAMES} are played again in all",
+                    "times: {queued} games {} times are {games}; expected at most {MAX_REPLAYED_GAMES} in all",
                     last.saturating_add(times)
                 )));
             }
             let (mut count, mut account) = (0, None);
             for replay in last + 1..=last + times {
                 for played in &schedule {
-                    let Some(of) = played.purpose.meeting() else {
+                    let Some(original) = played.purpose.schedule_entry() else {
                         continue;
                     };
                     let game = Game {
                         id: GameId::new(),
-                        purpose: GamePurpose::Replay { replay, of },
-                        seed: GameSeed::Replay {
+                        purpose: GamePurpose::Replay { replay, original },
+                        seed: GameSeedLabel::Replay {
                             tournament: tournament.number,
                             replay,
-                            round: of.round,
-                            meeting: of.meeting,
+                            round: original.round,
+                            meeting: original.pairing,
                         },
                         created_at: now,
                         state: GameState::Queued,
@@ -105,9 +105,9 @@ impl Store {
                     };
                     let account = match account {
                         Some(known) => known,
-                        None => *account.insert(play::account(tx, &game, purpose::REPLAY_GAME).await?),
+                        None => *account.insert(game_lifecycle::account(tx, &game, purpose::REPLAY_GAME).await?),
                     };
-                    play::enqueue_for(tx, &game, purpose::REPLAY_GAME, account).await?;
+                    game_lifecycle::enqueue_for(tx, &game, purpose::REPLAY_GAME, account).await?;
                     count += 1;
                 }
             }
@@ -121,7 +121,7 @@ impl Store {
         .await
     }
 
-    /// Calls off the replays that are not over. Returns how many games.
+    /// Cancels the replays that are not over. Returns the number of games.
     #[boxed]
     pub async fn cancel_replays(
         &self,
@@ -134,7 +134,7 @@ impl Store {
             let mut count = 0;
             for game in games::open(tx, id).await? {
                 if let GamePurpose::Replay { .. } = game.purpose {
-                    play::call_off(tx, &game, "the organisers called the replays off").await?;
+                    game_lifecycle::cancel(tx, &game, "the organisers cancelled the replays").await?;
                     count += 1;
                 }
             }

@@ -4,12 +4,12 @@ use crate::{
     event::{Actor, Event, Subject},
     operations::{
         purpose,
-        tournament::{play, playing::playing},
+        tournament::{game_lifecycle, current_entrants::current_entrants},
     },
     store::Store,
     tables::{
         entrants::Entrant,
-        games::{self, Game, GamePurpose, GameState, Meeting},
+        games::{self, Game, GamePurpose, GameState, ScheduleEntry},
         rounds::{self, DrawnRound, RoundBye, TournamentRound},
         season,
         submissions::{self, Submission},
@@ -17,7 +17,7 @@ use crate::{
     },
     write::Tx,
 };
-use faceoff_types::{GameId, GameSeed, SubmissionId, TeamId, TournamentFormat, TournamentId};
+use faceoff_types::{GameId, GameSeedLabel, SubmissionId, TeamId, TournamentFormat, TournamentId};
 use jiff::Timestamp;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -25,11 +25,11 @@ fn conflict<T>(why: impl Into<String>) -> Result<T> {
     Err(StoreError::Conflict(why.into()))
 }
 
-/// Does a tournament take the runtime of a submission?
+/// Whether a tournament accepts the runtime of a submission.
 pub(super) fn takes(tournament: &Tournament, submission: &Submission) -> bool {
     match (&tournament.rules.runtimes, &submission.runtime) {
         (None, _) => true,
-        (Some(taken), Some(runtime)) => taken.contains(runtime),
+        (Some(accepted), Some(runtime)) => accepted.contains(runtime),
         (Some(_), None) => false,
     }
 }
@@ -40,28 +40,28 @@ async fn check_next(tx: &mut Tx, tournament: &Tournament, drawn: &DrawnRound) ->
     let started = rounds::count(tx, tournament.id).await?;
     if number.get() <= started {
         return conflict(format!(
-            "round {number} was started already: look how far it is"
+            "round {number} has started already: look at its progress"
         ));
     }
     if number.get() > started + 1 || number > tournament.rules.format.last_round() {
         return conflict(format!(
-            "round {number} is not the next one: {started} of {} were started",
+            "round {number} is not the next one: {started} of {} have started",
             tournament.rules.format.last_round()
         ));
     }
-    let owed = games::owed(tx, tournament.id).await?;
-    if let Some(first) = owed.first() {
+    let pending = games::pending(tx, tournament.id).await?;
+    if let Some(first) = pending.first() {
         return conflict(format!(
-            "{} games of earlier rounds have no result, the first is game {}: wait for them, play them again, or let a \
-             team leave",
-            owed.len(),
+            "{} games of earlier rounds have no result, the first is game {}: wait for them, rerun them, or let a team \
+             leave",
+            pending.len(),
             first.game
         ));
     }
     Ok(())
 }
 
-/// Refuses a draw of other teams than are in the tournament: somebody left meanwhile.
+/// Refuses a draw whose teams differ from the entrants, because a team was added or left meanwhile.
 fn check_teams(
     tournament: &Tournament,
     drawn: &DrawnRound,
@@ -84,16 +84,16 @@ fn check_teams(
     };
     if !fits {
         return conflict(
-            "the teams of the tournament have changed meanwhile: start the round again",
+            "the entrants have changed meanwhile: start the round again",
         );
     }
     if with_games.is_empty() {
-        return conflict("a round needs two teams at least: enter more");
+        return conflict("a round needs at least two teams: add more");
     }
     Ok(with_games)
 }
 
-/// What each of these teams has active, or the names of those that have nothing that can play.
+/// The active submission of each of these teams. An error names the teams without one that the tournament accepts.
 async fn freeze(
     tx: &mut Tx,
     tournament: &Tournament,
@@ -113,8 +113,8 @@ async fn freeze(
         .collect();
     if !unready.is_empty() {
         return conflict(format!(
-            "without an active, valid submission that the tournament takes: {}. Wait for them, or let them leave the \
-             tournament",
+            "these teams have no active, valid submission that the tournament accepts: {}. Wait for them, or let them \
+             leave the tournament",
             unready.join(", ")
         ));
     }
@@ -124,7 +124,7 @@ async fn freeze(
         .collect())
 }
 
-/// Queues the games of a round, one or, mirrored, two of each meeting.
+/// Queues the games of a round: one per fixture, or two if the rules are mirrored.
 async fn queue_games(
     tx: &mut Tx,
     tournament: &Tournament,
@@ -148,15 +148,15 @@ async fn queue_games(
                 let game = Game {
                     id: GameId::new(),
                     tournament: tournament.id,
-                    purpose: GamePurpose::Round(Meeting {
+                    purpose: GamePurpose::Round(ScheduleEntry {
                         round: drawn.number,
                         matchday,
-                        meeting,
+                        pairing: meeting,
                         second_half,
                     }),
                     teams,
                     submissions: teams.map(|team| frozen[&team]),
-                    seed: GameSeed::Meeting {
+                    seed: GameSeedLabel::Fixture {
                         tournament: tournament.number,
                         round: drawn.number,
                         meeting,
@@ -166,9 +166,9 @@ async fn queue_games(
                 };
                 let account = match account {
                     Some(known) => known,
-                    None => *account.insert(play::account(tx, &game, purpose::ROUND_GAME).await?),
+                    None => *account.insert(game_lifecycle::account(tx, &game, purpose::ROUND_GAME).await?),
                 };
-                play::enqueue_for(tx, &game, purpose::ROUND_GAME, account).await?;
+                game_lifecycle::enqueue_for(tx, &game, purpose::ROUND_GAME, account).await?;
                 count += 1;
             }
         }
@@ -177,10 +177,11 @@ async fn queue_games(
 }
 
 impl Store {
-    /// Starts a round: what each team has active is fixed for it, and its games are queued. [`StoreError::Conflict`], and
-    /// nothing is changed, if the round is not the next one (two that start one at once: one does), a game of an earlier
-    /// one has no result, a team has no valid submission that the tournament takes (it names them), the teams are not
-    /// those that are in it, or it is closed.
+    /// Starts a round: freezes each team's active submission for it and queues its games. Of two concurrent calls one
+    /// succeeds. [`StoreError::Conflict`] in these cases, without any change:
+    /// - The round is not the next one, or a game of an earlier round has no result.
+    /// - A team has no valid submission that the tournament accepts; the error names the teams.
+    /// - The draw does not match the entrants, or the tournament is closed.
     #[boxed]
     pub async fn start_round(
         &self,
@@ -192,7 +193,7 @@ impl Store {
         self.write(actor, now, async |tx| {
             season::check_open(tx).await?;
             let tournament = tournaments::find_open(tx, id).await?;
-            let playing = playing(tx, id).await?;
+            let playing = current_entrants(tx, id).await?;
             check_next(tx, &tournament, drawn).await?;
             let teams = check_teams(&tournament, drawn, &playing)?;
             let frozen = freeze(tx, &tournament, &teams, &playing).await?;

@@ -2,7 +2,7 @@ use crate::{
     boxed,
     error::{Result, StoreError},
     event::{Actor, Event, Subject},
-    operations::{purpose, tournament::play},
+    operations::{purpose, tournament::game_lifecycle},
     store::Store,
     tables::{
         entrants::{self, Entrant},
@@ -16,7 +16,7 @@ use faceoff_types::GameId;
 use jiff::Timestamp;
 
 impl Store {
-    /// A result counts no more; its attempt stays. The next round waits until the game is played again.
+    /// Voids the result of a game; its attempt stays. The next round cannot start until the game is rerun.
     /// [`StoreError::Conflict`] unless it is a round's game with a result.
     #[boxed]
     pub async fn void_game(
@@ -33,7 +33,7 @@ impl Store {
             let (GamePurpose::Round(_), GameState::Played(played)) = (game.purpose, &game.state)
             else {
                 return Err(StoreError::Conflict(
-                    "only a game of a round that has a result is voided: one that is queued or running is waited for".into(),
+                    "only a game of a round with a result can be voided: wait for the end of one that is queued or running".into(),
                 ));
             };
             game_attempts::set_voided(tx, id, played.attempt, reason).await?;
@@ -45,8 +45,8 @@ impl Store {
         .await
     }
 
-    /// Queues a game again that was voided or broken by us: same submissions, same seed. [`StoreError::Conflict`] of any
-    /// other, and if one of its teams had left by its round.
+    /// Reruns a game that was voided or ended by a platform fault, with the same submissions and seed.
+    /// [`StoreError::Conflict`] for any other game, and if one of its teams had left by its round.
     #[boxed]
     pub async fn rerun_game(&self, actor: Actor, id: GameId, now: Timestamp) -> Result<Game> {
         self.write(actor, now, async |tx| {
@@ -55,35 +55,35 @@ impl Store {
             tournaments::find_open(tx, game.tournament).await?;
             if !matches!(
                 game.state,
-                GameState::Void { .. } | GameState::Broken { .. }
+                GameState::Void { .. } | GameState::PlatformFailed { .. }
             ) {
                 return Err(StoreError::Conflict(
-                    "only a game that was voided, or that we could not play, is played again: void its result first"
+                    "only a game that was voided, or that ended by a platform fault, can be rerun: void its result first"
                         .into(),
                 ));
             }
             let lane = match game.purpose {
                 GamePurpose::Round(meeting) => {
                     let has_left = |entrant: &Entrant| {
-                        let left = entrant.left.as_ref();
+                        let left = entrant.departure.as_ref();
                         game.teams.contains(&entrant.team)
                             && left.is_some_and(|left| left.from_round <= meeting.round)
                     };
                     if entrants::all(tx, game.tournament).await?.iter().any(has_left) {
                         return Err(StoreError::Conflict(
-                            "one of its teams has left the tournament by its round: it counts for nobody".into(),
+                            "one of its teams has left the tournament by its round, so the game does not count".into(),
                         ));
                     }
                     purpose::ROUND_GAME
                 }
                 GamePurpose::Test { .. } | GamePurpose::Friendly { .. } => {
                     return Err(StoreError::Conflict(
-                        "a game that does not count is not played again: ask for another one".into(),
+                        "a game that does not count cannot be rerun: request another one".into(),
                     ));
                 }
                 GamePurpose::Replay { .. } => purpose::REPLAY_GAME,
             };
-            play::enqueue_again(tx, &game, lane).await?;
+            game_lifecycle::enqueue_again(tx, &game, lane).await?;
             tx.record(Subject::Game(id), Event::GameQueuedAgain);
             games::find(tx, id).await
         })

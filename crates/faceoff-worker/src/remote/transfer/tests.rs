@@ -1,5 +1,5 @@
 use super::*;
-use crate::remote::order_files::OrderFiles;
+use crate::remote::job_files::JobFiles;
 use faceoff_types::BundleRef;
 use std::{
     path::{Path, PathBuf},
@@ -10,135 +10,135 @@ use tokio::{
     net::{TcpListener, TcpSocket, TcpStream},
 };
 
-fn carrier(patience: Patience) -> Carrier {
-    let nobody = rustls::ClientConfig::builder()
+fn file_transfer(timeouts: TransferTimeouts) -> FileTransfer {
+    let no_roots = rustls::ClientConfig::builder()
         .with_root_certificates(rustls::RootCertStore::empty())
         .with_no_client_auth();
     let http = Client::builder()
         .no_proxy()
-        .tls_backend_preconfigured(nobody);
-    Carrier {
+        .tls_backend_preconfigured(no_roots);
+    FileTransfer {
         http: http.build().unwrap(),
-        patience,
+        timeouts,
     }
 }
 
-/// Whoever is tried again is at once.
-fn restless() -> Patience {
-    Patience {
-        rest: Duration::ZERO,
-        longest_rest: Duration::ZERO,
-        // However slow the machine.
-        still: Duration::from_secs(3600),
-        away: Duration::from_secs(3600),
-        ..Patience::default()
+/// Timeouts with immediate retries.
+fn immediate_retries() -> TransferTimeouts {
+    TransferTimeouts {
+        retry_delay: Duration::ZERO,
+        max_retry_delay: Duration::ZERO,
+        // Independent of the speed of the machine.
+        stall: Duration::from_secs(3600),
+        unavailable: Duration::from_secs(3600),
+        ..TransferTimeouts::default()
     }
 }
 
-fn wanted() -> bool {
+fn never_ends() -> bool {
     false
 }
 
 #[tokio::test(start_paused = true)]
-async fn what_is_slow_but_moves_takes_as_long_as_it_takes() {
-    let tries = AtomicU32::new(0);
-    let by = carrier(Patience::default());
-    let carried = by.carry(
-        async |_, moved| {
-            tries.fetch_add(1, Ordering::Relaxed);
+async fn slow_transfer_with_progress_has_no_time_limit() {
+    let attempts = AtomicU32::new(0);
+    let transfer = file_transfer(TransferTimeouts::default());
+    let result = transfer.run(
+        async |_, progress| {
+            attempts.fetch_add(1, Ordering::Relaxed);
             for _ in 0..20 {
                 sleep(Duration::from_secs(50)).await;
-                moved.add(1);
+                progress.add(1);
             }
             Ok(())
         },
-        wanted,
+        never_ends,
     );
-    carried.await.unwrap();
-    assert_eq!(tries.into_inner(), 1);
+    result.await.unwrap();
+    assert_eq!(attempts.into_inner(), 1);
 }
 
 #[tokio::test(start_paused = true)]
-async fn what_was_handed_over_may_be_on_its_way_for_a_while() {
-    let by = carrier(Patience::default());
-    let carried = by.carry(
-        async |_, moved| {
+async fn buffered_data_extends_the_stall_timeout() {
+    let transfer = file_transfer(TransferTimeouts::default());
+    let result = transfer.run(
+        async |_, progress| {
             let bytes = 4 << 20;
-            moved.of(bytes);
-            moved.add(bytes as usize);
+            progress.set_total(bytes);
+            progress.add(bytes as usize);
             // Over a link of 128 kbit/s.
             sleep(Duration::from_secs(bytes / SLOWEST_BYTES_PER_S)).await;
             Ok(())
         },
-        wanted,
+        never_ends,
     );
-    carried.await.unwrap();
+    result.await.unwrap();
 }
 
 #[tokio::test(start_paused = true)]
-async fn what_stands_still_is_tried_once_more() {
-    let tries = AtomicU32::new(0);
-    let by = carrier(Patience::default());
-    let carried = by.carry(
+async fn stalled_transfer_is_retried_once() {
+    let attempts = AtomicU32::new(0);
+    let transfer = file_transfer(TransferTimeouts::default());
+    let result = transfer.run(
         async |_, _| {
-            tries.fetch_add(1, Ordering::Relaxed);
+            attempts.fetch_add(1, Ordering::Relaxed);
             std::future::pending().await
         },
-        wanted,
+        never_ends,
     );
-    let error = carried.await.unwrap_err();
-    assert_eq!(error.to_string(), "nothing has moved for 60 s");
-    assert_eq!(tries.into_inner(), 2);
+    let error = result.await.unwrap_err();
+    assert_eq!(error.to_string(), "no progress for 60 s");
+    assert_eq!(attempts.into_inner(), 2);
 }
 
 #[tokio::test(start_paused = true)]
-async fn nothing_is_waited_for_once_the_order_has_ended() {
+async fn transfer_stops_when_the_job_has_ended() {
     let has_ended = AtomicBool::new(false);
-    let by = carrier(Patience::default());
-    let carried = by.carry(
-        async |_, moved| {
-            moved.add(1);
+    let transfer = file_transfer(TransferTimeouts::default());
+    let result = transfer.run(
+        async |_, progress| {
+            progress.add(1);
             sleep(Duration::from_secs(1)).await;
             has_ended.store(true, Ordering::Relaxed);
             std::future::pending().await
         },
         || has_ended.load(Ordering::Relaxed),
     );
-    assert!(carried.await.unwrap_err().is::<Ended>());
+    assert!(result.await.unwrap_err().is::<JobEnded>());
 }
 
 #[tokio::test(start_paused = true)]
-async fn what_has_no_time_is_asked_for_a_minute_and_as_seldom_as_it_asks() {
-    for (retry_after, rests_s) in [(None, 2), (Some(10), 10), (Some(3600), 30)] {
-        let (began, tries) = (Instant::now(), AtomicU32::new(0));
-        let by = carrier(Patience::default());
-        let carried = by.carry(
+async fn busy_server_is_retried_for_a_minute() {
+    for (retry_after, delay_s) in [(None, 2), (Some(10), 10), (Some(3600), 30)] {
+        let (began, attempts) = (Instant::now(), AtomicU32::new(0));
+        let transfer = file_transfer(TransferTimeouts::default());
+        let result = transfer.run(
             async |_, _| {
-                tries.fetch_add(1, Ordering::Relaxed);
-                Err(Unfinished::Busy {
+                attempts.fetch_add(1, Ordering::Relaxed);
+                Err(TransientError::Busy {
                     status: StatusCode::SERVICE_UNAVAILABLE,
                     retry_after: retry_after.map(Duration::from_secs),
                 }
                 .into())
             },
-            wanted,
+            never_ends,
         );
-        let error = carried.await.unwrap_err();
+        let error = result.await.unwrap_err();
         assert_eq!(
             error.to_string(),
             "the server answered 503 Service Unavailable"
         );
-        assert_eq!(tries.into_inner(), 60 / rests_s + 1);
-        // Of the clock that only this test turns.
+        assert_eq!(attempts.into_inner(), 60 / delay_s + 1);
+        // By tokio's paused clock.
         assert_eq!(began.elapsed().as_secs(), 60);
     }
 }
 
-/// Where `listener` is reached, and what opens it.
-fn files(listener: &TcpListener) -> OrderFiles {
-    OrderFiles {
+/// Access to the files of `listener`.
+fn files(listener: &TcpListener) -> JobFiles {
+    JobFiles {
         grant: "grant".into(),
-        server: format!("http://{}", listener.local_addr().unwrap()),
+        files_url: format!("http://{}", listener.local_addr().unwrap()),
         objects: None,
     }
 }
@@ -154,7 +154,7 @@ fn file(folder: &tempfile::TempDir, bytes: u64) -> PathBuf {
     path
 }
 
-/// Reads what comes before the body.
+/// Reads the head of an HTTP request.
 async fn head(connection: &mut TcpStream) -> String {
     let mut head = Vec::new();
     while !head.ends_with(b"\r\n\r\n") {
@@ -168,20 +168,20 @@ async fn body(connection: &mut TcpStream, bytes: u64) {
     assert_eq!(read.unwrap(), bytes);
 }
 
-async fn answer(mut connection: TcpStream, words: &str) {
-    let answer = format!("HTTP/1.1 {words}\r\nconnection: close\r\n\r\n");
-    connection.write_all(answer.as_bytes()).await.unwrap();
+async fn respond(mut connection: TcpStream, status: &str) {
+    let response = format!("HTTP/1.1 {status}\r\nconnection: close\r\n\r\n");
+    connection.write_all(response.as_bytes()).await.unwrap();
     connection.shutdown().await.unwrap();
 }
 
 #[tokio::test]
-async fn a_file_is_sent_again_to_whoever_has_no_time_and_after_a_break() {
+async fn upload_is_retried_after_transient_errors() {
     const BYTES: u64 = 100_000;
     let folder = tempfile::tempdir().unwrap();
     let (path, listener) = (file(&folder, BYTES), listener().await);
-    let (files, by) = (files(&listener), carrier(restless()));
+    let (files, transfer) = (files(&listener), file_transfer(immediate_retries()));
     let serves = async {
-        for words in [
+        for status in [
             "408 Request Timeout",
             "500 Internal Server Error",
             "429 Too Many Requests\r\nretry-after: 3600",
@@ -195,9 +195,9 @@ async fn a_file_is_sent_again_to_whoever_has_no_time_and_after_a_break() {
             );
             assert!(head.contains("authorization: Grant grant"), "{head}");
             body(&mut connection, BYTES).await;
-            answer(connection, words).await;
+            respond(connection, status).await;
         }
-        // In the middle.
+        // An interruption in the middle of the body.
         let (mut connection, _) = listener.accept().await.unwrap();
         head(&mut connection).await;
         body(&mut connection, BYTES / 2).await;
@@ -205,35 +205,35 @@ async fn a_file_is_sent_again_to_whoever_has_no_time_and_after_a_break() {
         let (mut connection, _) = listener.accept().await.unwrap();
         head(&mut connection).await;
         body(&mut connection, BYTES).await;
-        answer(connection, "204 No Content").await;
+        respond(connection, "204 No Content").await;
     };
-    let stored = files.store(&by, "steps.parquet", &path, wanted);
+    let stored = files.store(&transfer, "steps.parquet", &path, never_ends);
     let (stored, ()) = tokio::join!(stored, serves);
     stored.unwrap();
 }
 
 #[tokio::test]
-async fn what_breaks_again_and_again_in_the_middle_is_given_up() {
+async fn upload_is_given_up_after_many_interruptions() {
     let folder = tempfile::tempdir().unwrap();
     let (path, listener) = (file(&folder, 64 << 20), listener().await);
-    let (files, by) = (files(&listener), carrier(restless()));
+    let (files, transfer) = (files(&listener), file_transfer(immediate_retries()));
     let serves = async {
-        for _ in 0..by.patience.most_broken {
+        for _ in 0..transfer.timeouts.max_interrupted {
             let (mut connection, _) = listener.accept().await.unwrap();
             head(&mut connection).await;
             body(&mut connection, 1000).await;
         }
     };
-    let stored = files.store(&by, "steps.parquet", &path, wanted);
+    let stored = files.store(&transfer, "steps.parquet", &path, never_ends);
     let (stored, ()) = tokio::join!(stored, serves);
-    assert!(is_lost(&stored.unwrap_err()));
+    assert!(is_connection_error(&stored.unwrap_err()));
 }
 
 #[tokio::test]
-async fn what_is_refused_is_asked_for_once() {
+async fn refused_download_is_not_retried() {
     let folder = tempfile::tempdir().unwrap();
     let listener = listener().await;
-    let (files, by) = (files(&listener), carrier(restless()));
+    let (files, transfer) = (files(&listener), file_transfer(immediate_retries()));
     let bundle = BundleRef {
         key: "bundles/x".into(),
         bytes: 1,
@@ -241,33 +241,33 @@ async fn what_is_refused_is_asked_for_once() {
         file_name: "agent.tar.gz".into(),
     };
     let serves = async {
-        for (words, told) in [
+        for (status, message) in [
             ("403 Forbidden", "the server answered 403 Forbidden"),
             ("507 Insufficient Storage", "no storage space"),
         ] {
             let archive: &Path = &folder.path().join("agent.tar.gz");
             let (fetched, ()) =
-                tokio::join!(files.fetch_bundle(&by, &bundle, archive, wanted), async {
+                tokio::join!(files.fetch_bundle(&transfer, &bundle, archive, never_ends), async {
                     let (mut connection, _) = listener.accept().await.unwrap();
                     head(&mut connection).await;
-                    answer(connection, words).await;
+                    respond(connection, status).await;
                 });
             let error = format!("{:#}", fetched.unwrap_err());
-            assert!(error.contains(told), "{error}");
+            assert!(error.contains(message), "{error}");
         }
     };
     serves.await;
 }
 
-/// A link so slow that all of a file takes far longer than anything of it may stand still. Time passes only when this test says so: after
-/// so much was received that some of it was handed over since.
+/// Over this slow link the whole file takes far longer than the stall timeout. The test advances the clock only after it has
+/// received so much data that the sender has made progress since.
 #[tokio::test(start_paused = true)]
-async fn a_file_over_a_slow_link_is_stored_by_one_try() {
-    /// More than all buffers on the way hold.
+async fn upload_over_a_slow_link_needs_one_attempt() {
+    /// More than all buffers on the way can hold.
     const PIECE: u64 = 48 << 20;
     const PIECES: u64 = 4;
     let (hold, held) = std::sync::mpsc::channel::<()>();
-    // While a thread is waited for, the clock does not run by itself.
+    // A blocking task keeps tokio's paused clock from advancing automatically.
     let holds = tokio::task::spawn_blocking(move || held.recv());
     let folder = tempfile::tempdir().unwrap();
     let socket = TcpSocket::new_v4().unwrap();
@@ -275,21 +275,21 @@ async fn a_file_over_a_slow_link_is_stored_by_one_try() {
     socket.bind(([127, 0, 0, 1], 0).into()).unwrap();
     let listener = socket.listen(1).unwrap();
     let (path, files) = (file(&folder, PIECES * PIECE), files(&listener));
-    let by = carrier(Patience::default());
+    let transfer = file_transfer(TransferTimeouts::default());
     let began = Instant::now();
     let serves = async {
         let (mut connection, _) = listener.accept().await.unwrap();
         head(&mut connection).await;
         for _ in 0..PIECES {
             body(&mut connection, PIECE).await;
-            tokio::time::advance(by.patience.still * 2 / 3).await;
+            tokio::time::advance(transfer.timeouts.stall * 2 / 3).await;
         }
-        answer(connection, "204 No Content").await;
+        respond(connection, "204 No Content").await;
     };
-    let stored = files.store(&by, "steps.parquet", &path, wanted);
+    let stored = files.store(&transfer, "steps.parquet", &path, never_ends);
     let (stored, ()) = tokio::join!(stored, serves);
     stored.unwrap();
-    assert!(began.elapsed() > by.patience.still * 2);
+    assert!(began.elapsed() > transfer.timeouts.stall * 2);
     drop(hold);
     assert!(holds.await.unwrap().is_err());
 }

@@ -1,4 +1,4 @@
-//! Downloads that break, against the real site.
+//! Interrupted downloads, against a real server.
 
 use super::*;
 use faceoff_api::views::submission::SubmissionView;
@@ -8,8 +8,8 @@ use tokio::{
     net::{TcpListener, TcpStream},
 };
 
-/// A submission that is larger than a connection's buffers, and its team's client.
-async fn large(site: &Site) -> (Client, SubmissionView) {
+/// Uploads a submission that is larger than the buffers of a connection; returns its team's client.
+async fn upload_large(site: &Site) -> (Client, SubmissionView) {
     let team = site.organiser.create_team("Alpha").await.unwrap();
     let client = site.organiser.with_token(&team.token);
     let folder = bundle(site);
@@ -22,21 +22,21 @@ async fn large(site: &Site) -> (Client, SubmissionView) {
 
 async fn get(
     client: &Client,
-    of: &SubmissionView,
+    submission: &SubmissionView,
     file: &Path,
-) -> anyhow::Result<super::super::Downloaded> {
+) -> anyhow::Result<super::super::DownloadedFile> {
     let bar = ProgressBar::hidden();
     client
-        .download_submission(of.id, file, &of.blake3, &bar)
+        .download_submission(submission.id, file, &submission.blake3, &bar)
         .await
 }
 
-fn beside(file: &Path, end: &str) -> PathBuf {
-    PathBuf::from(format!("{}{end}", file.display()))
+fn sibling(file: &Path, suffix: &str) -> PathBuf {
+    PathBuf::from(format!("{}{suffix}", file.display()))
 }
 
-/// What stands before a server and hangs up after so many bytes of an answer.
-async fn hangs_up(site: &Site, after: u64) -> String {
+/// Starts a proxy that closes each connection after `limit` bytes of the response; returns its URL.
+async fn start_breaking_proxy(site: &Site, limit: u64) -> String {
     let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
     let url = format!("http://{}", listener.local_addr().unwrap());
     let port = reqwest::Url::parse(&site.url).unwrap().port().unwrap();
@@ -44,15 +44,15 @@ async fn hangs_up(site: &Site, after: u64) -> String {
         while let Ok((client, _)) = listener.accept().await {
             let server = TcpStream::connect(("127.0.0.1", port)).await.unwrap();
             tokio::spawn(async move {
-                let (mut asks, mut hears) = client.into_split();
-                let (answers, mut listens) = server.into_split();
-                let passed_on = tokio::spawn(async move {
-                    let mut some = answers.take(after);
-                    let _ = tokio::io::copy(&mut some, &mut hears).await;
-                    let _ = hears.shutdown().await;
+                let (mut client_read, mut client_write) = client.into_split();
+                let (server_read, mut server_write) = server.into_split();
+                let response = tokio::spawn(async move {
+                    let mut beginning = server_read.take(limit);
+                    let _ = tokio::io::copy(&mut beginning, &mut client_write).await;
+                    let _ = client_write.shutdown().await;
                 });
-                let asked = tokio::io::copy(&mut asks, &mut listens);
-                tokio::select! { _ = asked => {}, _ = passed_on => {} }
+                let request = tokio::io::copy(&mut client_read, &mut server_write);
+                tokio::select! { _ = request => {}, _ = response => {} }
             });
         }
     });
@@ -60,21 +60,21 @@ async fn hangs_up(site: &Site, after: u64) -> String {
 }
 
 #[tokio::test]
-async fn a_download_that_broke_off_goes_on_where_it_was() {
+async fn interrupted_download_is_resumed() {
     let site = site(32 << 20).await;
-    let (client, uploaded) = large(&site).await;
+    let (client, uploaded) = upload_large(&site).await;
     let file = site.folder.path().join("again.tar.gz");
     let token = client.token.clone();
-    let broken = hangs_up(&site, 1 << 20).await;
-    let through = Client::new(&broken, token.as_deref(), None).unwrap();
-    let error = get(&through, &uploaded, &file).await.unwrap_err();
-    let told = format!("{error:#}");
+    let proxy = start_breaking_proxy(&site, 1 << 20).await;
+    let proxied = Client::new(&proxy, token.as_deref(), None).unwrap();
+    let error = get(&proxied, &uploaded, &file).await.unwrap_err();
+    let message = format!("{error:#}");
     assert!(
-        told.contains("the same command goes on from there"),
-        "{told}"
+        message.contains("run the same command again to resume it"),
+        "{message}"
     );
     assert!(!file.exists());
-    let begun = std::fs::metadata(beside(&file, ".part")).unwrap().len();
+    let begun = std::fs::metadata(sibling(&file, ".part")).unwrap().len();
     assert!(begun > 0 && begun < uploaded.bytes, "{begun}");
 
     let done = get(&client, &uploaded, &file).await.unwrap();
@@ -83,43 +83,43 @@ async fn a_download_that_broke_off_goes_on_where_it_was() {
         (done.blake3.as_str(), done.checked),
         (uploaded.blake3.as_str(), true)
     );
-    for end in [".part", ".part.etag"] {
-        assert!(!beside(&file, end).exists(), "{end} is left");
+    for suffix in [".part", ".part.etag"] {
+        assert!(!sibling(&file, suffix).exists(), "{suffix} is left");
     }
 }
 
 #[tokio::test]
-async fn what_is_no_beginning_of_the_file_is_not_gone_on_with() {
+async fn foreign_partial_file_is_not_resumed() {
     let site = site(32 << 20).await;
-    let (client, uploaded) = large(&site).await;
+    let (client, uploaded) = upload_large(&site).await;
     let file = site.folder.path().join("again.tar.gz");
     let whole = get(&client, &uploaded, &file).await.unwrap();
     assert_eq!(whole.resumed_at, 0);
     let bytes = std::fs::read(&file).unwrap();
     let tag = format!("\"blake3-{}\"", uploaded.blake3);
     let begin = |part: &[u8], tag: Option<&str>| {
-        std::fs::write(beside(&file, ".part"), part).unwrap();
+        std::fs::write(sibling(&file, ".part"), part).unwrap();
         match tag {
-            Some(tag) => std::fs::write(beside(&file, ".part.etag"), tag).unwrap(),
-            None => assert!(!beside(&file, ".part.etag").exists()),
+            Some(tag) => std::fs::write(sibling(&file, ".part.etag"), tag).unwrap(),
+            None => assert!(!sibling(&file, ".part.etag").exists()),
         }
     };
-    // Of nobody knows what, and of another file: anew.
+    // Without an ETag, or with that of another file, the download starts at 0.
     begin(&bytes[..1000], None);
     assert_eq!(get(&client, &uploaded, &file).await.unwrap().resumed_at, 0);
     begin(&bytes[..1000], Some("\"blake3-00\""));
     assert_eq!(get(&client, &uploaded, &file).await.unwrap().resumed_at, 0);
-    // More than there is.
+    // The partial file is longer than the file.
     begin(&[&bytes[..], b"x"].concat(), Some(&tag));
     assert_eq!(get(&client, &uploaded, &file).await.unwrap().resumed_at, 0);
-    // All of it but the name.
+    // The partial file is complete and only needs its name.
     begin(&bytes, Some(&tag));
     assert_eq!(get(&client, &uploaded, &file).await.unwrap(), whole);
-    // Damaged: that is found out, and nothing of it kept.
+    // Damage is detected, and the partial file is deleted.
     begin(&[0; 1000], Some(&tag));
-    let told = format!("{:#}", get(&client, &uploaded, &file).await.unwrap_err());
-    assert!(told.contains("it was changed on the way"), "{told}");
-    assert!(!beside(&file, ".part").exists() && !beside(&file, ".part.etag").exists());
+    let message = format!("{:#}", get(&client, &uploaded, &file).await.unwrap_err());
+    assert!(message.contains("it was damaged in transfer"), "{message}");
+    assert!(!sibling(&file, ".part").exists() && !sibling(&file, ".part.etag").exists());
     assert_eq!(get(&client, &uploaded, &file).await.unwrap(), whole);
     assert_eq!(std::fs::read(&file).unwrap(), bytes);
 }

@@ -1,51 +1,51 @@
-//! `faceoff admin freeze`, `missed-day`, `extra-turn`: what the organiser does with boards and days beside the schedule.
+//! `faceoff admin freeze`, `unfreeze`, `missed-day` and `extra-turn`: interventions in boards and evaluation days.
 
-use super::{find::find_team, lines::line};
+use super::{team_lookup::find_team, lines::evaluation_line};
 use crate::{
     client::Client,
-    commands::{find_stage::find_stage, output::print},
+    commands::{stage_lookup::find_stage, output::print},
 };
 use clap::Subcommand;
-use faceoff_api::requests::{ExtraTurn, MissedDay};
+use faceoff_api::requests::{NewExtraEvaluation, MissedDay};
 use faceoff_types::StageDay;
 use jiff::civil::Date;
 
 #[derive(Debug, Subcommand)]
 pub(super) enum DayAction {
-    /// Freeze the boards of a stage: they show what they show now, and say so; days go on
+    /// Freeze the boards of a stage: they keep their current results and are marked as frozen; evaluation days continue
     Freeze {
         /// The stage's name or id
         stage: String,
-        /// Shown to everybody
+        /// Shown publicly
         reason: String,
     },
-    /// Have the boards of a stage show everything again
+    /// Unfreeze the boards of a stage: they show all released results again
     Unfreeze {
         /// The stage's name or id
         stage: String,
     },
-    /// Play a day that was missed, a date that has passed without a cut, with what is active now
+    /// Start an evaluation day for a past date without a cutoff, with the submissions that are active now
     MissedDay {
-        /// Its date
+        /// The date of the day
         day: Date,
-        /// Shown to everybody
+        /// Shown publicly
         reason: String,
         /// The stage's name or id
         #[arg(long)]
         stage: String,
     },
-    /// Give one team one more evaluation of a day; without --confirm, say what it would replace
+    /// Add one evaluation of a team to an evaluation day; without --confirm, only name the result it would replace
     ExtraTurn {
         /// The team's name or id
         team: String,
-        /// The day's date
+        /// The date of the day
         day: Date,
-        /// Shown to everybody
+        /// Shown publicly
         reason: String,
         /// The stage's name or id
         #[arg(long)]
         stage: String,
-        /// The team's name, if a result that counts is to be replaced
+        /// The team's name, as confirmation that a counting result is replaced
         #[arg(long, value_name = "TEAM")]
         confirm: Option<String>,
     },
@@ -64,20 +64,20 @@ pub(super) async fn act(client: &Client, json: bool, action: DayAction) -> anyho
             let stage = find_stage(client, &stage).await?;
             let live = client.unfreeze(stage.id).await?;
             print(json, &live, || {
-                format!("the boards of {} show everything", live.name)
+                format!("the boards of {} are live again", live.name)
             })
         }
         DayAction::MissedDay { day, reason, stage } => {
             let stage = find_stage(client, &stage).await?;
-            let wanted = MissedDay { day, reason };
-            let started = client.start_missed_day(stage.id, &wanted).await?;
+            let missed = MissedDay { day, reason };
+            let started = client.start_missed_day(stage.id, &missed).await?;
             print(json, &started, || {
                 let mut lines = vec![format!(
-                    "{}: {} started",
+                    "{}: {} evaluations started",
                     started.day,
                     started.created.len()
                 )];
-                lines.extend(started.created.iter().map(line));
+                lines.extend(started.created.iter().map(evaluation_line));
                 lines.join("\n")
             })
         }
@@ -88,17 +88,17 @@ pub(super) async fn act(client: &Client, json: bool, action: DayAction) -> anyho
             stage,
             confirm,
         } => {
-            let of = StageDay {
+            let stage_day = StageDay {
                 stage: find_stage(client, &stage).await?.id,
                 date: day,
             };
-            let wanted = ExtraTurn {
+            let extra = NewExtraEvaluation {
                 team: find_team(client, &team).await?,
                 reason,
                 confirm,
             };
-            let turn = client.extra_turn(of, &wanted).await?;
-            print(json, &turn, || line(&turn))
+            let evaluation = client.add_evaluation(stage_day, &extra).await?;
+            print(json, &evaluation, || evaluation_line(&evaluation))
         }
     }
 }

@@ -3,7 +3,7 @@ use faceoff_archive::Edition;
 use serde_json::json;
 use std::path::Path;
 
-/// Downloads the season's archive and tells what is in it.
+/// Downloads the season's archive and prints its summary.
 pub(super) async fn export(
     client: &Client,
     as_json: bool,
@@ -15,7 +15,7 @@ pub(super) async fn export(
         false => Edition::Organiser,
     };
     let (manifest, bytes) = client.season_archive(edition, file).await?;
-    let told = json!({
+    let summary = json!({
         "file": file,
         "bytes": bytes,
         "season": manifest.season,
@@ -25,9 +25,9 @@ pub(super) async fn export(
         "unpacked_bytes": manifest.total_bytes(),
         "left_out": manifest.left_out,
     });
-    print(as_json, &told, || {
+    print(as_json, &summary, || {
         let mut lines = vec![format!(
-            "{}: {bytes} bytes, the {edition} archive of {:?} as it was at {}; {} files of {} bytes",
+            "{}: {bytes} bytes, the {edition} archive of {:?} of {}; {} files of {} bytes",
             file.display(),
             manifest.season,
             manifest.made_at.strftime("%Y-%m-%d %H:%M:%S UTC"),
@@ -38,7 +38,7 @@ pub(super) async fn export(
             manifest
                 .left_out
                 .iter()
-                .map(|what| format!("left out: {what}")),
+                .map(|part| format!("left out: {part}")),
         );
         lines.join("\n")
     })

@@ -1,8 +1,8 @@
-use crate::commands::evaluation_text::state;
+use crate::commands::evaluation_text::status_text;
 use faceoff_api::views::evaluation::EvaluationView;
 
-/// An evaluation in a line.
-pub(super) fn line(evaluation: &EvaluationView) -> String {
+/// Formats an evaluation as one line.
+pub(super) fn evaluation_line(evaluation: &EvaluationView) -> String {
     let (team, id) = (&evaluation.team_name, evaluation.id);
-    format!("{team:<40} {id}  {}", state(evaluation))
+    format!("{team:<40} {id}  {}", status_text(evaluation))
 }

@@ -1,11 +1,11 @@
-//! `faceoff admin people` and `faceoff admin registration`: who takes part.
+//! `faceoff admin people` and `faceoff admin registration`: users and teams of the season.
 
-use super::find::find_team;
+use super::team_lookup::find_team;
 use crate::{
     client::Client,
     commands::{
-        output::{or_none, print},
-        people::{invitation_line, invitation_lines, invited, person_line},
+        output::{lines_or, print},
+        people::{invitation_line, invitation_lines, new_invitation_text, person_line},
     },
 };
 use anyhow::bail;
@@ -14,46 +14,46 @@ use faceoff_api::{
     requests::{InvitedRole, NewInvitation, SeasonChange},
     views::invitation::RegistrationView,
 };
-use faceoff_types::{DivisionName, InvitationId, PersonId, RegistrationId};
+use faceoff_types::{DivisionName, InvitationId, UserId, RegistrationId};
 
 #[derive(Debug, Subcommand)]
 pub(super) enum PeopleAction {
-    /// List everybody
+    /// List all users
     List,
-    /// Make a link by which one person becomes an organiser
+    /// Create an invitation link for an organiser
     InviteOrganiser {
-        /// For whom
+        /// Label that identifies the invitation in lists, e.g. the name of the invited person
         note: String,
     },
-    /// Make a link by which one person becomes a member of a team
+    /// Create an invitation link for a member of a team
     InviteMember {
         /// The team's name or id
         team: String,
-        /// For whom
+        /// Label that identifies the invitation in lists, e.g. the name of the invited person
         note: String,
     },
-    /// Make a link by which one person brings a new team, without registration
+    /// Create an invitation link for the first member of a new team, without registration
     InviteTeam {
-        /// For whom
+        /// Label that identifies the invitation in lists, e.g. the name of the invited person
         note: String,
     },
-    /// Make a link for somebody who has lost password and tokens
+    /// Create a sign-in link for a user who has lost password and tokens
     InviteBack {
-        /// The person's name or id
+        /// The user's name or id
         person: String,
     },
     /// List all invitations
     Invitations,
-    /// Take an invitation back
+    /// Revoke an invitation
     Uninvite {
         /// The invitation's id
         invitation: InvitationId,
     },
-    /// Let a person do nothing any more, at once; without --confirm, say what that would do
+    /// Remove a user: their access ends at once; without --confirm, only list the effects
     Remove {
-        /// The person's name or id
+        /// The user's name or id
         person: String,
-        /// The person's name
+        /// The user's name, as confirmation
         #[arg(long, value_name = "NAME")]
         confirm: Option<String>,
     },
@@ -63,11 +63,11 @@ pub(super) enum PeopleAction {
 pub(super) enum RegistrationAction {
     /// List the registrations
     List,
-    /// Let anybody register a team
+    /// Open registration: anyone can register a team
     Open,
-    /// Let teams come by invitation only
+    /// Close registration: teams join by invitation only
     Close,
-    /// Let a registered team take part
+    /// Approve a registration: the team takes part
     Approve {
         /// The registration's id
         registration: RegistrationId,
@@ -76,30 +76,30 @@ pub(super) enum RegistrationAction {
     Refuse {
         /// The registration's id
         registration: RegistrationId,
-        /// For whoever has the registration's link
+        /// Shown to the team under its registration link
         reason: String,
     },
-    /// Set the divisions that teams can be in, in their order; none without names
+    /// Set the divisions of teams, in display order; without names, there are none
     Divisions {
-        /// Their names
+        /// The names of the divisions
         names: Vec<DivisionName>,
     },
 }
 
-async fn find_person(client: &Client, wanted: &str) -> anyhow::Result<PersonId> {
-    if let Ok(id) = wanted.parse() {
+async fn find_person(client: &Client, name_or_id: &str) -> anyhow::Result<UserId> {
+    if let Ok(id) = name_or_id.parse() {
         return Ok(id);
     }
     let people = client.people().await?;
-    match people.iter().find(|person| person.name.as_str() == wanted) {
+    match people.iter().find(|person| person.name.as_str() == name_or_id) {
         Some(person) => Ok(person.id),
-        None => bail!("nobody is named {wanted:?}; faceoff admin people list shows everybody"),
+        None => bail!("there is no user {name_or_id:?}; see faceoff admin people list"),
     }
 }
 
 async fn invite(client: &Client, json: bool, new: NewInvitation) -> anyhow::Result<()> {
-    let made = client.invite(&new).await?;
-    print(json, &made, || invited(&made))
+    let invitation = client.invite(&new).await?;
+    print(json, &invitation, || new_invitation_text(&invitation))
 }
 
 const fn new(role: InvitedRole, note: String) -> NewInvitation {
@@ -122,9 +122,9 @@ pub(super) async fn people(
             let people = client.people().await?;
             print(json, &people, || {
                 let lines = people.iter().map(person_line).collect();
-                or_none(
+                lines_or(
                     lines,
-                    "nobody yet: faceoff admin people invite-organiser NOTE",
+                    "no users yet; invite the first with faceoff admin people invite-organiser NOTE",
                 )
             })
         }
@@ -185,7 +185,7 @@ pub(super) async fn registrations(
             let registrations = client.registrations().await?;
             return print(json, &registrations, || {
                 let lines = registrations.iter().map(registration_line).collect();
-                or_none(lines, "no team has registered")
+                lines_or(lines, "no team has registered")
             });
         }
         RegistrationAction::Approve { registration } => {

@@ -1,18 +1,18 @@
-//! `faceoff admin proposal`: what is tried without counting, and what is evaluated again.
+//! `faceoff admin proposal`: trials and proposed re-evaluations.
 
 use crate::{
     client::Client,
     commands::{
-        find_stage::find_stage,
-        output::{or_none, print},
+        stage_lookup::find_stage,
+        output::{lines_or, print},
     },
 };
 use clap::Subcommand;
 use faceoff_api::{
     requests::{NewProposal, Trial},
     views::proposal::{
-        ChangeView, DraftStatus, DraftView, ProposalKindView, ProposalStateView, ProposalView,
-        StandingView,
+        ChangeView, ProposedEvaluationStatus, ProposedEvaluationView, ProposalKindView, ProposalStateView, ProposalView,
+        RankView,
     },
 };
 use faceoff_types::{EvaluationId, ProposalId, SubmissionId};
@@ -20,56 +20,56 @@ use jiff::civil::Date;
 
 #[derive(Debug, Subcommand)]
 pub(super) enum ProposalAction {
-    /// List trials and proposals, the newest first
+    /// List trials and proposed re-evaluations, the newest first
     List,
-    /// Show one: what it plays, and which ranks would change
+    /// Show one with its evaluations and the ranks it would change
     Show {
-        /// Its id
+        /// The id of the trial or proposal
         proposal: ProposalId,
     },
-    /// Play what is active by a stage's rules, without turn and board, behind everything that counts
+    /// Evaluate the active submissions by a stage's rules, without effect on boards; all counting jobs run first
     Trial {
         /// The stage's name or id
         stage: String,
-        /// Kept in the log
+        /// Recorded in the log
         reason: String,
         /// Only this valid submission
         #[arg(long, value_name = "ID")]
         submission: Option<SubmissionId>,
     },
-    /// Play one evaluation that counts again, on the same episodes, beside it
+    /// Propose to re-evaluate one counting result, on the same episodes
     Evaluation {
         /// The evaluation's id
         evaluation: EvaluationId,
-        /// Shown to everybody once it is applied
+        /// Shown publicly once the proposal is applied
         reason: String,
     },
-    /// Play all of a day that counts again, on the same episodes, beside it
+    /// Propose to re-evaluate all counting results of a day, on the same episodes
     Day {
-        /// The day's date
+        /// The date of the day
         day: Date,
-        /// Shown to everybody once it is applied
+        /// Shown publicly once the proposal is applied
         reason: String,
         /// The stage's name or id
         #[arg(long)]
         stage: String,
-        /// By the stage's newest rules, for the board of these
+        /// Evaluate by the stage's newest rules, for the board of that revision
         #[arg(long)]
         new_rules: bool,
     },
-    /// Have what was played again count; without --confirm, say what that would do
+    /// Apply a proposal: its results replace the old ones; without --confirm, only list the effects
     Apply {
-        /// Its id
+        /// The id of the trial or proposal
         proposal: ProposalId,
-        /// The day's date
+        /// The date of the day, as confirmation
         #[arg(long, value_name = "DATE")]
         confirm: Option<String>,
     },
-    /// Have it never count; what is under way of it is stopped; without --confirm, say what that would do
+    /// Drop a proposal or trial and cancel its unfinished evaluations; without --confirm, only list the effects
     Drop {
-        /// Its id
+        /// The id of the trial or proposal
         proposal: ProposalId,
-        /// The stage's name
+        /// The stage's name, as confirmation
         #[arg(long, value_name = "NAME")]
         confirm: Option<String>,
     },
@@ -80,7 +80,7 @@ pub(super) async fn act(client: &Client, json: bool, action: ProposalAction) -> 
         ProposalAction::List => {
             let all = client.proposals().await?;
             return print(json, &all, || {
-                or_none(all.iter().map(head).collect(), "no trial and no proposal")
+                lines_or(all.iter().map(proposal_line).collect(), "no trials or proposals")
             });
         }
         ProposalAction::Show { proposal } => client.proposal(proposal).await?,
@@ -96,13 +96,13 @@ pub(super) async fn act(client: &Client, json: bool, action: ProposalAction) -> 
         }
         ProposalAction::Evaluation { evaluation, reason } => {
             let stage = client.evaluation(evaluation).await?.stage;
-            let wanted = NewProposal {
+            let new = NewProposal {
                 evaluation: Some(evaluation),
                 day: None,
                 new_rules: false,
                 reason,
             };
-            client.propose(stage, &wanted).await?
+            client.propose(stage, &new).await?
         }
         ProposalAction::Day {
             day,
@@ -111,13 +111,13 @@ pub(super) async fn act(client: &Client, json: bool, action: ProposalAction) -> 
             new_rules,
         } => {
             let stage = find_stage(client, &stage).await?;
-            let wanted = NewProposal {
+            let new = NewProposal {
                 evaluation: None,
                 day: Some(day),
                 new_rules,
                 reason,
             };
-            client.propose(stage.id, &wanted).await?
+            client.propose(stage.id, &new).await?
         }
         ProposalAction::Apply { proposal, confirm } => {
             client.apply_proposal(proposal, confirm).await?
@@ -126,84 +126,84 @@ pub(super) async fn act(client: &Client, json: bool, action: ProposalAction) -> 
             client.drop_proposal(proposal, confirm).await?
         }
     };
-    print(json, &shown, || whole(&shown))
+    print(json, &shown, || proposal_text(&shown))
 }
 
-fn head(proposal: &ProposalView) -> String {
-    let what = match (proposal.kind, proposal.day) {
-        (ProposalKindView::Evaluation, Some(day)) => format!("one evaluation of {day} again"),
-        (ProposalKindView::Day, Some(day)) => format!("{day} again"),
+fn proposal_line(proposal: &ProposalView) -> String {
+    let subject = match (proposal.kind, proposal.day) {
+        (ProposalKindView::Evaluation, Some(day)) => format!("re-evaluation of one result of {day}"),
+        (ProposalKindView::Day, Some(day)) => format!("re-evaluation of {day}"),
         (ProposalKindView::Rules, Some(day)) => {
             format!(
-                "{day} again, by revision {} of the rules",
+                "re-evaluation of {day} by revision {} of the rules",
                 proposal.revision
             )
         }
-        _ => "a trial".to_owned(),
+        _ => "trial".to_owned(),
     };
     let state = match proposal.state {
-        ProposalStateView::Playing => "is being played",
-        ProposalStateView::Played => "is played",
-        ProposalStateView::Applied => "was applied",
-        ProposalStateView::Dropped => "was dropped",
+        ProposalStateView::Playing => "running",
+        ProposalStateView::Played => "finished, not applied",
+        ProposalStateView::Applied => "applied",
+        ProposalStateView::Dropped => "dropped",
     };
     format!(
-        "{}  {}: {what} ({}), {state}",
+        "{}  {}: {subject} ({}), {state}",
         proposal.id, proposal.stage_name, proposal.reason
     )
 }
 
-fn whole(proposal: &ProposalView) -> String {
-    let mut lines = vec![head(proposal)];
-    lines.extend(proposal.evaluations.iter().map(played));
+fn proposal_text(proposal: &ProposalView) -> String {
+    let mut lines = vec![proposal_line(proposal)];
+    lines.extend(proposal.evaluations.iter().map(evaluation_line));
     if let Some(outcome) = &proposal.outcome {
         if outcome.old_board.is_some() {
             lines.push(match outcome.changes.len() {
-                0 => "applied, it would change no row".to_owned(),
-                1 => "applied, it would change this:".to_owned(),
-                count => format!("applied, it would change these {count}:"),
+                0 => "applying it would change no row of the board".to_owned(),
+                1 => "applying it would change one row of the board:".to_owned(),
+                count => format!("applying it would change {count} rows of the board:"),
             });
         }
-        lines.extend(outcome.changes.iter().map(change));
+        lines.extend(outcome.changes.iter().map(change_line));
     }
     lines.join("\n")
 }
 
-fn played(draft: &DraftView) -> String {
-    let state = match &draft.status {
-        DraftStatus::Queued => "queued, behind what counts".to_owned(),
-        DraftStatus::Running => format!(
+fn evaluation_line(evaluation: &ProposedEvaluationView) -> String {
+    let state = match &evaluation.status {
+        ProposedEvaluationStatus::Queued => "queued, after all counting jobs".to_owned(),
+        ProposedEvaluationStatus::Running => format!(
             "running, {} of {} episodes",
-            draft.progress.episodes_done, draft.progress.episodes_total
+            evaluation.progress.episodes_done, evaluation.progress.episodes_total
         ),
-        DraftStatus::Finalising => "computing the score".to_owned(),
-        DraftStatus::Finished { result, .. } => format!(
+        ProposedEvaluationStatus::Finalising => "computing the score".to_owned(),
+        ProposedEvaluationStatus::Finished { result, .. } => format!(
             "score {:.1}, {:.1} penalty points, {}",
             result.score,
             result.penalty_points,
             result.tier.title().to_lowercase()
         ),
-        DraftStatus::AgentFailed { faults, .. } => {
+        ProposedEvaluationStatus::AgentFailed { faults, .. } => {
             format!("the agent failed ({} faults)", faults.len())
         }
-        DraftStatus::PlatformFailed { reason, .. } => format!("our fault: {reason}"),
-        DraftStatus::Cancelled { .. } => "stopped".to_owned(),
+        ProposedEvaluationStatus::PlatformFailed { reason, .. } => format!("platform fault: {reason}"),
+        ProposedEvaluationStatus::Cancelled { .. } => "cancelled".to_owned(),
     };
-    format!("  {:<40} {state}", draft.team_name)
+    format!("  {:<40} {state}", evaluation.team_name)
 }
 
-fn change(change: &ChangeView) -> String {
-    let standing = |standing: Option<StandingView>| match standing {
-        Some(standing) => format!(
+fn change_line(change: &ChangeView) -> String {
+    let rank = |row: Option<RankView>| match row {
+        Some(row) => format!(
             "rank {} (score {:.1}, {:.1} points)",
-            standing.rank, standing.score, standing.penalty_points
+            row.rank, row.score, row.penalty_points
         ),
         None => "no row".to_owned(),
     };
     format!(
         "  {:<40} {} → {}",
         change.team,
-        standing(change.old),
-        standing(change.new)
+        rank(change.old),
+        rank(change.new)
     )
 }

@@ -1,10 +1,10 @@
-//! `faceoff admin stage`: makes, changes and lists the season's stages.
+//! `faceoff admin stage`: creates, changes and lists the season's stages.
 
 use crate::{
     client::Client,
     commands::{
-        find_stage::find_stage,
-        output::{or_none, print},
+        stage_lookup::find_stage,
+        output::{lines_or, print},
     },
 };
 use anyhow::{Context, ensure};
@@ -17,8 +17,8 @@ use faceoff_api::{
     },
 };
 use faceoff_types::{
-    DayDeadline, PerturbationSettings, Profile, Publishes, Retention, Runtimes, Schedule,
-    StageLimits, StageUploads, Standings, Task, TaskWeights, TierBounds, Zone,
+    DayDeadline, PerturbationSettings, Profile, Publication, Retention, Runtimes, Schedule,
+    StageLimits, StageUploadLimits, CountingResult, Task, TaskWeights, TierBounds, Zone,
 };
 use jiff::{
     Timestamp, Zoned,
@@ -31,62 +31,62 @@ use std::path::PathBuf;
 pub(super) enum StageAction {
     /// List the stages with their times and rules
     List,
-    /// Tell whether the stage's days fit: what there is to play against the slots and the time until the deadline
+    /// Estimate whether the evaluation days fit: the expected load against the slots and the time until the deadline
     Capacity {
         /// The stage's name or id
         stage: String,
     },
-    /// Make a stage: what is left out is as in the stage that is open
+    /// Create a stage; options that are left out are copied from the open stage
     Create {
         /// 1 to 40 letters, digits, spaces and . _ -
         name: String,
         #[command(flatten)]
-        wanted: Box<Wanted>,
+        options: Box<StageOptions>,
     },
-    /// Change a stage: what is left out stays as it is
+    /// Change a stage; options that are left out do not change
     Change {
         /// The stage's name or id
         stage: String,
-        /// Another name
+        /// The new name
         #[arg(long, value_name = "NAME")]
         rename: Option<String>,
         #[command(flatten)]
-        wanted: Box<Wanted>,
-        /// No end as yet
+        options: Box<StageOptions>,
+        /// Remove the closing time
         #[arg(long, conflicts_with = "closes")]
         open_end: bool,
-        /// The organiser starts the days
+        /// Remove the schedule: organisers start each evaluation day
         #[arg(long, conflicts_with_all = ["daily", "cron"])]
         no_schedule: bool,
-        /// The stage's name, if it is open and gets other rules or standings (its board begins anew then), or if
-        /// --retention removes something
+        /// The stage's name, as confirmation, if new rules or a new counting result of an open stage start a new
+        /// board, or if --retention deletes files
         #[arg(long, value_name = "NAME")]
         confirm: Option<String>,
     },
-    /// Start a stage's final day, once, after its close: of a stage with --standings final
+    /// Start the final evaluation day of a closed stage with --standings final; possible once
     Final {
         /// The stage's name or id
         stage: String,
     },
-    /// Sign a closed stage's result off: nothing of it changes any more; without --confirm, say what that would do
+    /// Sign off the result of a closed stage: it becomes final; without --confirm, only list the effects
     Finalise {
         /// The stage's name or id
         stage: String,
-        /// The stage's name
+        /// The stage's name, as confirmation
         #[arg(long, value_name = "NAME")]
         confirm: Option<String>,
     },
 }
 
 #[derive(Debug, Args)]
-pub(super) struct Wanted {
-    /// When it opens: "2026-12-01 06:00" in its zone, or with an offset; left out at its making, now
+pub(super) struct StageOptions {
+    /// Opening time, e.g. "2026-12-01 06:00" in the stage's time zone, or with an offset [default of a new stage: now]
     #[arg(long, value_name = "TIME")]
     opens: Option<String>,
-    /// When it closes; left out at its making, it has no end yet
+    /// Closing time [default of a new stage: open end]
     #[arg(long, value_name = "TIME")]
     closes: Option<String>,
-    /// Time zone of its days and its schedule, e.g. Europe/Berlin
+    /// Time zone of the evaluation days and the schedule, e.g. Europe/Berlin
     #[arg(long, value_name = "NAME")]
     zone: Option<Zone>,
     /// Perturbation profile
@@ -95,64 +95,64 @@ pub(super) struct Wanted {
     /// Tasks, e.g. hit,defend
     #[arg(long, value_delimiter = ',', value_name = "TASKS")]
     tasks: Option<Vec<Task>>,
-    /// Episodes of each task on a day
+    /// Episodes per task and evaluation
     #[arg(long)]
     episodes: Option<u32>,
-    /// More agent faults than this: no score
+    /// Agent faults allowed in an evaluation; with more, it has no score
     #[arg(long)]
     max_faults: Option<u32>,
-    /// What hit, defend and prepare weigh in the score, e.g. 0.4,0.4,0.2
+    /// Weights of hit, defend and prepare in the score, e.g. 0.4,0.4,0.2
     #[arg(long, value_name = "WEIGHTS")]
     weights: Option<TaskWeights>,
-    /// Penalty points per episode up to which an agent is deployable, and improvable, e.g. 0.5,1.5
+    /// Penalty points per episode up to which an agent is deployable and improvable, e.g. 0.5,1.5
     #[arg(long, value_name = "BOUNDS")]
     tier_bounds: Option<TierBounds>,
-    /// A JSON file with magnitudes of the perturbations; what it leaves out is the ruleset's, so {} gives up all others
+    /// A JSON file with magnitudes of the perturbations; those left out are the ruleset's, so {} resets all of them
     #[arg(long, value_name = "FILE")]
     perturbations: Option<PathBuf>,
-    /// Limits of agents in place of the server's, e.g. '{"memory_bytes":4294967296,"step_s":0.5}'; {} gives them up
+    /// Limits of agents instead of the server's, e.g. '{"memory_bytes":4294967296,"step_s":0.5}'; {} resets them
     #[arg(long, value_name = "JSON", value_parser = json::<StageLimits>)]
     limits: Option<StageLimits>,
-    /// The runtimes that its agents may use, e.g. native,python3; `all`: all that the server offers
+    /// Allowed runtimes, e.g. native,python3; `all`: all that the server offers
     #[arg(long, value_delimiter = ',', value_name = "NAMES")]
     runtimes: Option<Vec<String>>,
-    /// What each team may upload in place of the server's, e.g. '{"waiting":2,"day_bytes":1073741824}'
-    #[arg(long, value_name = "JSON", value_parser = json::<StageUploads>)]
-    uploads: Option<StageUploads>,
-    /// Its days start every day at this time
+    /// Upload limits of each team instead of the server's, e.g. '{"waiting":2,"day_bytes":1073741824}'
+    #[arg(long, value_name = "JSON", value_parser = json::<StageUploadLimits>)]
+    uploads: Option<StageUploadLimits>,
+    /// Daily cutoff at this time
     #[arg(long, value_name = "HH:MM", conflicts_with = "cron")]
     daily: Option<Time>,
-    /// Its days start at the first of these times of a date, e.g. "0 6 * * 1-5"
+    /// Cutoffs by a cron expression, e.g. "0 6 * * 1-5"; at most the first time of each date
     #[arg(long, value_name = "EXPRESSION")]
     cron: Option<String>,
-    /// Dates without a day, with --daily or --cron, e.g. 2026-12-24,2026-12-25
+    /// Dates without a cutoff, with --daily or --cron, e.g. 2026-12-24,2026-12-25
     #[arg(long, value_delimiter = ',', value_name = "DATES")]
     days_off: Option<Vec<Date>>,
-    /// Episodes per task and profile of the ablation of every submission that the schedule starts; 0: none
+    /// Episodes per task and profile of the ablation that the schedule starts for each submission; 0: none
     #[arg(long)]
     ablation_episodes: Option<u32>,
-    /// Episodes of one unit of work
+    /// Episodes per shard, the job that one slot runs at a time
     #[arg(long)]
     episodes_per_shard: Option<u32>,
-    /// Until when a day may be played: next-cut, never, or hours from its cut as 30h
+    /// Deadline of an evaluation day: next-cut, never, or hours after its cutoff, e.g. 30h
     #[arg(long, value_name = "DEADLINE")]
     deadline: Option<DayDeadline>,
-    /// Hide its scores from everybody but the organiser; `false` opens it, for good once it has scores
+    /// Hide the scores from everyone but organisers; `false` reveals them, permanently if there are any
     #[arg(long, value_name = "true|false")]
     blind: Option<bool>,
-    /// When its datasets are there for everybody: never, at_close or at_release
-    #[arg(long, value_name = "WHEN")]
-    publishes: Option<Publishes>,
-    /// What is kept of datasets and archives, e.g. '{"last":5,"days_after_sign_off":90}' or '{"until":"2027-06-01T00:00:00Z"}';
-    /// {} keeps everything
+    /// When datasets are published: never, at_close or at_release
+    #[arg(long, value_name = "TIME")]
+    publishes: Option<Publication>,
+    /// Retention of datasets and bundles, e.g. '{"last":5,"days_after_sign_off":90}' or
+    /// '{"until":"2027-06-01T00:00:00Z"}'; {} keeps all files
     #[arg(long, value_name = "JSON", value_parser = json::<Retention>)]
     retention: Option<Retention>,
-    /// What a team's row on its board is: latest, best, mean_of_last:N, or final
-    #[arg(long, value_name = "HOW")]
-    standings: Option<Standings>,
+    /// The result that counts for a team: latest, best, mean_of_last:N, or final
+    #[arg(long, value_name = "RESULT")]
+    standings: Option<CountingResult>,
 }
 
-impl Wanted {
+impl StageOptions {
     fn perturbations(&self) -> anyhow::Result<Option<Box<PerturbationSettings>>> {
         let Some(path) = &self.perturbations else {
             return Ok(None);
@@ -171,7 +171,7 @@ impl Wanted {
 
     #[expect(
         clippy::option_option,
-        reason = "all and left out are told apart, as the request does"
+        reason = "the request distinguishes `all` from an option that is left out"
     )]
     fn runtimes(&self) -> Option<Option<Runtimes>> {
         let names = self.runtimes.as_ref()?;
@@ -186,7 +186,7 @@ impl Wanted {
             (None, None) => {
                 ensure!(
                     self.days_off.is_none(),
-                    "--days-off goes with --daily or --cron: say when days start, too"
+                    "--days-off needs --daily or --cron, which set the cutoffs"
                 );
                 return Ok(None);
             }
@@ -202,21 +202,21 @@ fn json<T: DeserializeOwned>(text: &str) -> Result<T, String> {
     serde_path_to_error::deserialize(&mut json).map_err(|error| error.to_string())
 }
 
-/// An instant as people write it: with an offset or a zone, or by the clocks of `zone`.
-fn instant(text: &str, zone: &Zone) -> anyhow::Result<Timestamp> {
+/// Parses a time with an offset or a zone; without them, it is local time in `zone`.
+fn parse_instant(text: &str, zone: &Zone) -> anyhow::Result<Timestamp> {
     if let Ok(at) = text.parse::<Timestamp>() {
         return Ok(at);
     }
     if let Ok(at) = text.parse::<Zoned>() {
         return Ok(at.timestamp());
     }
-    let there: DateTime = text.parse().ok().with_context(|| {
+    let local: DateTime = text.parse().ok().with_context(|| {
         format!(
-            "{text:?} is no time: expected one as \"2026-12-01 06:00\" ({zone}), or with an offset as \
-             2026-12-01T06:00+01:00"
+            "{text:?} is not a time: expected e.g. \"2026-12-01 06:00\" ({zone}), or with an offset \
+            2026-12-01T06:00+01:00"
         )
     })?;
-    let at = there.to_zoned(zone.time_zone());
+    let at = local.to_zoned(zone.time_zone());
     Ok(at
         .with_context(|| format!("the time {text:?}"))?
         .timestamp())
@@ -227,7 +227,7 @@ pub(super) async fn act(client: &Client, json: bool, action: StageAction) -> any
         StageAction::List => {
             let stages = client.stages().await?;
             print(json, &stages, || {
-                or_none(stages.iter().map(told).collect(), "no stage")
+                lines_or(stages.iter().map(stage_text).collect(), "no stages")
             })
         }
         StageAction::Capacity { stage } => {
@@ -239,126 +239,126 @@ pub(super) async fn act(client: &Client, json: bool, action: StageAction) -> any
                 lines.join("\n")
             })
         }
-        StageAction::Create { name, wanted } => {
-            let zone = match &wanted.zone {
+        StageAction::Create { name, options } => {
+            let zone = match &options.zone {
                 Some(zone) => zone.clone(),
-                None => like(client).await?,
+                None => default_zone(client).await?,
             };
             let at = |text: &Option<String>| {
-                let at = text.as_deref().map(|text| instant(text, &zone));
+                let at = text.as_deref().map(|text| parse_instant(text, &zone));
                 at.transpose()
             };
             let new = NewStage {
                 name,
-                perturbations: wanted.perturbations()?,
-                runtimes: wanted.runtimes(),
-                opens_at: at(&wanted.opens)?,
-                closes_at: at(&wanted.closes)?,
-                schedule: wanted.schedule()?,
-                zone: wanted.zone,
-                profile: wanted.profile,
-                tasks: wanted.tasks,
-                episodes_per_task: wanted.episodes,
-                max_faults: wanted.max_faults,
-                weights: wanted.weights,
-                tier_bounds: wanted.tier_bounds,
-                limits: wanted.limits.map(Box::new),
-                uploads: wanted.uploads,
-                ablation_episodes: wanted.ablation_episodes,
-                episodes_per_shard: wanted.episodes_per_shard,
-                day_deadline: wanted.deadline,
-                blind: wanted.blind,
-                publishes: wanted.publishes,
-                standings: wanted.standings,
-                retention: wanted.retention,
+                perturbations: options.perturbations()?,
+                runtimes: options.runtimes(),
+                opens_at: at(&options.opens)?,
+                closes_at: at(&options.closes)?,
+                schedule: options.schedule()?,
+                zone: options.zone,
+                profile: options.profile,
+                tasks: options.tasks,
+                episodes_per_task: options.episodes,
+                max_faults: options.max_faults,
+                weights: options.weights,
+                tier_bounds: options.tier_bounds,
+                limits: options.limits.map(Box::new),
+                uploads: options.uploads,
+                ablation_episodes: options.ablation_episodes,
+                episodes_per_shard: options.episodes_per_shard,
+                day_deadline: options.deadline,
+                blind: options.blind,
+                publishes: options.publishes,
+                standings: options.standings,
+                retention: options.retention,
             };
             let made = client.create_stage(&new).await?;
-            print(json, &made, || told(&made))
+            print(json, &made, || stage_text(&made))
         }
         StageAction::Change {
             stage,
             rename,
-            wanted,
+            options,
             open_end,
             no_schedule,
             confirm,
         } => {
             let stage = find_stage(client, &stage).await?;
-            let zone = wanted.zone.clone().unwrap_or_else(|| stage.zone.clone());
+            let zone = options.zone.clone().unwrap_or_else(|| stage.zone.clone());
             let at = |text: &Option<String>| {
-                let at = text.as_deref().map(|text| instant(text, &zone));
+                let at = text.as_deref().map(|text| parse_instant(text, &zone));
                 at.transpose()
             };
-            let schedule = wanted.schedule()?.map(Some).or(no_schedule.then_some(None));
+            let schedule = options.schedule()?.map(Some).or(no_schedule.then_some(None));
             let change = StageChange {
                 name: rename,
-                perturbations: wanted.perturbations()?,
-                runtimes: wanted.runtimes(),
-                opens_at: at(&wanted.opens)?,
-                closes_at: at(&wanted.closes)?.map(Some).or(open_end.then_some(None)),
+                perturbations: options.perturbations()?,
+                runtimes: options.runtimes(),
+                opens_at: at(&options.opens)?,
+                closes_at: at(&options.closes)?.map(Some).or(open_end.then_some(None)),
                 schedule,
-                zone: wanted.zone,
-                profile: wanted.profile,
-                tasks: wanted.tasks,
-                episodes_per_task: wanted.episodes,
-                max_faults: wanted.max_faults,
-                weights: wanted.weights,
-                tier_bounds: wanted.tier_bounds,
-                limits: wanted.limits.map(Box::new),
-                uploads: wanted.uploads,
-                ablation_episodes: wanted.ablation_episodes,
-                episodes_per_shard: wanted.episodes_per_shard,
-                day_deadline: wanted.deadline,
-                blind: wanted.blind,
-                publishes: wanted.publishes,
-                standings: wanted.standings,
-                retention: wanted.retention,
+                zone: options.zone,
+                profile: options.profile,
+                tasks: options.tasks,
+                episodes_per_task: options.episodes,
+                max_faults: options.max_faults,
+                weights: options.weights,
+                tier_bounds: options.tier_bounds,
+                limits: options.limits.map(Box::new),
+                uploads: options.uploads,
+                ablation_episodes: options.ablation_episodes,
+                episodes_per_shard: options.episodes_per_shard,
+                day_deadline: options.deadline,
+                blind: options.blind,
+                publishes: options.publishes,
+                standings: options.standings,
+                retention: options.retention,
                 confirm,
             };
             let changed = client.change_stage(stage.id, &change).await?;
-            print(json, &changed, || told(&changed))
+            print(json, &changed, || stage_text(&changed))
         }
         StageAction::Final { stage } => {
             let stage = find_stage(client, &stage).await?;
             let day = client.start_final_day(stage.id).await?;
             print(json, &day, || {
-                format!("{}: final day, {} started", day.day, day.created.len())
+                format!("{}: final day, {} evaluations started", day.day, day.created.len())
             })
         }
         StageAction::Finalise { stage, confirm } => {
             let stage = find_stage(client, &stage).await?;
             let done = client.finalise(stage.id, confirm).await?;
-            print(json, &done, || told(&done))
+            print(json, &done, || stage_text(&done))
         }
     }
 }
 
-/// The zone of the stage that is open, or of the last.
-async fn like(client: &Client) -> anyhow::Result<Zone> {
+/// The time zone of the open stage, or else of the last one.
+async fn default_zone(client: &Client) -> anyhow::Result<Zone> {
     let stages = client.stages().await?;
     let open = stages.iter().rfind(|stage| stage.phase == PhaseView::Open);
-    let like = open.or(stages.last());
-    Ok(like.map_or(Zone::UTC, |stage| stage.zone.clone()))
+    let template = open.or(stages.last());
+    Ok(template.map_or(Zone::UTC, |stage| stage.zone.clone()))
 }
 
-/// The days that do not fit into their time.
+/// Warnings about evaluation days that do not fit into their time.
 fn warnings(stage: &StageView) -> impl Iterator<Item = String> {
     let loads = stage.capacity.iter().flatten();
     let overflows = loads.filter(|load| load.fit == Fit::Not);
     overflows.map(|load| format!("\n  warning  {}", load.summary))
 }
 
-fn told(stage: &StageView) -> String {
-    let there = |at: Timestamp| {
-        let there = at.to_zoned(stage.zone.time_zone());
-        there.strftime("%Y-%m-%d %H:%M:%S").to_string()
+fn stage_text(stage: &StageView) -> String {
+    let local_time = |at: Timestamp| {
+        let local = at.to_zoned(stage.zone.time_zone());
+        local.strftime("%Y-%m-%d %H:%M:%S").to_string()
     };
     let phase = match stage.phase {
         PhaseView::Upcoming => "upcoming",
         PhaseView::Open => "open",
         PhaseView::Closed => "closed",
     };
-    let closes = stage.closes_at.map_or_else(|| "open end".to_owned(), there);
+    let closes = stage.closes_at.map_or_else(|| "open end".to_owned(), local_time);
     let rules = &stage.rules.rules;
     let tasks: Vec<&str> = rules.tasks.iter().map(|task| task.as_str()).collect();
     let next = match &stage.next_cut {
@@ -366,11 +366,11 @@ fn told(stage: &StageView) -> String {
         None => "none".to_owned(),
     };
     let result = match &stage.finalised {
-        Some(done) => format!("signed off on {} by {}", there(done.at), done.by),
+        Some(done) => format!("signed off on {} by {}", local_time(done.at), done.by),
         None => "provisional".to_owned(),
     };
     let settings = &stage.settings;
-    let own = [
+    let overrides = [
         (
             "limits ",
             !rules.limits.is_none(),
@@ -382,30 +382,30 @@ fn told(stage: &StageView) -> String {
             serde_json::to_string(&settings.uploads),
         ),
     ];
-    let limits: String = own
+    let overrides: String = overrides
         .into_iter()
-        .filter(|(_, is_own, _)| *is_own)
+        .filter(|(_, is_set, _)| *is_set)
         .filter_map(|(name, _, json)| Some(format!("\n  {name}  {}", json.ok()?)))
         .chain(
             rules
                 .runtimes
                 .iter()
-                .map(|runtimes| format!("\n  agents   of the runtime {runtimes} only")),
+                .map(|runtimes| format!("\n  runtimes {runtimes} only")),
         )
         .chain(warnings(stage))
         .collect();
     let blind = if settings.blind { ", blind" } else { "" };
     format!(
-        "{} ({phase}{blind})\n  id       {}\n  times    {} to {closes}, {}\n  next day {next}\n  deadline {}\n  rules    revision {} since {}: {}, {} \
-         episodes of each of {}, at most {} faults\n  score    weights {}, tiers up to {} \
-         points per episode, perturbations {}{limits}\n  board    by {}, {result}\n  datasets public {}\n  kept     {}",
+        "{} ({phase}{blind})\n  id       {}\n  times    {} to {closes}, {}\n  cutoff   {next}\n  deadline {}\n  rules    revision {} since {}: {}, {} \
+        episodes per task ({}), at most {} faults\n  score    weights {}, tiers up to {} \
+         points per episode, perturbations {}{overrides}\n  board    by {}, {result}\n  datasets public {}\n  kept     {}",
         stage.name,
         stage.id,
-        there(stage.opens_at),
+        local_time(stage.opens_at),
         stage.zone,
         stage.settings.day_deadline,
         stage.rules.revision,
-        there(stage.rules.since),
+        local_time(stage.rules.since),
         rules.profile,
         rules.episodes_per_task,
         tasks.join(", "),
@@ -413,15 +413,15 @@ fn told(stage: &StageView) -> String {
         rules.variation.weights,
         rules.variation.tier_bounds,
         if *rules.variation.perturbations == PerturbationSettings::default() {
-            "as the ruleset has them"
+            "of the ruleset"
         } else {
-            "of its own"
+            "custom"
         },
         settings.standings,
         match settings.publishes {
-            Publishes::Never => "if their teams publish them",
-            Publishes::AtClose => "at the close",
-            Publishes::AtRelease => "when their day is released",
+            Publication::Never => "if the team publishes them",
+            Publication::AtClose => "when the stage closes",
+            Publication::AtRelease => "when the day is released",
         },
         stage.retention,
     )
@@ -432,9 +432,9 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_time_is_by_the_clocks_of_the_stage_unless_it_says_otherwise() {
+    fn time_without_offset_is_in_the_zone_of_the_stage() {
         let berlin: Zone = "Europe/Berlin".parse().unwrap();
-        let at = |text: &str| instant(text, &berlin).map(|at| at.to_string());
+        let at = |text: &str| parse_instant(text, &berlin).map(|at| at.to_string());
         for text in [
             "2026-12-01 06:00",
             "2026-12-01T06:00:00",

@@ -3,7 +3,7 @@
 use crate::{
     client::Client,
     commands::{
-        output::{download_bar, downloaded, or_none, print},
+        output::{download_bar, download_text, lines_or, print},
         storage::storage_line,
     },
 };
@@ -14,22 +14,22 @@ use std::path::PathBuf;
 
 #[derive(Debug, Subcommand)]
 pub(super) enum StorageAction {
-    /// Show how much room the files of each team take
+    /// Show the disk usage of each team
     Storage,
-    /// Download the archive of a submission
+    /// Download the bundle of a submission
     DownloadSubmission {
         /// The submission's id
         submission: SubmissionId,
-        /// Where to
+        /// The file to write; an existing file is replaced
         file: PathBuf,
     },
-    /// Have the archive of a submission removed; without --confirm, say what that would do
+    /// Delete the bundle of a submission; without --confirm, only list the effects
     DeleteSubmission {
         /// The submission's id
         submission: SubmissionId,
-        /// Its team reads it
+        /// Shown to the team
         reason: String,
-        /// The name of its archive
+        /// The file name of the bundle, as confirmation
         #[arg(long, value_name = "FILE_NAME")]
         confirm: Option<String>,
     },
@@ -40,7 +40,7 @@ pub(super) async fn act(client: &Client, json: bool, action: StorageAction) -> a
         StorageAction::Storage => {
             let teams = client.storage().await?;
             print(json, &teams, || {
-                or_none(teams.iter().map(storage_line).collect(), "no team yet")
+                lines_or(teams.iter().map(storage_line).collect(), "no teams yet")
             })
         }
         StorageAction::DownloadSubmission { submission, file } => {
@@ -50,19 +50,19 @@ pub(super) async fn act(client: &Client, json: bool, action: StorageAction) -> a
                 .download_submission(submission, &file, &hash, &bar)
                 .await?;
             bar.finish_and_clear();
-            print(json, &done, || downloaded(&done))
+            print(json, &done, || download_text(&done))
         }
         StorageAction::DeleteSubmission {
             submission,
             reason,
             confirm,
         } => {
-            let wanted = DeleteSubmission {
+            let deletion = DeleteSubmission {
                 confirm,
                 reason: Some(reason),
             };
-            let deleted = client.delete_submission(submission, &wanted).await?;
-            print(json, &deleted, || format!("{} is deleted", deleted.id))
+            let deleted = client.delete_submission(submission, &deletion).await?;
+            print(json, &deleted, || format!("the bundle of {} is deleted", deleted.id))
         }
     }
 }

@@ -1,10 +1,11 @@
-//! `faceoff admin create-team`, `change-team`, `new-token`, `disqualify`, `reinstate`, `retire-team`, `return-team` and `teams`.
+//! `faceoff admin create-team`, `change-team`, `new-token`, `disqualify`, `reinstate`, `retire-team`, `return-team`
+//! and `teams`.
 
-use super::find::find_team;
+use super::team_lookup::find_team;
 use crate::{
     client::Client,
     commands::{
-        output::{or_none, print},
+        output::{lines_or, print},
         team::team_text,
     },
 };
@@ -15,59 +16,59 @@ use faceoff_types::{DivisionName, TeamName};
 
 #[derive(Debug, Subcommand)]
 pub(super) enum TeamAction {
-    /// Create a team and print its token, which is shown this once
+    /// Create a team and print its token, which is shown only once
     CreateTeam {
         /// 1 to 40 letters, digits, spaces and . _ -
         name: String,
     },
-    /// Change a team's name or division, or say whether it is ranked
+    /// Change a team's name or division, or make it a baseline
     ChangeTeam {
         /// The team's name or id
         team: String,
-        /// Another name
+        /// The new name
         #[arg(long, value_name = "NAME")]
         rename: Option<TeamName>,
-        /// The division that it is in; empty: none
+        /// The team's division; empty: none
         #[arg(long)]
         division: Option<String>,
-        /// It is a reference agent of yours: boards show it apart, and rank the teams without it
+        /// Make it a baseline: a reference agent that boards show separately and without a rank
         #[arg(long, conflicts_with = "no_baseline")]
         baseline: bool,
-        /// It is ranked as any team
+        /// Make it a ranked team
         #[arg(long)]
         no_baseline: bool,
     },
-    /// Replace a team's own tokens by one; the old ones are worth nothing from then on
+    /// Create a new token for a team and revoke its old ones
     NewToken {
         /// The team's name or id
         team: String,
     },
-    /// Disqualify a team: it neither plays nor is ranked, at once; without --confirm, say what that would do
+    /// Disqualify a team: it is no longer evaluated or ranked; without --confirm, only list the effects
     Disqualify {
         /// The team's name or id
         team: String,
-        /// Shown to everybody
+        /// Shown publicly
         reason: String,
-        /// The team's name
+        /// The team's name, as confirmation
         #[arg(long, value_name = "TEAM")]
         confirm: Option<String>,
     },
-    /// Let a disqualified team play and be ranked again
+    /// Reinstate a disqualified team: it is evaluated and ranked again
     Reinstate {
         /// The team's name or id
         team: String,
-        /// Kept in the log
+        /// Recorded in the log
         reason: String,
     },
-    /// Take a team out of all days to come; without --confirm, say what that would do
+    /// Retire a team from all future evaluation days; without --confirm, only list the effects
     RetireTeam {
         /// The team's name or id
         team: String,
-        /// The team's name
+        /// The team's name, as confirmation
         #[arg(long, value_name = "TEAM")]
         confirm: Option<String>,
     },
-    /// Let a team play again that has retired
+    /// Return a retired team to the competition
     ReturnTeam {
         /// The team's name or id
         team: String,
@@ -91,7 +92,7 @@ pub(super) async fn act(client: &Client, json: bool, action: TeamAction) -> anyh
             let created = client.create_team(&name).await?;
             print(json, &created, || {
                 format!(
-                    "team {} ({})\ntoken {}\nIt is not shown again; give it to the team.",
+                    "team {} ({})\ntoken {}\nThe token is not shown again; give it to the team.",
                     created.team.name, created.team.id, created.token
                 )
             })
@@ -123,7 +124,7 @@ pub(super) async fn act(client: &Client, json: bool, action: TeamAction) -> anyh
             let replaced = client.replace_token(team).await?;
             print(json, &replaced, || {
                 format!(
-                    "team {} ({})\ntoken {}\nThe old token is worth nothing from now on.",
+                    "team {} ({})\ntoken {}\nThe old tokens are revoked.",
                     replaced.team.name, replaced.team.id, replaced.token
                 )
             })
@@ -161,9 +162,9 @@ pub(super) async fn act(client: &Client, json: bool, action: TeamAction) -> anyh
                         )
                     })
                     .collect();
-                or_none(
+                lines_or(
                     lines,
-                    "no team yet; create one with faceoff admin create-team NAME",
+                    "no teams yet; create one with faceoff admin create-team NAME",
                 )
             })
         }

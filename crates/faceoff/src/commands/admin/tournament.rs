@@ -1,13 +1,13 @@
-//! `faceoff admin tournament`: opens, plays and closes tournaments.
+//! `faceoff admin tournament`: opens, runs and closes tournaments.
 
-mod wanted;
+mod options;
 
 use crate::{
     client::Client,
     commands::{
         output::print,
         tournament::{
-            find::{find, find_or_newest},
+            lookup::{find_tournament, find_tournament_or_newest},
             games, round, text,
         },
     },
@@ -15,143 +15,146 @@ use crate::{
 use anyhow::bail;
 use clap::Subcommand;
 use faceoff_api::requests::{Decision, NewDeparture, NewTournament, TournamentChange};
-use faceoff_types::{GameId, LeftAs, RoundNumber, SubmissionId, TeamName};
-use wanted::Wanted;
+use faceoff_types::{GameId, DepartureKind, RoundNumber, SubmissionId, TeamName};
+use options::TournamentOptions;
 
 #[derive(Debug, Subcommand)]
 pub(super) enum TournamentAction {
-    /// Open one. Until its first round starts, teams and rules may change, and games that do not count be played
+    /// Open a tournament. Until its first round starts, teams and rules may change, and friendly and test games are
+    /// possible
     Open {
         /// 1 to 40 letters, digits, spaces and . _ -
         name: String,
-        /// The stage on whose board its teams stand [default: the one that is open, or the nearest]
+        /// The stage whose board ranks the teams [default: the open stage, or the nearest]
         #[arg(long, value_name = "STAGE")]
         stage: Option<String>,
-        /// Its teams, e.g. AJoy,Zed [default: those that the stage's board has as deployable or improvable]
+        /// Names of the teams, e.g. AJoy,Zed [default: the teams that the stage's board has as deployable or
+        /// improvable]
         #[arg(long, value_delimiter = ',', value_name = "TEAMS")]
         teams: Option<Vec<TeamName>>,
         #[command(flatten)]
-        wanted: Box<Wanted>,
+        options: Box<TournamentOptions>,
     },
-    /// List them, the first one first
+    /// List the tournaments, the oldest first
     List,
-    /// Show one: rules, teams, rounds, tables, and what comes next
+    /// Show a tournament: rules, teams, rounds, standings and next step
     Show {
-        /// Its name or id [default: the newest]
+        /// The tournament's name or id [default: the newest]
         tournament: Option<String>,
     },
-    /// Change one: its rules until its first round starts, the rest until it is closed
+    /// Change a tournament: its rules until the first round starts, other settings until it is closed
     Change {
-        /// Its name or id
+        /// The tournament's name or id
         tournament: String,
-        /// Another name
+        /// The new name
         #[arg(long, value_name = "NAME")]
         rename: Option<String>,
-        /// The agent against which teams may test theirs: a valid submission of any team
+        /// The baseline, the opponent of test games: a valid submission of any team
         #[arg(long, value_name = "SUBMISSION", conflicts_with = "no_baseline")]
         baseline: Option<SubmissionId>,
-        /// No test games any more
+        /// Remove the baseline: no further test games
         #[arg(long)]
         no_baseline: bool,
         #[command(flatten)]
-        wanted: Box<Wanted>,
+        options: Box<TournamentOptions>,
     },
     /// Enter teams
     Enter {
-        /// Its name or id
+        /// The tournament's name or id
         tournament: String,
         /// The teams' names
         #[arg(required = true)]
         teams: Vec<TeamName>,
     },
-    /// Take a team out for good; without --confirm, say what that would do
+    /// Remove a team permanently; without --confirm, only list the effects
     Leave {
-        /// Its name or id
+        /// The tournament's name or id
         tournament: String,
         /// The team's name
         team: TeamName,
-        /// Everybody may read it
+        /// Shown publicly
         reason: String,
-        /// By the organiser's decision: it stands below all others
+        /// Disqualify the team: it is ranked below all others
         #[arg(long)]
         disqualified: bool,
-        /// The first round whose games with a disqualified team do not count [default: the one under way, or the next]
+        /// The first round whose games with the disqualified team do not count [default: the running round, or the
+        /// next]
         #[arg(long, value_name = "ROUND", value_parser = round, requires = "disqualified")]
         from_round: Option<RoundNumber>,
-        /// The team's name again
+        /// The team's name, as confirmation
         #[arg(long, value_name = "TEAM")]
         confirm: Option<String>,
     },
-    /// Draw the next round and start it: what each team has active now plays all of it
+    /// Draw and start the next round: each team plays all of it with its active submission of this moment
     StartRound {
-        /// Its name or id
+        /// The tournament's name or id
         tournament: String,
     },
-    /// Let no game of it begin; what is played goes on to its end
+    /// Pause a tournament: running games finish, no further game starts
     Pause {
-        /// Its name or id
+        /// The tournament's name or id
         tournament: String,
-        /// Shown to everybody
+        /// Shown publicly
         reason: String,
     },
-    /// Let its games begin again
+    /// Resume a paused tournament
     Resume {
-        /// Its name or id
+        /// The tournament's name or id
         tournament: String,
     },
-    /// Close it: nothing of it changes any more; without --confirm, say what that would do
+    /// Close a tournament: its result becomes final; without --confirm, only list the effects
     Close {
-        /// Its name or id
+        /// The tournament's name or id
         tournament: String,
-        /// Its name
+        /// The tournament's name, as confirmation
         #[arg(long, value_name = "NAME")]
         confirm: Option<String>,
     },
-    /// Have teams play the baseline, before or between rounds; it does not count
+    /// Start test games of teams against the baseline, before or between rounds; they do not count
     Test {
-        /// Its name or id
+        /// The tournament's name or id
         tournament: String,
-        /// The teams' names [default: all that are in it]
+        /// The teams' names [default: all teams of the tournament]
         #[arg(long, value_delimiter = ',', value_name = "TEAMS")]
         teams: Option<Vec<TeamName>>,
     },
-    /// List its games that do not count, all teams', the newest first
+    /// List the friendly and test games of all teams, the newest first
     FreeGames {
-        /// Its name or id [default: the newest]
+        /// The tournament's name or id [default: the newest]
         tournament: Option<String>,
     },
-    /// Have the schedule played again with fresh seeds, to see how sure its champion is; it never counts
+    /// Replay the whole schedule with new seeds, to estimate how certain the champion is; replays never count
     Replay {
-        /// Its name or id
+        /// The tournament's name or id
         tournament: String,
-        /// How many times more
+        /// Number of replays
         #[arg(required_unless_present = "cancel")]
         times: Option<u32>,
-        /// Call off those that are not over instead
+        /// Cancel the unfinished replays instead
         #[arg(long, conflicts_with = "times")]
         cancel: bool,
     },
-    /// Let the result of a game count no more; without --confirm, say what that would do
+    /// Void the result of a game; without --confirm, only list the effects
     Void {
         /// The game's id
         game: GameId,
-        /// Shown to everybody
+        /// Shown publicly
         reason: String,
-        /// The teams' names, as in "AJoy - Zed"
+        /// The teams' names as confirmation, e.g. "AJoy - Zed"
         #[arg(long, value_name = "HOME - AWAY")]
         confirm: Option<String>,
     },
-    /// Play a game again that is void, or that we broke: the same submissions on the same seed
+    /// Repeat a game that is void or failed by a platform fault: same submissions, same seed
     Rerun {
         /// The game's id
         game: GameId,
     },
-    /// List each time that a slot began a game, whatever came of it
+    /// List all attempts to run a game, with their outcomes
     Attempts {
         /// The game's id
         game: GameId,
     },
-    /// Call off a game that does not count and is not over
+    /// Cancel an unfinished friendly or test game
     CallOff {
         /// The game's id
         game: GameId,
@@ -166,34 +169,34 @@ pub(super) async fn act(
     let shown = match action {
         TournamentAction::List => {
             let tournaments = client.tournaments().await?;
-            return print(json, &tournaments, || text::list(&tournaments));
+            return print(json, &tournaments, || text::tournament_list(&tournaments));
         }
         TournamentAction::Test { tournament, teams } => {
-            let id = find(client, &tournament).await?;
-            let ordered = client.order_test_games(id, teams).await?;
-            return print(json, &ordered, || games::ordered(&ordered));
+            let id = find_tournament(client, &tournament).await?;
+            let requested = client.request_test_games(id, teams).await?;
+            return print(json, &requested, || games::requested_text(&requested));
         }
         TournamentAction::FreeGames { tournament } => {
-            let id = find_or_newest(client, tournament.as_deref()).await?;
-            let free = client.free_games(id).await?;
-            return print(json, &free, || games::table(&free));
+            let id = find_tournament_or_newest(client, tournament.as_deref()).await?;
+            let games = client.uncounted_games(id).await?;
+            return print(json, &games, || games::games_table(&games));
         }
         TournamentAction::Replay {
             tournament,
             times,
             cancel: _,
         } => {
-            let id = find(client, &tournament).await?;
+            let id = find_tournament(client, &tournament).await?;
             let certainty = match times {
-                Some(times) => client.order_replays(id, times).await?,
+                Some(times) => client.request_replays(id, times).await?,
                 None => client.cancel_replays(id).await?,
             };
-            return print(json, &certainty, || text::certainty(&certainty));
+            return print(json, &certainty, || text::champion_shares_text(&certainty));
         }
         TournamentAction::StartRound { tournament } => {
-            let id = find(client, &tournament).await?;
+            let id = find_tournament(client, &tournament).await?;
             let started = client.start_round(id).await?;
-            return print(json, &started, || text::round(&started));
+            return print(json, &started, || text::round_text(&started));
         }
         TournamentAction::Void {
             game,
@@ -202,35 +205,35 @@ pub(super) async fn act(
         } => {
             let decision = Decision { reason, confirm };
             let voided = client.void_game(game, &decision).await?;
-            return print(json, &voided, || games::whole(&voided));
+            return print(json, &voided, || games::game_text(&voided));
         }
         TournamentAction::Rerun { game } => {
             let queued = client.rerun_game(game).await?;
-            return print(json, &queued, || games::whole(&queued));
+            return print(json, &queued, || games::game_text(&queued));
         }
         TournamentAction::Attempts { game } => {
             let attempts = client.attempts(game).await?;
-            return print(json, &attempts, || games::attempts(&attempts));
+            return print(json, &attempts, || games::attempts_text(&attempts));
         }
         TournamentAction::CallOff { game } => {
             let cancelled = client.cancel_game(game).await?;
-            return print(json, &cancelled, || games::whole(&cancelled));
+            return print(json, &cancelled, || games::game_text(&cancelled));
         }
         TournamentAction::Show { tournament } => {
-            let id = find_or_newest(client, tournament.as_deref()).await?;
+            let id = find_tournament_or_newest(client, tournament.as_deref()).await?;
             client.tournament(id).await?
         }
         TournamentAction::Open {
             name,
             stage,
             teams,
-            wanted,
+            options,
         } => {
             let new = NewTournament {
                 name,
                 stage,
-                rules: wanted.rules()?,
-                settings: wanted.settings(),
+                rules: options.rules()?,
+                settings: options.settings(),
                 teams,
             };
             client.open_tournament(&new).await?
@@ -240,12 +243,12 @@ pub(super) async fn act(
             rename,
             baseline,
             no_baseline,
-            wanted,
+            options,
         } => {
             let change = TournamentChange {
                 name: rename,
-                rules: wanted.rules()?,
-                settings: wanted.settings(),
+                rules: options.rules()?,
+                settings: options.settings(),
                 baseline: if no_baseline {
                     Some(None)
                 } else {
@@ -258,14 +261,14 @@ pub(super) async fn act(
                 && change.baseline.is_none()
             {
                 bail!(
-                    "nothing is to be changed: faceoff admin tournament change --help names what can be"
+                    "nothing to change: faceoff admin tournament change --help lists the options"
                 );
             }
-            let id = find(client, &tournament).await?;
+            let id = find_tournament(client, &tournament).await?;
             client.change_tournament(id, &change).await?
         }
         TournamentAction::Enter { tournament, teams } => {
-            let id = find(client, &tournament).await?;
+            let id = find_tournament(client, &tournament).await?;
             client.enter_teams(id, teams).await?
         }
         TournamentAction::Leave {
@@ -279,32 +282,32 @@ pub(super) async fn act(
             let departure = NewDeparture {
                 team,
                 r#as: if disqualified {
-                    LeftAs::Disqualified
+                    DepartureKind::Disqualified
                 } else {
-                    LeftAs::Withdrawn
+                    DepartureKind::Withdrawn
                 },
                 from_round,
                 reason,
                 confirm,
             };
-            let id = find(client, &tournament).await?;
+            let id = find_tournament(client, &tournament).await?;
             client.depart(id, &departure).await?
         }
         TournamentAction::Pause { tournament, reason } => {
-            let id = find(client, &tournament).await?;
+            let id = find_tournament(client, &tournament).await?;
             client.pause_tournament(id, reason).await?
         }
         TournamentAction::Resume { tournament } => {
-            let id = find(client, &tournament).await?;
+            let id = find_tournament(client, &tournament).await?;
             client.resume_tournament(id).await?
         }
         TournamentAction::Close {
             tournament,
             confirm,
         } => {
-            let id = find(client, &tournament).await?;
+            let id = find_tournament(client, &tournament).await?;
             client.close_tournament(id, confirm).await?
         }
     };
-    print(json, &shown, || text::whole(&shown))
+    print(json, &shown, || text::tournament_text(&shown))
 }

@@ -1,6 +1,6 @@
-//! Files as a backup holds them: for their owner alone, hashed on the way, on disk before they count.
+//! Files of a backup: readable by their owner only, hashed while they are copied, and synced to disk.
 
-use super::super::staging;
+use super::super::atomic_folder;
 use anyhow::Context;
 use std::{
     collections::BTreeMap,
@@ -10,12 +10,11 @@ use std::{
     path::Path,
 };
 
-/// In memory at a time.
+/// Size of the copy buffer.
 const PIECE_BYTES: usize = 1 << 20;
 
-/// A file that was copied.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Copied {
+pub struct CopiedFile {
     pub bytes: u64,
     /// BLAKE3, 64 hexadecimal digits.
     pub blake3: String,
@@ -24,13 +23,13 @@ pub struct Copied {
 /// Copies a file to a new one.
 ///
 /// # Errors
-/// If it cannot be read, or the copy is there or cannot be written.
-pub fn copy_whole(from: &Path, to: &Path) -> anyhow::Result<Copied> {
+/// If the source cannot be read, or the target exists or cannot be written.
+pub fn copy_file(from: &Path, to: &Path) -> anyhow::Result<CopiedFile> {
     let source = File::open(from).with_context(|| format!("reading {}", from.display()))?;
-    copy_opened(source, from, to)
+    copy_open_file(source, from, to)
 }
 
-fn copy_opened(mut source: File, from: &Path, to: &Path) -> anyhow::Result<Copied> {
+fn copy_open_file(mut source: File, from: &Path, to: &Path) -> anyhow::Result<CopiedFile> {
     let writing = || format!("writing {}", to.display());
     let mut copy = new_file(to)?;
     let mut hash = blake3::Hasher::new();
@@ -50,7 +49,7 @@ fn copy_opened(mut source: File, from: &Path, to: &Path) -> anyhow::Result<Copie
         bytes += read as u64;
     }
     copy.sync_all().with_context(writing)?;
-    Ok(Copied {
+    Ok(CopiedFile {
         bytes,
         blake3: hash.finalize().to_string(),
     })
@@ -68,7 +67,7 @@ fn new_file(path: &Path) -> anyhow::Result<File> {
 /// Writes a new file.
 ///
 /// # Errors
-/// If it is there, or the disk refuses.
+/// If the file exists or cannot be written.
 pub fn write(path: &Path, text: &[u8]) -> anyhow::Result<()> {
     let mut file = new_file(path)?;
     file.write_all(text)
@@ -76,27 +75,27 @@ pub fn write(path: &Path, text: &[u8]) -> anyhow::Result<()> {
         .with_context(|| format!("writing {}", path.display()))
 }
 
-/// Makes a file that somebody else has written as the others are, and hashes it.
+/// Restricts a file to its owner, syncs it to disk and hashes it.
 ///
 /// # Errors
-/// If it cannot be read or changed.
-pub fn settle(path: &Path) -> anyhow::Result<Copied> {
+/// If the file cannot be read or changed.
+pub fn make_private(path: &Path) -> anyhow::Result<CopiedFile> {
     fs::set_permissions(path, Permissions::from_mode(0o600))
         .and_then(|()| File::open(path)?.sync_all())
         .with_context(|| format!("writing {}", path.display()))?;
-    hashed(path)
+    hash_file(path)
 }
 
-/// A file's length and hash.
+/// Length and hash of a file.
 ///
 /// # Errors
-/// If it cannot be read.
-pub fn hashed(path: &Path) -> anyhow::Result<Copied> {
-    let hash = || -> std::io::Result<Copied> {
+/// If the file cannot be read.
+pub fn hash_file(path: &Path) -> anyhow::Result<CopiedFile> {
+    let hash = || -> std::io::Result<CopiedFile> {
         let file = File::open(path)?;
         let mut hash = blake3::Hasher::new();
         hash.update_reader(&file)?;
-        Ok(Copied {
+        Ok(CopiedFile {
             bytes: file.metadata()?.len(),
             blake3: hash.finalize().to_string(),
         })
@@ -104,8 +103,8 @@ pub fn hashed(path: &Path) -> anyhow::Result<Copied> {
     hash().with_context(|| format!("reading {}", path.display()))
 }
 
-/// Copies all files of a folder and of those in it, and notes them under `name/…`. What goes meanwhile is left out: the
-/// database's copy, which is older, says whether it is missed. So is what is half written.
+/// Copies a folder recursively and records its files as `name/…` in `copied`. Files that are deleted meanwhile or
+/// only half written are left out; the older copy of the database decides whether they are missing.
 ///
 /// # Errors
 /// If something cannot be read or written.
@@ -113,9 +112,9 @@ pub fn copy_tree(
     from: &Path,
     to: &Path,
     name: &str,
-    copied: &mut BTreeMap<String, Copied>,
+    copied: &mut BTreeMap<String, CopiedFile>,
 ) -> anyhow::Result<()> {
-    staging::private(to)?;
+    atomic_folder::create_private(to)?;
     let reading = || format!("reading {}", from.display());
     let entries = match fs::read_dir(from) {
         Err(error) if error.kind() == ErrorKind::NotFound => return Ok(()),
@@ -123,12 +122,12 @@ pub fn copy_tree(
     };
     for entry in entries {
         let entry = entry.with_context(reading)?;
-        let own = entry.file_name();
-        let (source, copy) = (from.join(&own), to.join(&own));
-        let Some(own) = own.to_str().filter(|own| !is_half_written(own)) else {
+        let file_name = entry.file_name();
+        let (source, copy) = (from.join(&file_name), to.join(&file_name));
+        let Some(file_name) = file_name.to_str().filter(|file_name| !is_half_written(file_name)) else {
             continue;
         };
-        let path = format!("{name}/{own}");
+        let path = format!("{name}/{file_name}");
         let kind = entry
             .file_type()
             .with_context(|| format!("reading {}", source.display()))?;
@@ -139,15 +138,15 @@ pub fn copy_tree(
                 Err(error) if error.kind() == ErrorKind::NotFound => {}
                 file => {
                     let file = file.with_context(|| format!("reading {}", source.display()))?;
-                    copied.insert(path, copy_opened(file, &source, &copy)?);
+                    copied.insert(path, copy_open_file(file, &source, &copy)?);
                 }
             }
         }
     }
-    staging::sync(to)
+    atomic_folder::sync(to)
 }
 
-/// The store writes an artifact beside its place first, with a number after its name.
+/// The store first writes an artifact to a temporary file with `#` and a number after its name.
 fn is_half_written(name: &str) -> bool {
     name.rsplit_once('#')
         .is_some_and(|(_, number)| !number.is_empty() && number.bytes().all(|b| b.is_ascii_digit()))
@@ -158,21 +157,21 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_half_written_is_known_by_its_name() {
+    fn half_written_file_is_recognised_by_its_name() {
         assert!(is_half_written("bundle.tar.gz#3"));
         assert!(!is_half_written("bundle.tar.gz"));
         assert!(!is_half_written("a#b"));
     }
 
     #[test]
-    fn a_copy_is_private_and_never_takes_the_place_of_a_file() {
+    fn copy_is_private_and_never_overwrites_a_file() {
         let folder = tempfile::tempdir().unwrap();
         let (from, to) = (folder.path().join("from"), folder.path().join("to"));
         fs::write(&from, "text").unwrap();
-        let copied = copy_whole(&from, &to).unwrap();
+        let copied = copy_file(&from, &to).unwrap();
         assert_eq!(copied.blake3, blake3::hash(b"text").to_string());
-        assert_eq!(copied, settle(&to).unwrap());
+        assert_eq!(copied, make_private(&to).unwrap());
         assert_eq!(to.metadata().unwrap().permissions().mode() & 0o777, 0o600);
-        assert!(copy_whole(&from, &to).is_err());
+        assert!(copy_file(&from, &to).is_err());
     }
 }

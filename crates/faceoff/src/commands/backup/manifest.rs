@@ -1,4 +1,4 @@
-//! What a backup says of itself.
+//! Manifest of a backup.
 
 use anyhow::{Context, ensure};
 use jiff::Timestamp;
@@ -9,28 +9,28 @@ use std::{
     path::{Component, Path},
 };
 
-/// The manifest's name in the backup's folder.
+/// File name of the manifest in a backup.
 pub const MANIFEST: &str = "backup.json";
-/// The database's, there and in a data folder.
+/// File name of the database, in a backup and in a data folder.
 pub const DATABASE: &str = "faceoff.sqlite3";
-/// The artifacts' folder, in both.
+/// Name of the artifact folder, in both.
 pub const ARTIFACTS: &str = "artifacts";
-/// Of the manifest; a later one may mean other things.
+/// Version of the manifest's format.
 pub const FORMAT: u32 = 1;
 
-/// The list of what is in a backup.
+/// Origin and files of a backup.
 #[derive(Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Manifest {
     pub format: u32,
-    /// Version that made it.
+    /// Version of Faceoff that made the backup.
     pub program: String,
     /// Newest migration of the database.
     pub schema: i64,
     pub season: String,
-    /// When it was begun.
+    /// Start time of the backup.
     pub made_at: Timestamp,
-    /// What the database names and the data folder did not have.
+    /// Files that the database refers to and that the data folder lacked.
     #[serde(default)]
     pub missing: Vec<Missing>,
     pub files: Vec<Part>,
@@ -40,29 +40,29 @@ pub struct Manifest {
 #[derive(Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Part {
-    /// From the backup's folder.
+    /// Relative to the backup's folder.
     pub path: String,
     pub bytes: u64,
     /// BLAKE3, 64 hexadecimal digits.
     pub blake3: String,
 }
 
-/// What the database names and the data folder did not have as it was stored.
+/// A file that the database refers to and that the data folder lacked.
 #[derive(Debug, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Missing {
-    /// It was not there.
+    /// The file did not exist.
     Gone {
-        /// From the data folder.
+        /// Relative to the data folder.
         path: String,
     },
-    /// It was another file.
+    /// The file had another hash.
     Changed {
-        /// From the data folder.
+        /// Relative to the data folder.
         path: String,
-        /// BLAKE3 by the database.
+        /// BLAKE3 according to the database.
         expected: String,
-        /// BLAKE3 of what was there.
+        /// BLAKE3 of the file in the data folder.
         found: String,
     },
 }
@@ -77,15 +77,15 @@ impl fmt::Display for Missing {
                 found,
             } => write!(
                 f,
-                "damaged: {path} has BLAKE3 {found}, where {expected} was stored"
+                "damaged: {path} has BLAKE3 {found}, expected {expected}"
             ),
         }
     }
 }
 
 impl Manifest {
-    /// In short, of what lies in `folder`: as `--json` prints it.
-    pub fn told(&self, folder: &Path) -> Value {
+    /// Summary of the backup in `folder`, as `--json` prints it.
+    pub fn summary(&self, folder: &Path) -> Value {
         json!({
             "folder": folder,
             "season": self.season,
@@ -98,28 +98,28 @@ impl Manifest {
         })
     }
 
-    /// Reads one, and makes sure that its paths stay where they belong.
+    /// Parses a manifest and checks that its paths do not leave the backup's folder.
     ///
     /// # Errors
-    /// If it is none, or of a later version.
+    /// If it is no manifest, or one of a later version.
     pub fn parse(text: &[u8]) -> anyhow::Result<Self> {
         #[derive(Deserialize)]
         struct Head {
             format: u32,
         }
-        let head: Head = serde_json::from_slice(text).context("no manifest of a backup")?;
+        let head: Head = serde_json::from_slice(text).context("not a manifest of a backup")?;
         ensure!(
             head.format == FORMAT,
-            "expected a manifest of format {FORMAT}, got {}: a later version of Faceoff made the backup; use that",
+            "expected a manifest of format {FORMAT}, got {}: the backup was made by a later version of Faceoff; use that version",
             head.format
         );
-        let manifest: Self = serde_json::from_slice(text).context("no manifest of a backup")?;
+        let manifest: Self = serde_json::from_slice(text).context("not a manifest of a backup")?;
         for file in &manifest.files {
             let mut parts = Path::new(&file.path).components();
-            let stays =
+            let is_inside =
                 !file.path.is_empty() && parts.all(|part| matches!(part, Component::Normal(_)));
             ensure!(
-                stays,
+                is_inside,
                 "expected paths below the backup's folder, got {:?}",
                 file.path
             );
@@ -151,7 +151,7 @@ mod tests {
     }
 
     #[test]
-    fn a_manifest_is_read_and_names_nothing_elsewhere() {
+    fn manifest_with_a_path_outside_the_folder_is_refused() {
         let read = |format, path| Manifest::parse(manifest(format, path).as_bytes());
         assert_eq!(read(1, "artifacts/a").unwrap().total_bytes(), 3);
         for path in ["../a", "/a", "", "artifacts/../../a", "./a"] {

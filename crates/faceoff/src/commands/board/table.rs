@@ -1,4 +1,4 @@
-//! The board as text, in tiers, with the columns of the paper's qualifying table.
+//! Text of a board: rows by tier, with the columns of the paper's qualifying table.
 
 use faceoff_api::views::board::{BoardRow, BoardView};
 use faceoff_types::{Task, Tier};
@@ -7,8 +7,8 @@ use std::fmt::Write as _;
 /// Width of the table in characters.
 const WIDTH: usize = 78;
 
-/// The board as a table, with whose it is, and what is special about it.
-pub(super) fn whole(board: &BoardView) -> String {
+/// The board with its title, notices, baselines and disqualified teams.
+pub(super) fn board_text(board: &BoardView) -> String {
     let mut text = format!("{}, {}", board.stage_name, board.ruleset);
     if let Some(task) = board.task {
         let _ = write!(text, ", {task}");
@@ -21,21 +21,21 @@ pub(super) fn whole(board: &BoardView) -> String {
     }
     if let Some(frozen) = &board.frozen {
         let at = frozen.at.strftime("%Y-%m-%d %H:%M UTC");
-        let _ = write!(text, "\nas it was at {at}: {}", frozen.reason);
+        let _ = write!(text, "\nfrozen since {at}: {}", frozen.reason);
     }
     text.push('\n');
     match (board.rows.is_empty(), board.blind) {
         (true, true) => text
-            .push_str("\nthe stage is blind: its results come out when the organisers open it\n"),
+            .push_str("\nthe stage is blind: results are hidden until the organisers reveal them\n"),
         (true, false) => text.push_str("\nno results yet\n"),
         (false, _) => {
-            let _ = write!(text, "\n{}", render(board));
+            let _ = write!(text, "\n{}", board_table(board));
         }
     }
     for row in &board.baselines {
         let _ = writeln!(
             text,
-            "baseline: {}, {}, score {:.1}, {:.2} penalty points: it would be number {}",
+            "baseline: {}, {}, score {:.1}, {:.2} penalty points, would be rank {}",
             row.team, row.tier, row.score, row.penalty_points, row.would_rank
         );
     }
@@ -49,8 +49,8 @@ pub(super) fn whole(board: &BoardView) -> String {
     text.trim_end().to_owned()
 }
 
-/// The rows as a table; a tier without teams is left out.
-pub fn render(board: &BoardView) -> String {
+/// The ranked rows; tiers without teams are left out.
+pub fn board_table(board: &BoardView) -> String {
     let mut text = String::new();
     // Writing to a String cannot fail.
     let _ = writeln!(
@@ -65,13 +65,13 @@ pub fn render(board: &BoardView) -> String {
         }
         let _ = writeln!(text, "{:─<WIDTH$}", format!("── {} ", tier.title()));
         for row in rows {
-            let _ = writeln!(text, "{}", line(row));
+            let _ = writeln!(text, "{}", row_line(row));
         }
     }
     text
 }
 
-fn line(row: &BoardRow) -> String {
+fn row_line(row: &BoardRow) -> String {
     let rate = |task| match row.tasks.get(&task) {
         Some(result) => format!("{:.1}%", 100.0 * result.success_rate),
         None => "–".to_owned(),

@@ -1,9 +1,9 @@
-use faceoff_scoring::{Comparison, WhoSolved};
+use faceoff_scoring::{Comparison, SolvedEpisodes};
 use faceoff_types::Task;
 use std::{collections::BTreeMap, fmt::Write as _};
 
-/// The comparison as a table for a terminal.
-pub(super) fn of(comparison: &Comparison) -> String {
+/// The comparison as text.
+pub(super) fn comparison_table(comparison: &Comparison) -> String {
     let mut out = String::new();
     write(&mut out, comparison).expect("writing to memory cannot fail");
     out
@@ -15,36 +15,36 @@ fn write(out: &mut String, comparison: &Comparison) -> std::fmt::Result {
         "\n{:<8} {:>6} {:>6} {:>6} {:>7} {:>8} {:>8} {:>8} {:>18} {:>9}  verdict",
         "task", "both", "only A", "only B", "neither", "A", "B", "A - B", "95 % interval", "p"
     )?;
-    for (task, of) in &comparison.tasks {
-        let [low, high] = of.difference_ci95.map(|bound| 100.0 * bound);
+    for (task, paired) in &comparison.tasks {
+        let [low, high] = paired.difference_ci95.map(|bound| 100.0 * bound);
         writeln!(
             out,
             "{task:<8} {:>6} {:>6} {:>6} {:>7} {:>6.1} % {:>6.1} % {:>+8.1} {:>18} {:>9}  {}",
-            of.both,
-            of.only_a,
-            of.only_b,
-            of.neither,
-            100.0 * of.success_rate_a,
-            100.0 * of.success_rate_b,
-            100.0 * of.difference,
+            paired.both,
+            paired.only_a,
+            paired.only_b,
+            paired.neither,
+            100.0 * paired.success_rate_a,
+            100.0 * paired.success_rate_b,
+            100.0 * paired.difference,
             format!("{low:+.1} to {high:+.1}"),
-            p_value(of.p_value),
-            verdict(of.told_apart, of.difference),
+            p_value(paired.p_value),
+            verdict(paired.significant, paired.difference),
         )?;
     }
-    let of = &comparison.overall;
-    let [low, high] = of.difference_ci95;
+    let overall = &comparison.overall;
+    let [low, high] = overall.difference_ci95;
     writeln!(
         out,
         "{:<8} {:>28} {:>6.1} % {:>6.1} % {:>+8.1} {:>18} {:>9}  {}",
         "score",
         "",
-        of.score_a,
-        of.score_b,
-        of.difference,
+        overall.score_a,
+        overall.score_b,
+        overall.difference,
         format!("{low:+.1} to {high:+.1}"),
-        p_value(of.p_value),
-        verdict(of.told_apart, of.difference),
+        p_value(overall.p_value),
+        verdict(overall.significant, overall.difference),
     )?;
     writeln!(
         out,
@@ -53,24 +53,24 @@ fn write(out: &mut String, comparison: &Comparison) -> std::fmt::Result {
     )
 }
 
-/// The episodes by who solved them.
-pub(super) fn by_whom(episodes: &BTreeMap<Task, WhoSolved>) -> String {
+/// The episodes that only A, only B, both or neither solved.
+pub(super) fn episode_lists(episodes: &BTreeMap<Task, SolvedEpisodes>) -> String {
     let mut out = String::new();
-    for (task, of) in episodes {
-        for (whom, list) in [
-            ("only A", &of.only_a),
-            ("only B", &of.only_b),
-            ("both", &of.both),
-            ("neither", &of.neither),
+    for (task, solved) in episodes {
+        for (label, list) in [
+            ("only A", &solved.only_a),
+            ("only B", &solved.only_b),
+            ("both", &solved.both),
+            ("neither", &solved.neither),
         ] {
             let list = ranges(list);
-            writeln!(out, "{task:<8} {whom:<8} {list}").expect("writing to memory cannot fail");
+            writeln!(out, "{task:<8} {label:<8} {list}").expect("writing to memory cannot fail");
         }
     }
     format!("\nepisodes\n{out}")
 }
 
-/// 1-3 5 7-8, or a dash.
+/// Numbers as ranges, e.g. `1-3 5 7-8`, or a dash.
 fn ranges(numbers: &[u32]) -> String {
     if numbers.is_empty() {
         return "–".to_owned();
@@ -92,9 +92,9 @@ fn p_value(p: f64) -> String {
     }
 }
 
-fn verdict(told_apart: bool, difference: f64) -> &'static str {
-    match (told_apart, difference > 0.0) {
-        (false, _) => "not told apart",
+fn verdict(is_significant: bool, difference: f64) -> &'static str {
+    match (is_significant, difference > 0.0) {
+        (false, _) => "statistically tied",
         (true, true) => "A is ahead",
         (true, false) => "B is ahead",
     }
@@ -105,7 +105,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn episodes_that_follow_each_other_are_a_range() {
+    fn consecutive_episodes_are_a_range() {
         assert_eq!(ranges(&[]), "–");
         assert_eq!(ranges(&[4]), "4");
         assert_eq!(ranges(&[0, 1, 2, 5, 7, 8]), "0-2 5 7-8");

@@ -2,7 +2,7 @@ use crate::{
     client::Client,
     commands::{
         block_on,
-        output::{download_bar, downloaded, print},
+        output::{download_bar, download_text, print},
         server::ServerArgs,
     },
 };
@@ -12,13 +12,13 @@ use faceoff_api::views::evaluation::EvaluationStatus;
 use faceoff_types::EvaluationId;
 use std::path::{Path, PathBuf};
 
-/// Downloads the dataset of an evaluation and holds it against its published hash. What has come of a download that broke
-/// off is in FILE.part, and the same command goes on from there, if it is the same dataset still.
+/// Downloads the dataset of an evaluation and compares it with its published hash. An interrupted download leaves
+/// FILE.part; the same command resumes it, unless the dataset has changed.
 #[derive(Debug, Args)]
 pub(super) struct DownloadArgs {
     /// The evaluation's id
     evaluation: EvaluationId,
-    /// Where to; a file that exists is replaced [default: EVALUATION.zip in the working folder]
+    /// The file to write; an existing file is replaced [default: EVALUATION.zip in the working folder]
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
     #[command(flatten)]
@@ -31,8 +31,8 @@ impl DownloadArgs {
     }
 
     async fn download(self) -> anyhow::Result<()> {
-        // What is public is everybody's.
-        let client = self.server.anybody()?;
+        // Public datasets need no token.
+        let client = self.server.client_or_visitor()?;
         let file = self
             .out
             .unwrap_or_else(|| PathBuf::from(format!("{}.zip", self.evaluation)));
@@ -40,7 +40,7 @@ impl DownloadArgs {
     }
 }
 
-/// Downloads it, as whoever the client is.
+/// Downloads the dataset of an evaluation with the client's token.
 pub(in crate::commands) async fn download(
     client: &Client,
     json: bool,
@@ -49,12 +49,12 @@ pub(in crate::commands) async fn download(
 ) -> anyhow::Result<()> {
     let evaluation = client.evaluation(id).await?;
     let EvaluationStatus::Finished { dataset_blake3, .. } = evaluation.status else {
-        bail!("it has no dataset: {}", evaluation.next);
+        bail!("the evaluation has no dataset: {}", evaluation.next);
     };
     let bar = download_bar()?;
     let done = client
         .download_dataset(id, file, dataset_blake3.as_deref(), &bar)
         .await?;
     bar.finish_and_clear();
-    print(json, &done, || downloaded(&done))
+    print(json, &done, || download_text(&done))
 }

@@ -3,10 +3,10 @@ use clap::Args;
 use faceoff_dataset::Dataset;
 use std::{io::Write, path::PathBuf};
 
-/// Prints a row per episode.
+/// Lists the episodes of a dataset.
 #[derive(Debug, Args)]
 pub struct ListArgs {
-    /// dataset.zip, the folder it was unpacked to, or the folder that `faceoff eval` wrote
+    /// dataset.zip, the folder it was unpacked to, or the folder of `faceoff eval --out`
     dataset: PathBuf,
     /// Print one JSON object per line
     #[arg(long)]

@@ -1,7 +1,7 @@
 use clap::Args;
 use std::ffi::OsString;
 
-/// What `faceoff dataset export` was given, which is Python's now.
+/// Arguments of `faceoff dataset export`, which has moved to the Python package.
 #[derive(Debug, Args)]
 pub struct MovedArgs {
     /// Ignored
@@ -13,7 +13,7 @@ impl MovedArgs {
     pub fn run(self) -> anyhow::Result<()> {
         let Self { arguments: _ } = self;
         anyhow::bail!(
-            "other layouts are written by the Python package: pip install 'faceoff[dataset]', then \
+            "the Python package exports other layouts: pip install 'faceoff[dataset]', then \
              python -m faceoff.dataset export DATASET --layout 2023 --out DIR (or minari, lerobot)"
         )
     }

@@ -18,10 +18,10 @@ use std::{
     str::FromStr,
 };
 
-/// Writes the control steps of one episode.
+/// Prints the control steps of an episode.
 #[derive(Debug, Args)]
 pub struct SliceArgs {
-    /// dataset.zip, the folder it was unpacked to, or the folder that `faceoff eval` wrote
+    /// dataset.zip, the folder it was unpacked to, or the folder of `faceoff eval --out`
     dataset: PathBuf,
     /// The task
     #[arg(long)]
@@ -29,29 +29,29 @@ pub struct SliceArgs {
     /// The episode, from 0
     #[arg(long, value_name = "N")]
     episode: u32,
-    /// Only these control steps: A and those before B
+    /// Only these control steps, from A to before B
     #[arg(long, value_name = "A..B")]
     steps: Option<Steps>,
     /// Only these columns, in this order [default: all]
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]
     columns: Option<Vec<String>>,
-    /// How rows are written
+    /// Output format
     #[arg(long, value_enum, default_value_t = Format::Csv)]
     format: Format,
-    /// A file instead of standard output
+    /// Write to a file instead of standard output
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Format {
-    /// A header and a line per step; an action is a JSON array, an absent value is empty
+    /// A header and a line per step; an action is a JSON array, a missing value is empty
     Csv,
     /// A JSON object per line
     Jsonl,
 }
 
-/// A range of steps, `A..B`, either end may be left out.
+/// A range of steps, `A..B`; either end may be left out.
 #[derive(Debug, Clone, PartialEq, Eq)]
 struct Steps(Range<u32>);
 
@@ -71,11 +71,11 @@ impl FromStr for Steps {
 impl SliceArgs {
     pub fn run(self) -> anyhow::Result<()> {
         let dataset = Dataset::open_unread(&self.dataset)?;
-        let wanted = self.columns.as_ref().map(|names| {
+        let columns = self.columns.as_ref().map(|names| {
             let step = "step".to_owned();
             names.iter().cloned().chain([step]).collect::<Vec<_>>()
         });
-        let rows = dataset.episode(self.task, self.episode, wanted.as_deref())?;
+        let rows = dataset.episode(self.task, self.episode, columns.as_deref())?;
         let names = self.columns.unwrap_or_else(|| {
             let schema = rows.schema();
             schema
@@ -138,7 +138,7 @@ fn write_row(
     Ok(())
 }
 
-/// A cell; numbers are written with the fewest digits that give the same bits again.
+/// A cell. Numbers have the fewest digits that round-trip to the same bits.
 fn json(column: &dyn Array, row: usize) -> Value {
     if column.is_null(row) {
         return Value::Null;

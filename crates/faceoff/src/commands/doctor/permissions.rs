@@ -1,6 +1,6 @@
-//! Who may read and write what the server keeps.
+//! Checks that only the server's user can access the data folder.
 
-use super::{super::serve::ADMIN_TOKEN_FILE, checked::Checked};
+use super::{super::serve::ADMIN_TOKEN_FILE, check::Check};
 use std::{
     fs::{self, Metadata},
     io::ErrorKind,
@@ -8,13 +8,13 @@ use std::{
     path::Path,
 };
 
-/// Nobody but the owner.
+/// Permission bits of the group and of other users.
 const OTHERS: u32 = 0o077;
 
-/// The data folder and the secrets in it, as they would be for the user that asks.
-pub fn permissions(data_dir: &Path) -> Checked {
+/// Checks owner and mode of the data folder and its secrets, for a server that runs as the current user.
+pub fn permissions(data_dir: &Path) -> Check {
     let own = rustix::process::geteuid().as_raw();
-    let mut wrong = Vec::new();
+    let mut problems = Vec::new();
     for name in ["", ADMIN_TOKEN_FILE, "faceoff.sqlite3"] {
         let path = if name.is_empty() {
             data_dir.to_owned()
@@ -22,54 +22,54 @@ pub fn permissions(data_dir: &Path) -> Checked {
             data_dir.join(name)
         };
         match fs::metadata(&path) {
-            Ok(found) => wrong.extend(judged(&path, &found, own)),
+            Ok(found) => problems.extend(find_problem(&path, &found, own)),
             Err(error) if error.kind() == ErrorKind::NotFound => {}
-            Err(error) => wrong.push((
+            Err(error) => problems.push((
                 format!("{}: {error}", path.display()),
-                "run this as the user that serves".to_owned(),
+                "run faceoff doctor as the server's user".to_owned(),
             )),
         }
     }
-    if wrong.is_empty() {
+    if problems.is_empty() {
         let found = match data_dir.exists() {
-            true => format!("{} is its owner's alone", data_dir.display()),
+            true => format!("{} is accessible to its owner only", data_dir.display()),
             false => format!(
-                "{} is not there yet; it will be its owner's alone",
+                "{} does not exist yet; it will be accessible to its owner only",
                 data_dir.display()
             ),
         };
-        return Checked {
+        return Check {
             name: "permissions",
             found,
             cure: None,
         };
     }
-    let (found, cures): (Vec<_>, Vec<_>) = wrong.into_iter().unzip();
-    Checked {
+    let (found, cures): (Vec<_>, Vec<_>) = problems.into_iter().unzip();
+    Check {
         name: "permissions",
         found: found.join("; "),
         cure: Some(cures.join("; ")),
     }
 }
 
-/// What is wrong with a file or folder, and the cure.
-fn judged(path: &Path, found: &Metadata, own: u32) -> Option<(String, String)> {
+/// The problem of a file or folder, and its cure.
+fn find_problem(path: &Path, metadata: &Metadata, own: u32) -> Option<(String, String)> {
     let shown = path.display();
-    if own != 0 && found.uid() != own {
+    if own != 0 && metadata.uid() != own {
         return Some((
             format!(
                 "{shown} belongs to user {}, this is user {own}",
-                found.uid()
-            ),
-            format!("serve as that user, or chown -R {own} {shown}"),
+                metadata.uid()
+                ),
+                format!("run the server as that user, or chown -R {own} {shown}"),
         ));
     }
-    let mode = found.permissions().mode() & 0o777;
-    // The files lie in the folder, whose own mode keeps others out; the token is worth a second door.
+    let mode = metadata.permissions().mode() & 0o777;
+    // The mode of the folder protects its files; only the token is protected a second time.
     let is_open = mode & OTHERS != 0 && !path.ends_with("faceoff.sqlite3");
     is_open.then(|| {
         (
-            format!("{shown} has mode {mode:04o}: others may look into it"),
+            format!("{shown} has mode {mode:04o}: other users can read it"),
             format!("chmod go= {shown}"),
         )
     })
@@ -81,13 +81,13 @@ mod tests {
     use std::fs::Permissions;
 
     #[test]
-    fn a_folder_or_token_that_others_can_read_is_found() {
+    fn folder_or_token_readable_by_others_is_reported() {
         let folder = tempfile::tempdir().unwrap();
         let data = folder.path().join("data");
         assert_eq!(
             permissions(&data).cure,
             None,
-            "what is not there is no fault"
+            "a missing folder is no problem"
         );
         fs::create_dir(&data).unwrap();
         fs::set_permissions(&data, Permissions::from_mode(0o700)).unwrap();
@@ -106,11 +106,11 @@ mod tests {
     }
 
     #[test]
-    fn what_belongs_to_another_user_is_found() {
+    fn folder_of_another_user_is_reported() {
         let folder = tempfile::tempdir().unwrap();
-        let found = fs::metadata(folder.path()).unwrap();
-        let (words, cure) = judged(folder.path(), &found, found.uid() + 1).unwrap();
-        assert!(words.contains("belongs to user"), "{words}");
+        let metadata = fs::metadata(folder.path()).unwrap();
+        let (found, cure) = find_problem(folder.path(), &metadata, metadata.uid() + 1).unwrap();
+        assert!(found.contains("belongs to user"), "{found}");
         assert!(cure.contains("chown"), "{cure}");
     }
 }

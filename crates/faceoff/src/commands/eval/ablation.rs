@@ -2,7 +2,7 @@
 
 use super::{
     files::{ABLATION, write_json},
-    profile_run::{EvalSetup, play},
+    profile_run::{EvalSetup, run_profile},
 };
 use crate::commands::output::print;
 use anyhow::Context;
@@ -20,20 +20,20 @@ struct AblationFile {
     tasks: BTreeMap<Task, Vec<ProfileEffect>>,
 }
 
-/// Plays every profile, each into a folder of its name, and compares them; how many faults the agent had.
+/// Runs every profile into a folder of its name and compares them. Returns the number of agent faults.
 pub(super) fn run(setup: &EvalSetup, out: &Path, json: bool) -> anyhow::Result<usize> {
     let mut faults = 0;
     let mut runs = BTreeMap::new();
     for profile in Profile::ABLATION {
-        let played = play(setup, profile, &out.join(profile.as_str()))
+        let outcome = run_profile(setup, profile, &out.join(profile.as_str()))
             .with_context(|| format!("profile {profile}"))?;
-        faults += played.faults.len();
-        let summary = EpisodeSummary::of(&played.outcomes, &setup.variation.tier_bounds);
+        faults += outcome.faults.len();
+        let summary = EpisodeSummary::from_outcomes(&outcome.outcomes, &setup.variation.tier_bounds);
         runs.insert(profile, summary.context("comparing the profiles")?);
     }
     let tasks = faceoff_scoring::ablation(&runs).context("comparing the profiles")?;
     let agent = setup.bundle.manifest.name.clone();
-    let told = table(&agent, setup.seed, &tasks);
+    let text = table(&agent, setup.seed, &tasks);
     let path = out.join(ABLATION);
     let file = AblationFile {
         ruleset: RULESET,
@@ -42,11 +42,11 @@ pub(super) fn run(setup: &EvalSetup, out: &Path, json: bool) -> anyhow::Result<u
         tasks,
     };
     write_json(&path, &file)?;
-    print(json, &file, || format!("{told}\n{}", path.display()))?;
+    print(json, &file, || format!("{text}\n{}", path.display()))?;
     Ok(faults)
 }
 
-/// The comparison as a table for a terminal.
+/// The comparison as text.
 fn table(agent: &str, seed: Seed, tasks: &BTreeMap<Task, Vec<ProfileEffect>>) -> String {
     let mut out = format!("{agent}: ablation ({RULESET}), seed {seed}\n\n");
     let mut line = |args: std::fmt::Arguments<'_>| {
@@ -84,8 +84,8 @@ fn table(agent: &str, seed: Seed, tasks: &BTreeMap<Task, Vec<ProfileEffect>>) ->
         }
     }
     line(format_args!(
-        "\nto ideal: percentage points; lost, gained: episodes that succeed in the ideal profile only, \
-         in this one only; p: McNemar's exact test"
+        "\nto ideal: difference in percentage points; lost, gained: episodes that succeed only in the ideal profile, \
+        only in this one; p: McNemar's exact test"
     ));
     out
 }

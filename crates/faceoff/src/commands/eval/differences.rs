@@ -1,108 +1,108 @@
-//! What an agent finds otherwise on this machine than on a server, in words.
+//! Differences between this machine and a server that an agent may notice.
 
 use faceoff_types::{AgentMachine, PythonInventory, RuntimeContent, RuntimeInventory};
 
-/// More packages than these are counted only.
-const MOST_NAMED: usize = 6;
+/// Further packages are only counted.
+const MAX_NAMED: usize = 6;
 
-/// Of the same runtime here and there, a sentence each.
-pub(super) fn of_runtimes(here: &RuntimeInventory, there: &RuntimeInventory) -> Vec<String> {
-    let name = &there.name;
-    match (&here.content, &there.content) {
-        (RuntimeContent::Python(here), RuntimeContent::Python(there)) => {
-            of_pythons(name, here, there)
+/// Compares a runtime of this machine with the server's; one sentence per difference.
+pub(super) fn compare_runtimes(local: &RuntimeInventory, remote: &RuntimeInventory) -> Vec<String> {
+    let name = &remote.name;
+    match (&local.content, &remote.content) {
+        (RuntimeContent::Python(local), RuntimeContent::Python(remote)) => {
+            compare_pythons(name, local, remote)
         }
-        (RuntimeContent::Native { libc: here }, RuntimeContent::Native { libc: there }) => {
-            of_libraries(here.as_deref(), there.as_deref())
+        (RuntimeContent::Native { libc: local }, RuntimeContent::Native { libc: remote }) => {
+            compare_c_libraries(local.as_deref(), remote.as_deref())
                 .into_iter()
                 .collect()
         }
         (RuntimeContent::Image, RuntimeContent::Image) => Vec::new(),
-        (RuntimeContent::Broken { why }, _) => {
-            vec![format!("{name} does not work on this machine: {why}")]
+        (RuntimeContent::Failed { reason }, _) => {
+            vec![format!("{name} does not work on this machine: {reason}")]
         }
-        (_, RuntimeContent::Broken { .. }) => {
+        (_, RuntimeContent::Failed { .. }) => {
             vec![format!("{name} does not work on the server at the moment")]
         }
         (_, RuntimeContent::Image) => {
             vec![format!(
-                "{name} is a runtime of this machine, and of the server whatever a container image brings"
+                "{name} is a runtime of this machine, but a container image on the server"
             )]
         }
         (_, RuntimeContent::Python(_)) => {
-            vec![format!("{name} has a Python on the server, and none here")]
+            vec![format!("{name} has Python on the server, but not locally")]
         }
         (_, RuntimeContent::Native { .. }) => {
             vec![format!(
-                "{name} has no Python on the server, and has one here"
+                "{name} has Python locally, but not on the server"
             )]
         }
     }
 }
 
-fn of_pythons(name: &str, here: &PythonInventory, there: &PythonInventory) -> Vec<String> {
+fn compare_pythons(name: &str, local: &PythonInventory, remote: &PythonInventory) -> Vec<String> {
     let mut found = Vec::new();
     let interpreter =
         |python: &PythonInventory| format!("{} {}", python.implementation, python.version);
-    if interpreter(here) != interpreter(there) {
-        let weight = if here.minor_version() == there.minor_version() {
+    if interpreter(local) != interpreter(remote) {
+        let effect = if local.minor_version() == remote.minor_version() {
             ""
         } else {
-            ", for which compiled packages are other ones"
+            ", so compiled packages differ"
         };
         found.push(format!(
-            "{name} is {} here and {} there{weight}",
-            interpreter(here),
-            interpreter(there)
+            "{name} is {} locally and {} on the server{effect}",
+            interpreter(local),
+            interpreter(remote)
         ));
     }
-    found.extend(of_libraries(here.libc.as_deref(), there.libc.as_deref()));
-    let only = |one: &PythonInventory, other: &PythonInventory| -> Vec<String> {
-        let lacking = one.packages.iter();
-        lacking
+    found.extend(compare_c_libraries(local.libc.as_deref(), remote.libc.as_deref()));
+    let only_in = |one: &PythonInventory, other: &PythonInventory| -> Vec<String> {
+        let packages = one.packages.iter();
+        packages
             .filter(|(name, _)| !other.packages.contains_key(*name))
             .map(|(name, version)| format!("{name} {version}"))
             .collect()
     };
-    let other_versions = here.packages.iter().filter_map(|(name, version)| {
-        let there = there.packages.get(name).filter(|there| *there != version)?;
-        Some(format!("{name} {version} (there {there})"))
+    let other_versions = local.packages.iter().filter_map(|(name, version)| {
+        let remote = remote.packages.get(name).filter(|remote| *remote != version)?;
+        Some(format!("{name} {version} (server: {remote})"))
     });
-    for (what, packages) in [
+    for (heading, packages) in [
         (
-            "packages of the server that are missing here",
-            only(there, here),
+            "packages missing locally",
+            only_in(remote, local),
         ),
         (
-            "packages of this machine that the server lacks",
-            only(here, there),
+            "packages missing on the server",
+            only_in(local, remote),
         ),
-        ("packages of other versions here", other_versions.collect()),
+        ("packages with other versions locally", other_versions.collect()),
     ] {
         if !packages.is_empty() {
-            found.push(format!("{what}: {}", named(&packages)));
+            found.push(format!("{heading}: {}", package_list(&packages)));
         }
     }
     found
 }
 
-fn of_libraries(here: Option<&str>, there: Option<&str>) -> Option<String> {
-    let (here, there) = (here?, there?);
-    (here != there).then(|| {
+fn compare_c_libraries(local: Option<&str>, remote: Option<&str>) -> Option<String> {
+    let (local, remote) = (local?, remote?);
+    (local != remote).then(|| {
         format!(
-            "the C library is {here} here and {there} there: a program built here may need a newer one than the \
-             server has"
+            "the C library is {local} locally and {remote} on the server: a program built locally may need a newer version \
+            than the server's"
         )
     })
 }
 
-/// Of the machines, a sentence each.
-pub(super) fn of_machines(here: &AgentMachine, there: &AgentMachine) -> Vec<String> {
+/// Compares this machine with the server's; one sentence per difference.
+pub(super) fn compare_machines(local: &AgentMachine, remote: &AgentMachine) -> Vec<String> {
     let mut found = Vec::new();
-    if here.architecture != there.architecture {
+    if local.architecture != remote.architecture {
         found.push(format!(
-            "the machine is {} here and {} there: no compiled program of one runs on the other",
-            here.architecture, there.architecture
+            "the architecture is {} locally and {} on the server: compiled programs do not run on both",
+            local.architecture, remote.architecture
         ));
     }
     let model = |machine: &AgentMachine| {
@@ -111,25 +111,25 @@ pub(super) fn of_machines(here: &AgentMachine, there: &AgentMachine) -> Vec<Stri
             .clone()
             .unwrap_or_else(|| "unknown".into())
     };
-    if here.cpu_model != there.cpu_model {
+    if local.cpu_model != remote.cpu_model {
         found.push(format!(
-            "the CPU is {} here and {} there: computation times are other ones",
-            model(here),
-            model(there)
+            "the CPU is {} locally and {} on the server: computation times differ",
+            model(local),
+            model(remote)
         ));
     }
-    if here.cpus_per_agent != there.cpus_per_agent {
+    if local.cpus_per_agent != remote.cpus_per_agent {
         found.push(format!(
-            "an agent may run on {} CPUs here and {} there",
-            here.cpus_per_agent, there.cpus_per_agent
+            "an agent may use {} CPUs locally and {} on the server",
+            local.cpus_per_agent, remote.cpus_per_agent
         ));
     }
     found
 }
 
-/// The first, and how many more.
-fn named(packages: &[String]) -> String {
-    let (first, rest) = packages.split_at(packages.len().min(MOST_NAMED));
+/// The first packages, and the number of the others.
+fn package_list(packages: &[String]) -> String {
+    let (first, rest) = packages.split_at(packages.len().min(MAX_NAMED));
     match rest.len() {
         0 => first.join(", "),
         more => format!("{} and {more} more", first.join(", ")),
@@ -156,58 +156,58 @@ mod tests {
     }
 
     #[test]
-    fn the_same_is_no_difference() {
+    fn equal_machines_have_no_differences() {
         let one = python("3.11.2", &[("numpy", "2.4.6")]);
-        assert_eq!(of_runtimes(&one, &one), [""; 0]);
+        assert_eq!(compare_runtimes(&one, &one), [""; 0]);
         let machine = AgentMachine::default();
-        assert_eq!(of_machines(&machine, &machine), [""; 0]);
+        assert_eq!(compare_machines(&machine, &machine), [""; 0]);
     }
 
     #[test]
-    fn interpreter_and_packages_are_told_apart() {
-        let here = python("3.12.1", &[("numpy", "2.0"), ("torch", "2.9")]);
-        let there = python("3.11.2", &[("numpy", "2.4.6"), ("scipy", "1.17.1")]);
-        let told = of_runtimes(&here, &there);
+    fn interpreter_and_package_versions_are_compared() {
+        let local = python("3.12.1", &[("numpy", "2.0"), ("torch", "2.9")]);
+        let remote = python("3.11.2", &[("numpy", "2.4.6"), ("scipy", "1.17.1")]);
+        let found = compare_runtimes(&local, &remote);
         assert_eq!(
-            told,
+            found,
             [
-                "python3 is CPython 3.12.1 here and CPython 3.11.2 there, for which compiled packages are other ones",
-                "packages of the server that are missing here: scipy 1.17.1",
-                "packages of this machine that the server lacks: torch 2.9",
-                "packages of other versions here: numpy 2.0 (there 2.4.6)",
+                "python3 is CPython 3.12.1 locally and CPython 3.11.2 on the server, so compiled packages differ",
+                "packages missing locally: scipy 1.17.1",
+                "packages missing on the server: torch 2.9",
+                "packages with other versions locally: numpy 2.0 (server: 2.4.6)",
             ]
         );
-        let patch = of_runtimes(&python("3.11.9", &[]), &python("3.11.2", &[]));
+        let patch = compare_runtimes(&python("3.11.9", &[]), &python("3.11.2", &[]));
         assert_eq!(
             patch,
-            ["python3 is CPython 3.11.9 here and CPython 3.11.2 there"]
+            ["python3 is CPython 3.11.9 locally and CPython 3.11.2 on the server"]
         );
         let many: Vec<(String, &str)> = (0..9).map(|n| (format!("p{n}"), "1")).collect();
         let many: Vec<(&str, &str)> = many
             .iter()
             .map(|(name, one)| (name.as_str(), *one))
             .collect();
-        let told = of_runtimes(&python("3.11.2", &[]), &python("3.11.2", &many));
-        assert!(told[0].ends_with("p5 1 and 3 more"), "{told:?}");
+        let found = compare_runtimes(&python("3.11.2", &[]), &python("3.11.2", &many));
+        assert!(found[0].ends_with("p5 1 and 3 more"), "{found:?}");
     }
 
     #[test]
-    fn machines_differ_by_what_agents_notice() {
+    fn machine_differences_are_those_agents_notice() {
         let machine = |model: &str, cpus_per_agent| AgentMachine {
             architecture: "x86_64".into(),
             cpu_model: Some(model.into()),
             cpus_per_agent,
         };
-        let told = of_machines(&machine("A", 1), &machine("B", 2));
-        assert_eq!(told.len(), 2);
-        assert!(told[0].contains("A here and B there") && told[1].contains("1 CPUs here and 2"));
+        let found = compare_machines(&machine("A", 1), &machine("B", 2));
+        assert_eq!(found.len(), 2);
+        assert!(found[0].contains("A locally and B on the server") && found[1].contains("1 CPUs locally and 2"));
         let broken = RuntimeInventory {
             name: "python3-ml".into(),
-            content: RuntimeContent::Broken {
-                why: "x does not exist".into(),
+            content: RuntimeContent::Failed {
+                reason: "x does not exist".into(),
             },
         };
-        let told = of_runtimes(&broken, &python("3.11.2", &[]));
-        assert!(told[0].contains("x does not exist"), "{told:?}");
+        let found = compare_runtimes(&broken, &python("3.11.2", &[]));
+        assert!(found[0].contains("x does not exist"), "{found:?}");
     }
 }

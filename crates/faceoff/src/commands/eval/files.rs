@@ -5,12 +5,12 @@ use faceoff_dataset::ARCHIVE_FILE;
 use std::{fs, io::ErrorKind, path::Path};
 
 pub(super) const RESULTS: &str = "results.json";
-/// The agent's log, where there is no result.
+/// The agent's log, written if the agent had faults.
 pub(super) const LOG: &str = "agent.log";
 /// The comparison of all profiles.
 pub(super) const ABLATION: &str = "ablation.json";
 
-/// Removes what an earlier run has left, so that it is not taken for this one's.
+/// Removes the files of an earlier run, so that they are not mistaken for results of this one.
 pub(super) fn remove_earlier(out: &Path) -> anyhow::Result<()> {
     for path in [RESULTS, ARCHIVE_FILE, LOG, ABLATION].map(|name| out.join(name)) {
         match fs::remove_file(&path) {

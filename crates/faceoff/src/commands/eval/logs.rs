@@ -1,38 +1,37 @@
-//! What the agent's processes wrote to standard error.
+//! Standard error of the agent's processes.
 
-use faceoff_types::{AgentFault, harmless};
+use faceoff_types::{AgentFault, escape_unprintable};
 
-/// Of each shard the end of it; after each process's own words stands the fault that ended it.
+/// The end of the log of each shard. The output of each process is followed by the fault that ended it.
 #[derive(Debug, Default)]
 pub(super) struct Logs(Vec<String>);
 
-/// Before a fault in a log.
-const MARK: &str = "[faceoff] ";
+/// Prefix of a fault in a log.
+const FAULT_PREFIX: &str = "[faceoff] ";
 
 impl Logs {
     pub(super) fn add(&mut self, log: &str) {
         self.0.push(log.to_owned());
     }
 
-    /// One after the other.
-    pub(super) fn whole(&self) -> String {
+    /// All logs, concatenated.
+    pub(super) fn concat(&self) -> String {
         self.0.concat()
     }
 
-    /// The lines that the process wrote which had this fault; none if it wrote nothing, or more has been written since
-    /// than is kept.
-    pub(super) fn before(&self, fault: &AgentFault) -> Vec<&str> {
+    /// The output of the process that had this fault; empty if it wrote nothing, or later output has displaced it.
+    pub(super) fn lines_before(&self, fault: &AgentFault) -> Vec<&str> {
         let fault = fault.to_string();
         let first = fault.lines().next().unwrap_or_default();
-        let told = format!("{MARK}{}", harmless(first));
+        let expected = format!("{FAULT_PREFIX}{}", escape_unprintable(first));
         for log in &self.0 {
             let mut lines = Vec::new();
             for line in log.lines() {
-                // It may go on: how long it was waited for.
-                if line.starts_with(&told) {
+                // The line may continue with the time that the fault took.
+                if line.starts_with(&expected) {
                     return lines;
                 }
-                if line.starts_with(MARK) {
+                if line.starts_with(FAULT_PREFIX) {
                     lines.clear();
                 } else {
                     lines.push(line);
@@ -49,10 +48,10 @@ mod tests {
     use faceoff_types::{AgentFaultKind, Task};
 
     #[test]
-    fn a_fault_is_told_with_what_its_own_process_wrote() {
+    fn fault_has_the_output_of_its_own_process() {
         let fault = |episode| AgentFault {
             fault: AgentFaultKind::Exited { code: 1 },
-            contest: Task::Hit.into(),
+            agent_task: Task::Hit.into(),
             episode: Some(episode),
             step: Some(7),
             line: None,
@@ -64,9 +63,9 @@ mod tests {
             fault(1),
             fault(2)
         ));
-        assert_eq!(logs.before(&fault(1)), ["one"]);
-        assert_eq!(logs.before(&fault(2)), ["two", "three"]);
-        assert_eq!(logs.before(&fault(3)), [""; 0]);
-        assert!(logs.whole().starts_with("of another shard\none\n"));
+        assert_eq!(logs.lines_before(&fault(1)), ["one"]);
+        assert_eq!(logs.lines_before(&fault(2)), ["two", "three"]);
+        assert_eq!(logs.lines_before(&fault(3)), [""; 0]);
+        assert!(logs.concat().starts_with("of another shard\none\n"));
     }
 }

@@ -15,26 +15,26 @@ use std::{
     thread,
 };
 
-/// A shard and where it is recorded.
+/// A shard and the folder for its recording.
 #[derive(Debug)]
 pub(super) struct Job {
     pub out: PathBuf,
     pub spec: ShardSpec,
 }
 
-/// How all shards together ended.
+/// Outcome of all shards together.
 pub(super) enum Verdict {
-    /// All episodes were played, with no more faults than allowed.
-    Played {
+    /// All episodes are finished, with no more faults than allowed.
+    Finished {
         faults: Vec<AgentFault>,
-        /// Of all episodes, in (task, episode) order.
+        /// Sorted by task and episode.
         outcomes: Vec<EpisodeOutcome>,
         logs: Logs,
     },
     Failed { faults: Vec<AgentFault>, logs: Logs },
 }
 
-/// Threads that take shard after shard, and what they share.
+/// State that the worker threads share.
 struct Pool {
     jobs: Mutex<VecDeque<Job>>,
     faults: Mutex<Vec<AgentFault>>,
@@ -46,15 +46,15 @@ struct Pool {
     bar: ProgressBar,
 }
 
-/// Plays all shards, one thread and one agent process per environment.
-pub(super) fn play_all(
+/// Runs all shards, with one thread and one agent process per environment.
+pub(super) fn run_shards(
     bundle: &Bundle,
     envs: &[AgentEnvironment],
     jobs: Vec<Job>,
 ) -> anyhow::Result<Verdict> {
     let episodes: u64 = jobs.iter().map(|job| job.spec.episodes.len() as u64).sum();
     let max_faults = jobs.first().map_or(0, |job| job.spec.max_faults);
-    // indicatif draws nothing where standard error is no terminal.
+    // indicatif draws nothing if standard error is no terminal.
     let bar = ProgressBar::new(episodes).with_style(
         ProgressStyle::with_template(
             "{msg:8} {bar:40} {pos}/{len} episodes, {per_sec}, {eta} left",
@@ -78,7 +78,7 @@ pub(super) fn play_all(
             .map(|(index, env)| {
                 thread::Builder::new()
                     .name(format!("worker-{index}"))
-                    .spawn_scoped(scope, || pool.work(bundle, env))
+                    .spawn_scoped(scope, || pool.run_jobs(bundle, env))
             })
             .collect();
         workers
@@ -88,7 +88,7 @@ pub(super) fn play_all(
                     .join()
                     .unwrap_or_else(|panic| std::panic::resume_unwind(panic)),
                 Err(source) => Err(PlatformFault::Io {
-                    what: "starting a worker".to_owned(),
+                    action: "starting a worker".to_owned(),
                     source,
                 }),
             })
@@ -98,14 +98,14 @@ pub(super) fn play_all(
     for result in results {
         match result {
             Ok(()) | Err(PlatformFault::Cancelled) => {}
-            Err(fault) => return Err(fault).context("the evaluation failed, not by the agent"),
+            Err(fault) => return Err(fault).context("the evaluation failed by a platform fault, not by the agent"),
         }
     }
     let mut faults = pool
         .faults
         .into_inner()
         .unwrap_or_else(PoisonError::into_inner);
-    faults.sort_by_key(|fault| (fault.contest, fault.episode));
+    faults.sort_by_key(|fault| (fault.agent_task, fault.episode));
     let logs = pool
         .logs
         .into_inner()
@@ -118,7 +118,7 @@ pub(super) fn play_all(
             .into_inner()
             .unwrap_or_else(PoisonError::into_inner);
         outcomes.sort_by_key(|outcome| (outcome.task, outcome.episode));
-        Ok(Verdict::Played {
+        Ok(Verdict::Finished {
             faults,
             outcomes,
             logs,
@@ -127,17 +127,17 @@ pub(super) fn play_all(
 }
 
 impl Pool {
-    fn work(&self, bundle: &Bundle, env: &AgentEnvironment) -> Result<(), PlatformFault> {
+    fn run_jobs(&self, bundle: &Bundle, env: &AgentEnvironment) -> Result<(), PlatformFault> {
         loop {
             let job = lock(&self.jobs).pop_front();
             let Some(Job { out, mut spec }) = job else {
                 return Ok(());
             };
-            // The limit is the evaluation's, not the shard's.
+            // The limit applies to the evaluation, not to the shard.
             let faults_so_far = self.fault_count.load(Ordering::Relaxed);
             spec.max_faults = self.max_faults.saturating_sub(faults_so_far);
             self.bar.set_message(spec.task.as_str());
-            if let Err(fault) = run_shard(&spec, bundle, env, &out, &mut Worker(self)) {
+            if let Err(fault) = run_shard(&spec, bundle, env, &out, &mut PoolObserver(self)) {
                 self.stop.store(true, Ordering::Relaxed);
                 return Err(fault);
             }
@@ -145,11 +145,11 @@ impl Pool {
     }
 }
 
-/// One thread's part: it reports to the pool.
-struct Worker<'a>(&'a Pool);
+/// Reports the progress of one thread to the pool.
+struct PoolObserver<'a>(&'a Pool);
 
-impl Observer for Worker<'_> {
-    fn episode_done(&mut self, outcome: &EpisodeOutcome) {
+impl Observer for PoolObserver<'_> {
+    fn on_episode_end(&mut self, outcome: &EpisodeOutcome) {
         self.0.bar.inc(1);
         lock(&self.0.outcomes).push(outcome.clone());
         if let Some(fault) = &outcome.fault {

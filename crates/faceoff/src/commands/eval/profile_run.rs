@@ -1,10 +1,10 @@
-//! All episodes in one profile: played, joined, scored.
+//! Runs, assembles and scores all episodes of one profile.
 
 use super::{
     files::{LOG, RESULTS, remove_earlier, write_json},
     logs::Logs,
-    pool::{Job, Verdict, play_all},
-    said::Said,
+    notes::Notes,
+    pool::{Job, Verdict, run_shards},
 };
 use anyhow::{Context, bail};
 use faceoff_dataset::{ARCHIVE_FILE, Assembled, assemble};
@@ -12,13 +12,13 @@ use faceoff_runner::{AgentEnvironment, bundle::Bundle};
 use faceoff_types::{
     AgentFault, EpisodeOutcome, EvaluationResult, Profile, Ruleset, Seed, Task, Variation,
 };
-use faceoff_wire::work::{EvaluationMeta, ShardSpec};
+use faceoff_wire::job::{EvaluationMeta, ShardSpec};
 use std::{
     fs,
     path::{Path, PathBuf},
 };
 
-/// What every profile is played with.
+/// Settings that all profiles share.
 #[derive(Debug)]
 pub(super) struct EvalSetup {
     pub bundle: Bundle,
@@ -29,50 +29,49 @@ pub(super) struct EvalSetup {
     pub seed: Seed,
     pub mismatch_seed: Seed,
     pub max_faults: u32,
-    /// What is played and scored by otherwise than the ruleset has it.
+    /// Deviations from the ruleset.
     pub variation: Variation,
-    pub said: Said,
-    /// For recordings under way.
+    pub notes: Notes,
+    /// Folder for unfinished recordings.
     pub scratch: PathBuf,
 }
 
-/// What came of one profile.
 #[derive(Debug)]
-pub(super) struct Played {
+pub(super) struct ProfileOutcome {
     pub result: EvaluationResult,
     pub outcomes: Vec<EpisodeOutcome>,
     pub archive_blake3: String,
     pub faults: Vec<AgentFault>,
 }
 
-/// Plays all episodes in one profile and leaves `results.json` and `dataset.zip` in `out`.
-pub(super) fn play(setup: &EvalSetup, profile: Profile, out: &Path) -> anyhow::Result<Played> {
+/// Runs all episodes in one profile and writes `results.json` and `dataset.zip` to `out`.
+pub(super) fn run_profile(setup: &EvalSetup, profile: Profile, out: &Path) -> anyhow::Result<ProfileOutcome> {
     fs::create_dir_all(out).with_context(|| format!("creating {}", out.display()))?;
     remove_earlier(out)?;
     let jobs = jobs(setup, profile);
     let dirs: Vec<PathBuf> = jobs.iter().map(|job| job.out.clone()).collect();
-    let (outcomes, faults) = match play_all(&setup.bundle, &setup.envs, jobs)? {
-        Verdict::Played {
+    let (outcomes, faults) = match run_shards(&setup.bundle, &setup.envs, jobs)? {
+        Verdict::Finished {
             faults,
             outcomes,
             logs,
         } => {
-            print_faults(setup.said, &faults, &logs);
+            print_faults(setup.notes, &faults, &logs);
             if !faults.is_empty() {
                 let path = write_log(out, &logs)?;
                 setup
-                    .said
-                    .line(format_args!("the agent's log is in {}", path.display()));
+                    .notes
+                    .print(format_args!("the agent's log is in {}", path.display()));
             }
             (outcomes, faults)
         }
         Verdict::Failed { faults, logs } => {
             let path = write_log(out, &logs)?;
-            print_faults(setup.said, &faults, &logs);
+            print_faults(setup.notes, &faults, &logs);
             let last = faults.last().map(ToString::to_string).unwrap_or_default();
             bail!(
-                "the agent failed: more than {} faults, so there is no score; the last one: \
-                 {last}; its log is in {}",
+                "the agent failed: it had more than {} faults, so there is no score; the last fault: \
+                {last}; the agent's log is in {}",
                 setup.max_faults,
                 path.display()
             );
@@ -89,12 +88,12 @@ pub(super) fn play(setup: &EvalSetup, profile: Profile, out: &Path) -> anyhow::R
     let Assembled {
         result, archive, ..
     } = assemble(&meta, &dirs, &out.join(ARCHIVE_FILE), None).context("joining the recordings")?;
-    // They are in the dataset now; a further profile needs the room.
+    // The dataset contains them now, and further profiles need the disk space.
     for dir in &dirs {
         fs::remove_dir_all(dir).with_context(|| format!("removing {}", dir.display()))?;
     }
     write_json(&out.join(RESULTS), &result)?;
-    Ok(Played {
+    Ok(ProfileOutcome {
         result,
         outcomes,
         archive_blake3: archive.blake3,
@@ -102,7 +101,7 @@ pub(super) fn play(setup: &EvalSetup, profile: Profile, out: &Path) -> anyhow::R
     })
 }
 
-/// One shard per task and worker, so that each agent is started as seldom as possible.
+/// One shard per task and worker, which starts each agent as rarely as possible.
 fn jobs(setup: &EvalSetup, profile: Profile) -> Vec<Job> {
     let workers = u32::try_from(setup.envs.len()).unwrap_or(u32::MAX);
     let per_shard = setup.episodes.div_ceil(workers);
@@ -129,34 +128,34 @@ fn jobs(setup: &EvalSetup, profile: Profile) -> Vec<Job> {
     jobs
 }
 
-/// All of them, and of the first what the agent wrote before it.
-fn print_faults(said: Said, faults: &[AgentFault], logs: &Logs) {
+/// Prints all faults, and the agent's output before the first one.
+fn print_faults(notes: Notes, faults: &[AgentFault], logs: &Logs) {
     const LINES: usize = 40;
     for fault in faults {
-        said.line(format_args!("fault: {fault}"));
+        notes.print(format_args!("fault: {fault}"));
     }
     let Some(first) = faults.first() else {
         return;
     };
-    let lines = logs.before(first);
+    let lines = logs.lines_before(first);
     if lines.is_empty() {
-        said.line(format_args!(
-            "before the first fault the agent wrote nothing to its standard error"
+        notes.print(format_args!(
+            "the agent wrote nothing to standard error before its first fault"
         ));
         return;
     }
-    said.line(format_args!("what the agent wrote before the first fault:"));
+    notes.print(format_args!("the agent's output before its first fault:"));
     let left_out = lines.len().saturating_sub(LINES);
     if left_out > 0 {
-        said.line(format_args!("  … {left_out} lines more"));
+        notes.print(format_args!("  … {left_out} more lines"));
     }
     for line in &lines[left_out..] {
-        said.line(format_args!("  {line}"));
+        notes.print(format_args!("  {line}"));
     }
 }
 
 fn write_log(out: &Path, logs: &Logs) -> anyhow::Result<PathBuf> {
     let path = out.join(LOG);
-    fs::write(&path, logs.whole()).with_context(|| format!("writing {}", path.display()))?;
+    fs::write(&path, logs.concat()).with_context(|| format!("writing {}", path.display()))?;
     Ok(path)
 }

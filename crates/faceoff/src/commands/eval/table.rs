@@ -1,8 +1,8 @@
 use faceoff_types::EvaluationResult;
 use std::fmt::Write as _;
 
-/// The result as a table for a terminal.
-pub(super) fn of(agent: &str, result: &EvaluationResult) -> String {
+/// The result as text.
+pub(super) fn result_table(agent: &str, result: &EvaluationResult) -> String {
     let mut out = String::new();
     let line = |out: &mut String, args: std::fmt::Arguments<'_>| {
         out.write_fmt(args).expect("writing to memory cannot fail");

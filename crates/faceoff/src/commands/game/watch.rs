@@ -1,4 +1,4 @@
-//! A game as it is played.
+//! `faceoff game watch`: prints the live events of a game.
 
 use crate::client::{ApiError, Client, ServerEvent};
 use anyhow::Context;
@@ -6,101 +6,101 @@ use faceoff_api::views::{
     game::GameView,
     live::{LiveEnd, LiveEndState},
 };
-use faceoff_types::{CONTROL_STEP_S, GameHappening, GameId, LiveGame, LiveHappening, Side};
+use faceoff_types::{CONTROL_STEP_S, GameEvent, GameId, LiveGame, LiveEvent, Side};
 use futures::StreamExt;
 use reqwest::StatusCode;
 use serde_json::Value;
 use std::time::Duration;
 
-/// Between two tries to go on after a cut.
-const PAUSE: Duration = Duration::from_secs(1);
-/// So many tries in a row that bring nothing: the server is gone.
-const MOST_TRIES: u32 = 30;
+/// Delay before a new attempt to connect.
+const RETRY_DELAY: Duration = Duration::from_secs(1);
+/// After this many attempts in a row without an event, the server is considered unreachable.
+const MAX_ATTEMPTS: u32 = 30;
 
-/// Prints what happens until the game is over. A cut connection is taken up again after the last that was told.
-pub(super) async fn follow(client: &Client, json: bool, id: GameId) -> anyhow::Result<()> {
+/// Prints events until the game is over. An interrupted stream is resumed after the last printed event.
+pub(super) async fn watch(client: &Client, json: bool, id: GameId) -> anyhow::Result<()> {
     let game = client.game(id).await?;
-    let mut told = Told::new(game, json);
-    let mut tries = 0;
-    while !told.is_over {
-        match listen(client, id, &mut told).await {
+    let mut printer = EventPrinter::new(game, json);
+    let mut attempts = 0;
+    while !printer.is_over {
+        match read_stream(client, id, &mut printer).await {
             // The server ends streams after an hour, and when it ends.
-            Ok(heard) if heard > 0 => tries = 0,
-            Ok(_) => tries += 1,
-            Err(error) if is_final(&error) || tries >= MOST_TRIES => return Err(error),
+            Ok(received) if received > 0 => attempts = 0,
+            Ok(_) => attempts += 1,
+            Err(error) if is_final(&error) || attempts >= MAX_ATTEMPTS => return Err(error),
             Err(error) => {
-                if tries == 0 {
-                    eprintln!("the connection is cut ({error:#}); trying again");
+                if attempts == 0 {
+                    eprintln!("connection lost ({error:#}); reconnecting");
                 }
-                tries += 1;
+                attempts += 1;
             }
         }
         anyhow::ensure!(
-            told.is_over || tries <= MOST_TRIES,
-            "the server tells nothing more of the game; faceoff game show {id} says how it stands"
+            printer.is_over || attempts <= MAX_ATTEMPTS,
+            "the server sends no further events of the game; for its state, run: faceoff game show {id}"
         );
-        if !told.is_over {
-            tokio::time::sleep(PAUSE).await;
+        if !printer.is_over {
+            tokio::time::sleep(RETRY_DELAY).await;
         }
     }
     Ok(())
 }
 
-/// Refused, and not because too many are watching or a server is about to be back.
+/// The server has refused the request, and not because of too many watchers or a restart.
 fn is_final(error: &anyhow::Error) -> bool {
     error.downcast_ref::<ApiError>().is_some_and(|refused| {
         refused.status.is_client_error() && refused.status != StatusCode::TOO_MANY_REQUESTS
     })
 }
 
-/// Takes one stream to its end; how many events came.
-async fn listen(client: &Client, id: GameId, told: &mut Told) -> anyhow::Result<u32> {
-    let mut heard = 0;
-    let mut events = Box::pin(client.watch_game(id, told.last.as_deref()).await?);
+/// Reads one stream to its end and returns the number of events.
+async fn read_stream(client: &Client, id: GameId, printer: &mut EventPrinter) -> anyhow::Result<u32> {
+    let mut received = 0;
+    let mut events = Box::pin(client.watch_game(id, printer.last.as_deref()).await?);
     while let Some(event) = events.next().await {
         let event = match event {
             Ok(event) => event,
-            // What came before it stands.
-            Err(_) if heard > 0 => break,
+            // The events before the error are complete.
+            Err(_) if received > 0 => break,
             Err(error) => return Err(error),
         };
-        told.take(&event)?;
-        heard += 1;
-        if told.is_over {
+        printer.print(&event)?;
+        received += 1;
+        if printer.is_over {
             break;
         }
     }
-    Ok(heard)
+    Ok(received)
 }
 
-/// What was told so far.
-struct Told {
+/// Prints the events of a game and remembers which have been printed.
+struct EventPrinter {
     teams: [String; 2],
     json: bool,
-    /// The id of the last happening.
+    /// Id of the last event.
     last: Option<String>,
-    /// Of which a snapshot was printed.
+    /// Number of the attempt whose snapshot was printed.
     attempt: Option<u32>,
-    waits: bool,
+    is_waiting: bool,
     is_over: bool,
 }
 
-impl Told {
+impl EventPrinter {
     fn new(game: GameView, json: bool) -> Self {
         Self {
             teams: game.sides.map(|side| side.team_name.to_string()),
             json,
             last: None,
             attempt: None,
-            waits: false,
+            is_waiting: false,
             is_over: false,
         }
     }
 
-    fn take(&mut self, event: &ServerEvent) -> anyhow::Result<()> {
+    fn print(&mut self, event: &ServerEvent) -> anyhow::Result<()> {
         let line = self
-            .line(event)
-            .context("the server's answer is not understood; is it another version of Faceoff?")?;
+            .event_line(event)
+            .context("the server's answer cannot be read; is it another version of Faceoff?")?;
         if self.json {
             let data: Value = serde_json::from_str(&event.data).context("an event")?;
             let whole = serde_json::json!({"event": event.name, "id": event.id, "data": data});
@@ -114,72 +114,72 @@ impl Told {
         Ok(())
     }
 
-    /// What is to be printed of an event, if anything.
-    fn line(&mut self, event: &ServerEvent) -> serde_json::Result<Option<String>> {
+    /// The line to print for an event, if any.
+    fn event_line(&mut self, event: &ServerEvent) -> serde_json::Result<Option<String>> {
         Ok(match event.name.as_str() {
             "snapshot" => {
-                let stands: LiveGame = serde_json::from_str(&event.data)?;
-                self.waits = false;
-                // After a cut it is the same attempt, and what was missed follows.
-                let is_new = self.attempt.replace(stands.attempt) != Some(stands.attempt);
+                let snapshot: LiveGame = serde_json::from_str(&event.data)?;
+                self.is_waiting = false;
+                // After a reconnection, the same attempt continues and the missed events follow.
+                let is_new = self.attempt.replace(snapshot.attempt) != Some(snapshot.attempt);
                 is_new.then(|| {
                     let [home, away] = &self.teams;
-                    let [goals, conceded] = stands.score;
-                    let minutes = f64::from(stands.steps) * CONTROL_STEP_S / 60.0;
+                    let [goals, conceded] = snapshot.score;
+                    let minutes = f64::from(snapshot.steps) * CONTROL_STEP_S / 60.0;
                     format!(
                         "{home} - {away}, attempt {} of a game of {minutes:.1} minutes: {goals} : {conceded} so far",
-                        stands.attempt
+                        snapshot.attempt
                     )
                 })
             }
             "happening" => {
-                let happening: LiveHappening = serde_json::from_str(&event.data)?;
-                Some(self.happening(&happening))
+                let happening: LiveEvent = serde_json::from_str(&event.data)?;
+                Some(self.happening_line(&happening))
             }
             "waiting" => {
-                let is_new = !std::mem::replace(&mut self.waits, true);
+                let is_new = !std::mem::replace(&mut self.is_waiting, true);
                 is_new
-                    .then(|| "no slot plays it at the moment; it is told when one does".to_owned())
+                    .then(|| "waiting for a free slot".to_owned())
             }
             "over" => {
                 let end: LiveEnd = serde_json::from_str(&event.data)?;
                 self.is_over = true;
                 let state = match end.state {
-                    LiveEndState::Played => "over; it was played to its end",
-                    LiveEndState::Broken => "over; it was broken by our fault, and has no result",
-                    LiveEndState::Void => "over; its result counts no more",
-                    LiveEndState::Cancelled => "it is not played",
+                    LiveEndState::Played => "over",
+                    LiveEndState::Broken => "over without a result, because of a platform fault",
+                    LiveEndState::Void => "over, result voided",
+                    LiveEndState::Cancelled => "cancelled",
                 };
                 Some(format!("{state}: faceoff game show {}", end.game))
             }
-            // Where things are, and what a later server may tell.
+            // Positions are not printed, and a later server may send other events.
             _ => None,
         })
     }
 
-    fn happening(&self, happening: &LiveHappening) -> String {
+    fn happening_line(&self, happening: &LiveEvent) -> String {
         let team = |side: Side| &self.teams[side.index()];
         let scored = |[home, away]: [u32; 2]| format!("{home} : {away}");
-        let what = match &happening.what {
-            GameHappening::RallyBegun { rally, serves } => format!(
+        let text = match &happening.event {
+            GameEvent::RallyBegun { rally, serves } => format!(
                 "rally {} begins, the puck is on the side of {}",
                 rally + 1,
                 team(*serves)
             ),
-            GameHappening::Restarted { side } => format!("{} is started anew", team(*side)),
-            GameHappening::Goal { by, score } => {
+            GameEvent::Restarted { side } => format!("{} is restarted", team(*side)),
+            GameEvent::Goal { by, score } => {
                 format!("goal by {}: {}", team(*by), scored(*score))
             }
-            GameHappening::Foul { by, score } => {
+            GameEvent::Foul { by, score } => {
                 format!("foul by {}: {}", team(*by), scored(*score))
             }
-            GameHappening::Stuck => "the puck is stuck in the middle; no foul".to_owned(),
-            GameHappening::LeftTable => "the puck left the table".to_owned(),
-            GameHappening::Diverged => "the world could not be simulated any further".to_owned(),
-            GameHappening::Fault { side, count } => {
-                format!("fault of {}, its number {count}", team(*side))
+            GameEvent::Stuck => "the puck is stuck in the middle; no foul".to_owned(),
+            GameEvent::LeftTable => "the puck left the table".to_owned(),
+            GameEvent::Diverged => "the simulation diverged".to_owned(),
+            GameEvent::Fault { side, count } => {
+                format!("fault {count} of {}", team(*side))
             }
-            GameHappening::Ended {
+            GameEvent::Ended {
                 score,
                 winner,
                 forfeits,
@@ -195,11 +195,11 @@ impl Told {
                 }
                 text
             }
-            GameHappening::BrokenOff => "broken off; there is no result of this attempt".to_owned(),
+            GameEvent::Aborted => "aborted; this attempt has no result".to_owned(),
         };
         let seconds = f64::from(happening.step) * CONTROL_STEP_S;
         format!(
-            "{:>3}:{:04.1}  {what}",
+            "{:>3}:{:04.1}  {text}",
             (seconds / 60.0) as u32,
             seconds % 60.0
         )
@@ -211,13 +211,13 @@ mod tests {
     use super::*;
     use serde_json::json;
 
-    fn told() -> Told {
-        Told {
+    fn printer() -> EventPrinter {
+        EventPrinter {
             teams: ["Ajax".to_owned(), "Zed".to_owned()],
             json: false,
             last: None,
             attempt: None,
-            waits: false,
+            is_waiting: false,
             is_over: false,
         }
     }
@@ -231,15 +231,15 @@ mod tests {
     }
 
     #[test]
-    fn happenings_are_told_by_name_and_by_the_games_clock() {
-        let told = told();
-        let line = |step: u32, what: Value| {
+    fn events_are_printed_with_team_name_and_game_clock() {
+        let printer = printer();
+        let line = |step: u32, fields: Value| {
             let mut whole = json!({ "step": step });
             whole
                 .as_object_mut()
                 .unwrap()
-                .extend(what.as_object().unwrap().clone());
-            told.happening(&serde_json::from_value(whole).unwrap())
+                .extend(fields.as_object().unwrap().clone());
+            printer.happening_line(&serde_json::from_value(whole).unwrap())
         };
         assert_eq!(
             line(3605, json!({"kind": "goal", "by": 2, "score": [0, 1]})),
@@ -251,16 +251,16 @@ mod tests {
         );
         let ended = json!({"kind": "ended", "score": [0, 10], "winner": 2,
                            "forfeits": [{"kind": "faults", "count": 11, "allowed": 10}, null]});
-        let said = line(45_000, ended);
+        let text = line(45_000, ended);
         assert!(
-            said.starts_with(" 15:00.0  Zed wins, 0 : 10; Ajax forfeited: "),
-            "{said}"
+            text.starts_with(" 15:00.0  Zed wins, 0 : 10; Ajax forfeited: "),
+            "{text}"
         );
     }
 
     #[test]
-    fn a_snapshot_is_told_once_an_attempt_and_positions_not_at_all() {
-        let mut told = told();
+    fn snapshot_is_printed_once_per_attempt() {
+        let mut printer = printer();
         let snapshot = |attempt: u32| {
             event(
                 "snapshot",
@@ -268,7 +268,7 @@ mod tests {
                                       "fouls": [0, 0], "position": null, "is_over": false}),
             )
         };
-        let mut line = |event: &ServerEvent| told.line(event).unwrap();
+        let mut line = |event: &ServerEvent| printer.event_line(event).unwrap();
         let waiting = event("waiting", &json!({"game": GameId::new()}));
         assert!(line(&waiting).is_some());
         assert_eq!(line(&waiting), None);
@@ -281,8 +281,8 @@ mod tests {
         assert_eq!(line(&event("position", &json!({}))), None);
         assert!(line(&snapshot(2)).is_some());
         let over = event("over", &json!({"game": GameId::new(), "state": "played"}));
-        assert!(line(&over).unwrap().starts_with("over; "));
-        assert!(told.is_over);
-        assert!(told.line(&event("over", &json!({}))).is_err());
+        assert!(line(&over).unwrap().starts_with("over: "));
+        assert!(printer.is_over);
+        assert!(printer.event_line(&event("over", &json!({}))).is_err());
     }
 }

@@ -1,16 +1,15 @@
 use clap::ValueEnum;
 
-/// What a new agent can do.
+/// Behaviour of a new agent.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum Example {
-    /// Stops incoming pucks (task defend)
+    /// Stops incoming pucks (task: defend)
     Defender,
-    /// Strikes pucks at the goal (task hit)
+    /// Shoots pucks at the goal (task: hit)
     Hitter,
 }
 
 impl Example {
-    /// The task that it plays.
     pub const fn task(self) -> &'static str {
         match self {
             Self::Defender => "defend",

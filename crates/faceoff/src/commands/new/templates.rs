@@ -1,4 +1,5 @@
-//! What `faceoff new` writes: paths in the new folder, and texts with `{{name}}`, `{{task}}` and `{{version}}`.
+//! Files that `faceoff new` writes: paths in the new folder, and texts with the placeholders `{{name}}`, `{{task}}` and
+//! `{{version}}`.
 
 use super::example::Example;
 
@@ -14,8 +15,8 @@ macro_rules! template {
     };
 }
 
-/// Of another crate: the very file that it is built from.
-macro_rules! of_crate {
+/// A source file of another crate, included unchanged.
+macro_rules! crate_source {
     ($path:literal) => {
         include_str!(concat!(env!("CARGO_MANIFEST_DIR"), "/../", $path))
     };
@@ -35,16 +36,16 @@ pub fn python(example: Example) -> Files {
         ("test_agent.py", template!("python/test_agent.py")),
         (
             "protocol.py",
-            of_crate!("faceoff-py/python/faceoff/agent.py"),
+            crate_source!("faceoff-py/python/faceoff/agent.py"),
         ),
         (
             "kinematics.py",
-            of_crate!("faceoff-py/python/faceoff/kinematics/plain.py"),
+            crate_source!("faceoff-py/python/faceoff/kinematics/plain.py"),
         ),
     ]
 }
 
-/// A crate with a bundle in it.
+/// A crate and its bundle folder.
 pub fn rust(example: Example) -> Files {
     let policy = match example {
         Example::Defender => template!("rust/src/defender.rs"),
@@ -67,23 +68,23 @@ pub fn rust(example: Example) -> Files {
         ),
         (
             "faceoff-agent/src/lib.rs",
-            of_crate!("faceoff-agent/src/lib.rs"),
+            crate_source!("faceoff-agent/src/lib.rs"),
         ),
         (
             "faceoff-agent/src/action.rs",
-            of_crate!("faceoff-agent/src/action.rs"),
+            crate_source!("faceoff-agent/src/action.rs"),
         ),
         (
             "faceoff-agent/src/conversation.rs",
-            of_crate!("faceoff-agent/src/conversation.rs"),
+            crate_source!("faceoff-agent/src/conversation.rs"),
         ),
         (
             "faceoff-agent/src/env.rs",
-            of_crate!("faceoff-agent/src/env.rs"),
+            crate_source!("faceoff-agent/src/env.rs"),
         ),
         (
             "faceoff-agent/src/observation.rs",
-            of_crate!("faceoff-agent/src/observation.rs"),
+            crate_source!("faceoff-agent/src/observation.rs"),
         ),
     ]
 }

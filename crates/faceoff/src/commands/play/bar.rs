@@ -3,15 +3,15 @@ use faceoff_episode::{GameStepRow, RallyRow};
 use faceoff_runner::GameObserver;
 use indicatif::{ProgressBar, ProgressStyle};
 
-/// A bar on standard error, if that is a terminal.
+/// A progress bar, shown if standard error is a terminal.
 pub(super) struct Bar {
     bar: ProgressBar,
-    /// What stands before the score.
+    /// Text before the score.
     title: String,
 }
 
 impl Bar {
-    /// Of one game, or of several after each other.
+    /// A bar of so many control steps in total.
     pub(super) fn steps(steps: u32) -> anyhow::Result<Self> {
         let style = ProgressStyle::with_template(
             "{msg:9} {bar:40} {pos}/{len} steps, {per_sec}, {eta} left",
@@ -25,7 +25,7 @@ impl Bar {
         })
     }
 
-    /// A game of several begins: `done` steps are behind it, those of an attempt that broke not among them.
+    /// Starts the next game of a series. `done` steps belong to finished games; those of failed attempts do not count.
     pub(super) fn next(&mut self, title: &str, done: u64, all: u64) {
         self.title = format!("{title} ");
         self.bar.set_length(all);
@@ -33,7 +33,7 @@ impl Bar {
         self.bar.set_message(format!("{title} 0 : 0"));
     }
 
-    /// Prints a line above it.
+    /// Runs `line`, which prints above the bar.
     pub(super) fn above(&self, line: impl FnOnce()) {
         self.bar.suspend(line);
     }
@@ -44,11 +44,11 @@ impl Bar {
 }
 
 impl GameObserver for Bar {
-    fn stepped(&mut self, _: &GameStepRow<'_>) {
+    fn on_step(&mut self, _: &GameStepRow<'_>) {
         self.bar.inc(1);
     }
 
-    fn rally_over(&mut self, row: &RallyRow<'_>) {
+    fn on_rally_end(&mut self, row: &RallyRow<'_>) {
         let [first, second] = row.score;
         self.bar
             .set_message(format!("{}{first} : {second}", self.title));

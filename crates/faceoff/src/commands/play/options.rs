@@ -4,18 +4,19 @@ use std::path::PathBuf;
 
 #[derive(Debug, Args)]
 pub(super) struct PlayOptions {
-    /// The first side's agent: a folder with agent.toml, a .tar.gz, .tar.zst or .zip, or a container image as docker save writes it
+    /// The first side's agent: a folder with agent.toml, a .tar.gz, .tar.zst or .zip, or a container image written by
+    /// docker save
     pub(super) bundle_a: PathBuf,
-    /// The second side's agent; it may be the same
+    /// The second side's agent; it may be the same bundle
     pub(super) bundle_b: PathBuf,
-    /// Control steps of a game; 50 are a second
+    /// Control steps per game; 50 steps are one second
     #[arg(long, value_name = "N", default_value_t = GAME_WINDOWS * WINDOW_STEPS, value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_GAME_STEPS)))]
     pub(super) steps: u32,
-    /// Mirrored pairs: two games of one seed, sides swapped; recordings go to pair-K/half-1 and pair-K/half-2
+    /// Number of mirrored pairs, two games on one seed with swapped sides; recordings go to pair-K/half-1 and
+    /// pair-K/half-2
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000), conflicts_with = "games")]
     pub(super) pairs: Option<u32>,
-    /// So many games, each with a seed of its own, the first agent at home in every other one; recordings go to
-    /// game-K
+    /// Number of games, each with its own seed and alternating home sides; recordings go to game-K
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000))]
     pub(super) games: Option<u32>,
     /// Perturbations: ideal, one factor's name, or evaluation
@@ -24,20 +25,19 @@ pub(super) struct PlayOptions {
     /// A number, or 64 hexadecimal digits; the same seed gives the same serves and noise everywhere
     #[arg(long, default_value = "0")]
     pub(super) seed: Seed,
-    /// Seed of the season's model mismatch; derived from the seed if left out
+    /// Seed of the season's model mismatch [default: derived from the seed]
     #[arg(long, value_name = "HEX")]
     pub(super) mismatch_seed: Option<Seed>,
-    /// Folder for results and recordings; those of an earlier game are replaced
+    /// Folder for results and recordings; files of an earlier game are replaced
     #[arg(long, value_name = "DIR", default_value = "faceoff-game")]
     pub(super) out: PathBuf,
-    /// Print the result as JSON, as results.json has it
+    /// Print the content of results.json
     #[arg(long)]
     pub(super) json: bool,
-    /// Run your own agents without isolation, with your own environment
+    /// Run the agents without a sandbox, with your own environment
     #[arg(long)]
     pub(super) no_sandbox: bool,
-    /// Limits, runtimes and given-up layers, and of [evaluation] magnitudes of perturbations, as a server's
-    /// configuration states them
+    /// A server's configuration, for limits, runtimes and given-up layers, and for the perturbations of [evaluation]
     #[arg(long, value_name = "FILE")]
     pub(super) config: Option<PathBuf>,
 }

@@ -6,14 +6,14 @@ use std::{
     path::{Path, PathBuf},
 };
 
-/// `results.json` beside the recordings: whole, or not there.
+/// `results.json` beside the recordings. The file is complete or absent.
 #[derive(Debug)]
 pub(super) struct Results {
     path: PathBuf,
 }
 
 impl Results {
-    /// The file of a folder, from which an earlier one is removed.
+    /// The file in a folder; removes an earlier one.
     pub(super) fn clear_in(folder: &Path) -> anyhow::Result<Self> {
         let path = folder.join("results.json");
         match fs::remove_file(&path) {

@@ -1,12 +1,12 @@
-//! Many games between the same two bundles.
+//! A series of games between the same two bundles.
 
 use super::{
     bar::Bar,
-    broken::explained,
     options::PlayOptions,
+    platform_fault::with_advice,
     results::Results,
     series_results::{Kind, Series, SeriesGame, SeriesResults},
-    setting::Setting,
+    matchup::Matchup,
     table,
 };
 use anyhow::Context;
@@ -14,23 +14,24 @@ use faceoff_dataset::game::GAME_FILE;
 use faceoff_runner::{GameReport, PlatformFault};
 use std::path::{Path, PathBuf};
 
-/// How often a game is played that the host broke, before the series ends.
+/// Attempts per game; after that many failures on a busy host, the series ends.
 const ATTEMPTS: u32 = 5;
 
-/// What of an earlier series is in a folder.
-pub(super) fn earlier(out: &Path) -> Option<PathBuf> {
+/// A recording of an earlier series in a folder.
+pub(super) fn find_earlier(out: &Path) -> Option<PathBuf> {
     ["pair-1", "game-1"]
         .map(|name| out.join(name))
         .into_iter()
         .find(|path| path.exists())
 }
 
-/// Plays, prints line by line and writes: after each pair or game, so that a series that ends early has results too.
+/// Plays the series. Results are printed and written after each pair or game, so that an interrupted series has some,
+/// too.
 pub(super) fn play(
     options: &PlayOptions,
-    setting: &Setting,
+    matchup: &Matchup,
     kind: Kind,
-    wanted: u32,
+    count: u32,
     results: &Results,
 ) -> anyhow::Result<()> {
     let halves: &[bool] = match kind {
@@ -38,20 +39,20 @@ pub(super) fn play(
         Kind::Games => &[false],
     };
     let mut bar = Bar::steps(options.steps)?;
-    let all_steps = u64::from(options.steps) * u64::from(wanted) * halves.len() as u64;
+    let all_steps = u64::from(options.steps) * u64::from(count) * halves.len() as u64;
     let mut done_steps = 0;
     let series = Series {
         kind,
-        wanted,
-        agents: setting.agents(),
-        spec: setting.spec(),
+        count,
+        agents: matchup.agents(),
+        spec: matchup.spec(),
     };
     let mut games = Vec::new();
     let mut json = String::new();
     if !options.json {
-        println!("{}", table::series_head(setting.agents(), kind));
+        println!("{}", table::series_head(matchup.agents(), kind));
     }
-    for number in 1..=wanted {
+    for number in 1..=count {
         let begun = games.len();
         for (half, swapped) in (1..).zip(halves) {
             let (seed, swapped, folder) = match kind {
@@ -68,20 +69,20 @@ pub(super) fn play(
             };
             bar.next(&folder, done_steps, all_steps);
             let out = options.out.join(&folder);
-            let report = persistently(|| setting.play(seed, swapped, &out, &mut bar), &folder)?;
+            let report = play_with_retries(|| matchup.play(seed, swapped, &out, &mut bar), &folder)?;
             let score = &report.archives.score;
             Results::clear_in(&out)?.write(score)?;
             done_steps += u64::from(options.steps);
             let pair = (kind == Kind::MirroredPairs).then_some(number);
-            games.push(SeriesGame::of(score, folder, pair, swapped)?);
+            games.push(SeriesGame::new(score, folder, pair, swapped)?);
         }
-        let told = SeriesResults::of(&series, &games)?;
-        json = results.write(&told)?;
+        let summary = SeriesResults::new(&series, &games)?;
+        json = results.write(&summary)?;
         if !options.json {
             bar.above(|| println!("{}", table::series_line(number, &games[begun..])));
-            if number == wanted {
+            if number == count {
                 bar.finish();
-                print!("{}", table::series(&told));
+                print!("{}", table::series_table(&summary));
             }
         }
     }
@@ -98,8 +99,8 @@ pub(super) fn play(
     Ok(())
 }
 
-/// Plays a game again that the host broke.
-fn persistently(
+/// Plays a game, and plays it again if the host was too busy.
+fn play_with_retries(
     mut play: impl FnMut() -> Result<GameReport, PlatformFault>,
     folder: &str,
 ) -> anyhow::Result<GameReport> {
@@ -107,10 +108,10 @@ fn persistently(
     loop {
         match play() {
             Err(PlatformFault::HostBusy(_)) if attempt < ATTEMPTS => attempt += 1,
-            played => {
-                return played
-                    .map_err(explained)
-                    .with_context(|| format!("{folder} has no result; those before it stand"));
+            result => {
+                return result
+                    .map_err(with_advice)
+                    .with_context(|| format!("{folder} has no result; earlier results remain valid"));
             }
         }
     }

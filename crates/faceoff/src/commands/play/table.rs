@@ -3,8 +3,8 @@ use faceoff_scoring::tournament::GameScore;
 use faceoff_types::Side;
 use std::fmt::Write as _;
 
-/// The result as a table for a terminal.
-pub(super) fn of(game: &GameScore) -> String {
+/// The result of a game as text.
+pub(super) fn game_table(game: &GameScore) -> String {
     let mut out = String::new();
     let mut line = |args: std::fmt::Arguments<'_>| {
         out.write_fmt(args).expect("writing to memory cannot fail");
@@ -90,7 +90,7 @@ pub(super) fn log_tail(side: Side, log: &str) -> String {
     out
 }
 
-/// What stands above the lines of a series.
+/// Title and column headings of a series.
 pub(super) fn series_head([first, second]: [&str; 2], kind: Kind) -> String {
     let columns = match kind {
         Kind::MirroredPairs => {
@@ -99,65 +99,65 @@ pub(super) fn series_head([first, second]: [&str; 2], kind: Kind) -> String {
         }
         Kind::Games => format!("{:>5}  {:<15} {:>10}", "game", "goals", "difference"),
     };
-    format!("{first} against {second}; goals, and what the first of them did\n{columns}")
+    format!("{first} against {second}; goals, and the result of {first}\n{columns}")
 }
 
-/// A pair, or a game.
+/// A pair or a game as one line.
 pub(super) fn series_line(number: u32, games: &[SeriesGame]) -> String {
     let mut line = format!("{number:>5} ");
     for game in games {
         let [first, second] = game.goals;
-        let did = match game.winner {
+        let outcome = match game.winner {
             Some(0) => "won",
             Some(_) => "lost",
             None => "drew",
         };
-        let told = format!("{first} : {second} {did}");
-        write!(line, " {told:<15}").expect("writing to memory cannot fail");
+        let cell = format!("{first} : {second} {outcome}");
+        write!(line, " {cell:<15}").expect("writing to memory cannot fail");
     }
     let difference: i64 = games.iter().map(SeriesGame::difference).sum();
     line + &format!(" {difference:>+10}")
 }
 
-/// What a series came to.
-pub(super) fn series(told: &SeriesResults) -> String {
-    let [first, second] = &told.agents;
-    let [won, lost] = told.wins;
-    let (unit, units) = match told.series {
+/// Summary of a series as text.
+pub(super) fn series_table(results: &SeriesResults) -> String {
+    let [first, second] = &results.agents;
+    let [won, lost] = results.wins;
+    let (singular, plural) = match results.series {
         Kind::MirroredPairs => ("pair", "mirrored pairs"),
         Kind::Games => ("game", "games"),
     };
-    let difference = &told.goal_difference;
-    let from_to = |interval: Option<[f64; 2]>| match interval {
+    let difference = &results.goal_difference;
+    let interval_text = |interval: Option<[f64; 2]>| match interval {
         Some([low, high]) => format!(" (95 %: {low:.2} to {high:.2})"),
         None => String::new(),
     };
     let mut out = format!(
-        "\n{first} against {second}: {} {units} of {} control steps, {} ({}), seed {}\n\
+        "\n{first} against {second}: {} {plural} of {} control steps, {} ({}), seed {}\n\
          {first} won {won} games, drew {}, lost {lost}\n\
-         goals of {first} less those of {second}, by {unit}: mean {:+.2}{}",
-        difference.of,
-        told.steps,
-        told.profile,
-        told.ruleset,
-        told.seed,
-        told.draws,
+         goals of {first} minus those of {second}, per {singular}: mean {:+.2}{}",
+        difference.count,
+        results.steps,
+        results.profile,
+        results.ruleset,
+        results.seed,
+        results.draws,
         difference.mean,
-        from_to(difference.mean_ci95),
+        interval_text(difference.mean_ci95),
     );
     if let Some(variance) = difference.variance {
         out.push_str(&format!(", variance {variance:.2}"));
     }
     out.push('\n');
-    if let Some(spread) = &told.spread {
+    if let Some(spread) = &results.spread {
         out.push_str(&format!(
-            "of two games that know nothing of each other the variance would be {:.2}",
+            "the variance of two independent games would be {:.2}",
             spread.of_independent_games
         ));
         if let Some(ratio) = spread.ratio {
             out.push_str(&format!(
-                "; a pair's is {ratio:.2} times that{}",
-                from_to(spread.ratio_ci95)
+                "; that of a pair is {ratio:.2} times as large{}",
+                interval_text(spread.ratio_ci95)
             ));
         }
         out.push('\n');

@@ -1,54 +1,54 @@
 use super::{
     plots::{self, Plots},
-    recorded::{Recorded, time_s},
+    recording::{EpisodeRecording, time_s},
     table_view,
 };
 use askama::Template;
-use faceoff_types::harmless;
+use faceoff_types::escape_unprintable;
 
 const WIDTH_PX: u32 = 900;
 
 #[derive(Template)]
 #[template(path = "replay/page.html")]
 struct Page<'a> {
-    recorded: &'a Recorded,
+    recording: &'a EpisodeRecording,
     headline: String,
     losses: Vec<String>,
     duration_s: String,
     table: String,
     plots: Plots,
-    /// What the script moves, as JSON of numbers alone.
+    /// Positions that the script animates, as JSON that contains only numbers.
     motion: String,
     last: usize,
 }
 
-/// A page that is complete by itself; without JavaScript it shows the paths and the end.
-pub fn html(recorded: &Recorded) -> anyhow::Result<String> {
+/// A self-contained page. Without JavaScript, it shows the paths and the final positions.
+pub fn html(recording: &EpisodeRecording) -> anyhow::Result<String> {
     let motion = serde_json::json!({
-        "puck": rounded(recorded.puck.iter().map(|[x, y, _]| [*x, *y])),
-        "seen": rounded(recorded.seen.iter().copied()),
-        "mallet": rounded(recorded.mallet.iter().copied()),
+        "puck": round(recording.puck.iter().map(|[x, y, _]| [*x, *y])),
+        "seen": round(recording.seen.iter().copied()),
+        "mallet": round(recording.mallet.iter().copied()),
         // Recorded from the first step on.
-        "opponent": rounded(recorded.opponent.first().into_iter().chain(&recorded.opponent).copied()),
+        "opponent": round(recording.opponent.first().into_iter().chain(&recording.opponent).copied()),
         "step_s": time_s(1),
     });
     let page = Page {
-        recorded,
-        headline: recorded.headline(),
-        losses: recorded.losses(),
-        duration_s: format!("{:.2}", time_s(recorded.puck.len() - 1)),
-        table: table_view::svg(recorded, WIDTH_PX, "id=\"table\""),
-        plots: plots::draw(recorded, WIDTH_PX)?,
+        recording,
+        headline: recording.headline(),
+        losses: recording.losses(),
+        duration_s: format!("{:.2}", time_s(recording.puck.len() - 1)),
+        table: table_view::svg(recording, WIDTH_PX, "id=\"table\""),
+        plots: plots::draw(recording, WIDTH_PX)?,
         motion: motion.to_string(),
-        last: recorded.puck.len() - 1,
+        last: recording.puck.len() - 1,
     };
     Ok(page.render()?)
 }
 
-/// The same as one picture.
-pub fn svg(recorded: &Recorded) -> anyhow::Result<String> {
-    let plots = plots::draw(recorded, WIDTH_PX)?;
-    let table = table_view::svg(recorded, WIDTH_PX, "y=\"58\"");
+/// The content of the page as one picture.
+pub fn svg(recording: &EpisodeRecording) -> anyhow::Result<String> {
+    let plots = plots::draw(recording, WIDTH_PX)?;
+    let table = table_view::svg(recording, WIDTH_PX, "y=\"58\"");
     let table_px = f64::from(WIDTH_PX) * 0.55;
     let plots_top = 58.0 + table_px;
     let placed = plots
@@ -60,21 +60,21 @@ pub fn svg(recorded: &Recorded) -> anyhow::Result<String> {
          <text x=\"8\" y=\"24\" font-size=\"18\">{}</text>\n<text x=\"8\" y=\"46\" font-size=\"13\">{}</text>\n\
          {table}{placed}</svg>\n",
         plots_top + f64::from(plots.height_px),
-        escaped(&recorded.headline()),
-        escaped(&recorded.why),
+        escape(&recording.headline()),
+        escape(&recording.end_reason),
     ))
 }
 
-fn escaped(text: &str) -> String {
-    harmless(text)
+fn escape(text: &str) -> String {
+    escape_unprintable(text)
         .replace('&', "&amp;")
         .replace('<', "&lt;")
         .replace('>', "&gt;")
 }
 
-/// Tenths of a millimetre are enough for a picture.
-fn rounded(places: impl Iterator<Item = [f64; 2]>) -> Vec<[f64; 2]> {
-    places
-        .map(|place| place.map(|metres| (metres * 1e4).round() / 1e4))
+/// Rounds to tenths of a millimetre, which is enough for a picture.
+fn round(positions: impl Iterator<Item = [f64; 2]>) -> Vec<[f64; 2]> {
+    positions
+    .map(|position| position.map(|metres| (metres * 1e4).round() / 1e4))
         .collect()
 }

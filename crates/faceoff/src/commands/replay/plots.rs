@@ -1,17 +1,17 @@
-use super::recorded::{CONSTRAINTS, Recorded, time_s};
+use super::recording::{CONSTRAINTS, EpisodeRecording, time_s};
 use faceoff_scoring::COMPUTATION_TIME_LIMITS_S;
 use faceoff_sim::model::LIMIT_FRACTION;
 use plotters::prelude::*;
 use std::ops::Range;
 
-/// Left and right of the time axis, px.
+/// Space for labels left of the plot, px.
 const LABELS_PX: u32 = 56;
 const MARGIN_PX: u32 = 8;
-/// Beside the plots: what the lines are.
+/// Space for the legend right of the plot, px.
 const LEGEND_PX: u32 = 150;
 const CHART_PX: u32 = 150;
 
-/// One colour per line, told apart by colour-blind readers too (Okabe and Ito's).
+/// One colour per line, the palette of Okabe and Ito, which colour-blind readers can distinguish.
 const COLOURS: [RGBColor; 7] = [
     RGBColor(0, 114, 178),
     RGBColor(213, 94, 0),
@@ -25,9 +25,9 @@ const COLOURS: [RGBColor; 7] = [
 struct Chart {
     caption: String,
     lines: Vec<Line>,
-    /// Values that must not be passed.
+    /// Limits, drawn as red lines.
     bounds: Vec<f64>,
-    /// The values that are shown, unless they are all within.
+    /// The plot shows at most this range of values.
     window: Range<f64>,
 }
 
@@ -37,18 +37,17 @@ struct Line {
     dots: bool,
 }
 
-/// All plots of an episode below each other.
+/// All plots of an episode, one below the other.
 pub struct Plots {
     pub svg: String,
     pub height_px: u32,
-    /// Where the time axis begins and ends, px from the left.
+    /// Start and end of the time axis, px from the left.
     pub axis_px: [i32; 2],
 }
 
-/// Draws them as wide as asked for.
-pub fn draw(recorded: &Recorded, width_px: u32) -> anyhow::Result<Plots> {
-    let charts = charts(recorded);
-    let end_s = time_s(recorded.puck.len().max(2) - 1);
+pub fn draw(recording: &EpisodeRecording, width_px: u32) -> anyhow::Result<Plots> {
+    let charts = charts(recording);
+    let end_s = time_s(recording.puck.len().max(2) - 1);
     let height_px = CHART_PX * u32::try_from(charts.len())?;
     let mut svg = String::new();
     let mut axis_px = [0, 0];
@@ -66,18 +65,18 @@ pub fn draw(recorded: &Recorded, width_px: u32) -> anyhow::Result<Plots> {
     })
 }
 
-fn charts(recorded: &Recorded) -> Vec<Chart> {
+fn charts(recording: &EpisodeRecording) -> Vec<Chart> {
     let puck = |axis: usize, name: &str| Chart {
         caption: format!("puck {name} (m), table frame: true and observed"),
         lines: vec![
-            Line::from_start("observed", recorded.seen.iter().map(|at| at[axis])).dotted(),
-            Line::from_start("true", recorded.puck.iter().map(|at| at[axis])),
+            Line::from_start("observed", recording.seen.iter().map(|position| position[axis])).dotted(),
+            Line::from_start("true", recording.puck.iter().map(|position| position[axis])),
         ],
         bounds: Vec::new(),
         window: f64::MIN..f64::MAX,
     };
     let constraint = |group: usize, scale: f64| {
-        let values = recorded
+        let values = recording
             .constraints
             .iter()
             .map(move |values| scale * values[group]);
@@ -89,18 +88,18 @@ fn charts(recorded: &Recorded) -> Vec<Chart> {
         Chart {
             caption: "mallet (m), table frame".to_owned(),
             lines: vec![
-                Line::from_start("x", recorded.mallet.iter().map(|at| at[0])),
-                Line::from_start("y", recorded.mallet.iter().map(|at| at[1])),
+                Line::from_start("x", recording.mallet.iter().map(|position| position[0])),
+                Line::from_start("y", recording.mallet.iter().map(|position| position[1])),
             ],
             bounds: Vec::new(),
             window: f64::MIN..f64::MAX,
         },
         Chart {
-            caption: "joint speeds, % of their limits (95 % may not be passed, filtered)"
+            caption: "joint speeds, % of their limits (filtered; at most 95 % allowed)"
                 .to_owned(),
             lines: (0..7)
                 .map(|joint| {
-                    let shares = recorded
+                    let shares = recording
                         .speed_share
                         .iter()
                         .map(|share| 100.0 * share[joint]);
@@ -111,22 +110,22 @@ fn charts(recorded: &Recorded) -> Vec<Chart> {
             window: -120.0..120.0,
         },
         Chart {
-            caption: "constraints (mm): broken above 0".to_owned(),
+            caption: "constraints (mm): violated above 0".to_owned(),
             lines: vec![constraint(2, 1e3), constraint(3, 1e3)],
             bounds: vec![0.0],
             window: -60.0..40.0,
         },
         Chart {
-            caption: "constraints (rad, rad/s): broken above 0".to_owned(),
+            caption: "constraints (rad, rad/s): violated above 0".to_owned(),
             lines: vec![constraint(0, 1.0), constraint(1, 1.0)],
             bounds: vec![0.0],
             window: -1.5..0.5,
         },
         Chart {
-            caption: "computation time (ms): points from 20 ms on".to_owned(),
+            caption: "computation time (ms): penalty from 20 ms".to_owned(),
             lines: vec![Line::after_steps(
-                "of a step",
-                recorded.computation_time_s.iter().map(|s| 1e3 * s),
+                "per step",
+                recording.computation_time_s.iter().map(|s| 1e3 * s),
             )],
             bounds: vec![1e3 * COMPUTATION_TIME_LIMITS_S[0]],
             window: 0.0..f64::MAX,
@@ -135,7 +134,7 @@ fn charts(recorded: &Recorded) -> Vec<Chart> {
 }
 
 impl Line {
-    /// Values after 0, 1, 2 … steps.
+    /// A line through values after 0, 1, 2 … steps.
     fn from_start(name: &str, values: impl Iterator<Item = f64>) -> Self {
         Self {
             name: name.to_owned(),
@@ -147,7 +146,7 @@ impl Line {
         }
     }
 
-    /// Values after 1, 2, 3 … steps.
+    /// A line through values after 1, 2, 3 … steps.
     fn after_steps(name: &str, values: impl Iterator<Item = f64>) -> Self {
         let mut line = Self::from_start(name, values);
         for (time, _) in &mut line.points {
@@ -163,7 +162,7 @@ impl Line {
 }
 
 impl Chart {
-    /// The values that are shown.
+    /// The range of the value axis.
     fn range(&self) -> Range<f64> {
         let values = self
             .lines
@@ -225,7 +224,7 @@ impl Chart {
             }
         }
         let (axis, _) = chart.plotting_area().get_pixel_range();
-        // Beside the plot, where the library's own legend does not go: it would hide the episode's end.
+        // The library can only place a legend inside the plot, where it would hide the end of the episode.
         let mut y = 14;
         for (line, colour) in self.lines.iter().zip(COLOURS) {
             let colour = if line.dots { BLACK } else { colour };

@@ -1,4 +1,4 @@
-use super::recorded::{CONSTRAINTS, Recorded};
+use super::recording::{CONSTRAINTS, EpisodeRecording};
 use faceoff_sim::{
     episode::task::{PLAYABLE_Y_M, TASK_RULES},
     model::TOOL,
@@ -7,12 +7,12 @@ use faceoff_sim::{
 use faceoff_types::Task;
 use std::fmt::Write;
 
-/// What is shown around the table, m.
+/// Visible margin around the table, m.
 const MARGIN_M: f64 = 0.07;
 
-/// The table from above as SVG, the opponent's goal on the right: paths, the last places, and marks where constraints
-/// were broken first. Elements with an id are what a script may move.
-pub fn svg(recorded: &Recorded, width_px: u32, attributes: &str) -> String {
+/// The table from above as SVG, with the opponent's goal on the right: paths, final positions, and marks of the first
+/// constraint violations. The script animates elements with an id.
+pub fn svg(recording: &EpisodeRecording, width_px: u32, attributes: &str) -> String {
     let (half_length, half_width) = (TABLE.half_length_m(), TABLE.half_width_m());
     let (left, top) = (-half_length - MARGIN_M, -half_width - MARGIN_M);
     let (width, height) = (-2.0 * left, -2.0 * top);
@@ -34,56 +34,56 @@ pub fn svg(recorded: &Recorded, width_px: u32, attributes: &str) -> String {
             -goal
         );
     }
-    out += &aim(recorded.outcome.task);
-    let puck: Vec<[f64; 2]> = recorded.puck.iter().map(|[x, y, _]| [*x, *y]).collect();
+    out += &target_zone(recording.outcome.task);
+    let puck: Vec<[f64; 2]> = recording.puck.iter().map(|[x, y, _]| [*x, *y]).collect();
     out += &path(
-        &recorded.opponent,
+        &recording.opponent,
         "#b98a3a",
         "stroke-dasharray=\"0.006 0.006\"",
     );
-    out += &path(&recorded.mallet, "#2a6fb0", "");
+    out += &path(&recording.mallet, "#2a6fb0", "");
     out += &path(&puck, "#c0392b", "");
-    for [x, y] in &recorded.seen {
+    for [x, y] in &recording.seen {
         out += &format!("<circle cx=\"{x:.4}\" cy=\"{y:.4}\" r=\"0.003\" fill=\"#888\"/>\n");
     }
     for (group, (name, ..)) in CONSTRAINTS.iter().enumerate() {
-        if let Some([x, y]) = recorded
-            .first_broken(group)
-            .and_then(|k| recorded.mallet.get(k))
+        if let Some([x, y]) = recording
+            .first_violation(group)
+            .and_then(|k| recording.mallet.get(k))
         {
             out += &format!(
                 "<path d=\"M{:.4} {:.4}l0.03 0.03m0 -0.03l-0.03 0.03\" stroke=\"#e00\" stroke-width=\"0.007\">\
-                 <title>{name} limit broken first</title></path>\n",
+                 <title>first violation of the {name} limit</title></path>\n",
                 x - 0.015,
                 y - 0.015
             );
         }
     }
     let (puck_r, mallet_r) = (PUCK.radius_m, TOOL.cylinder_radius_m);
-    if let Some([x, y, _]) = recorded.puck.first() {
+    if let Some([x, y, _]) = recording.puck.first() {
         out += &format!(
             "<circle cx=\"{x:.4}\" cy=\"{y:.4}\" r=\"{puck_r}\" stroke=\"#c0392b\" stroke-dasharray=\"0.01 0.008\"/>\n"
         );
     }
-    if let Some([x, y]) = recorded.opponent.last() {
+    if let Some([x, y]) = recording.opponent.last() {
         out += &disc("opponent", *x, *y, mallet_r, "#e8c27c");
     }
-    if let Some([x, y]) = recorded.mallet.last() {
+    if let Some([x, y]) = recording.mallet.last() {
         out += &disc("mallet", *x, *y, mallet_r, "#7fb2e0");
     }
-    if let Some([x, y]) = recorded.seen.last() {
+    if let Some([x, y]) = recording.seen.last() {
         out += &format!(
             "<circle id=\"seen\" cx=\"{x:.4}\" cy=\"{y:.4}\" r=\"{puck_r}\" stroke=\"#777\"/>\n"
         );
     }
-    if let Some([x, y, _]) = recorded.puck.last() {
+    if let Some([x, y, _]) = recording.puck.last() {
         out += &disc("puck", *x, *y, puck_r, "#e06a5c");
     }
     out + "</g>\n</svg>\n"
 }
 
-/// Where the puck should end.
-fn aim(task: Task) -> String {
+/// The zone in which the puck should end.
+fn target_zone(task: Task) -> String {
     let half_width = match task {
         Task::Hit => return String::new(),
         Task::Defend => TABLE.half_width_m(),
@@ -91,7 +91,7 @@ fn aim(task: Task) -> String {
     };
     let [from, to] = TASK_RULES.success_x_m;
     format!(
-        "<rect x=\"{from}\" y=\"{}\" width=\"{}\" height=\"{}\" fill=\"#dff0dc\"><title>here the puck counts</title></rect>\n",
+        "<rect x=\"{from}\" y=\"{}\" width=\"{}\" height=\"{}\" fill=\"#dff0dc\"><title>target zone of the puck</title></rect>\n",
         -half_width,
         to - from,
         2.0 * half_width

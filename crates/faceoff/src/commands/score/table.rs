@@ -1,9 +1,9 @@
-//! A tournament as tables for a terminal.
+//! Tables of a tournament.
 
-use super::scored::ScoredTournament;
+use super::scored_tournament::ScoredTournament;
 use anyhow::Context as _;
 use faceoff_scoring::tournament::{
-    HeadToHead, LeftAs, ScoredGame, Standing,
+    HeadToHead, DepartureKind, ScoredGame, StandingsRow,
     rating::{Pool, Ratings},
 };
 use std::{fmt::Write as _, io::Write};
@@ -15,17 +15,17 @@ pub fn write(out: &mut impl Write, scored: &ScoredTournament) -> anyhow::Result<
     out.write_all(text.as_bytes()).context("standard output")
 }
 
-pub(in crate::commands) fn of_standings(rows: &[Standing]) -> String {
+pub(in crate::commands) fn standings_table(rows: &[StandingsRow]) -> String {
     let mut out = String::new();
     standings(&mut out, rows).expect("writing to memory cannot fail");
     out
 }
 
-/// How strong submissions are, and each two teams' record.
-pub(in crate::commands) fn strengths(of: &Ratings, records: &[HeadToHead]) -> String {
+/// Head-to-head records and ratings.
+pub(in crate::commands) fn ratings_text(rated: &Ratings, records: &[HeadToHead]) -> String {
     let mut out = String::new();
     self::records(&mut out, records)
-        .and_then(|()| ratings(&mut out, of))
+        .and_then(|()| ratings(&mut out, rated))
         .expect("writing to memory cannot fail");
     out.trim().to_owned()
 }
@@ -40,7 +40,7 @@ fn tables(out: &mut String, scored: &ScoredTournament) -> std::fmt::Result {
     Ok(())
 }
 
-/// The width of the longest of these, at least that of the heading.
+/// The width of a column.
 fn width<'a>(heading: &str, cells: impl Iterator<Item = &'a str>) -> usize {
     cells
         .map(|cell| cell.chars().count())
@@ -57,9 +57,9 @@ fn games(out: &mut String, games: &[ScoredGame]) -> std::fmt::Result {
     let winner = width("winner", teams(0).chain(teams(1)));
     writeln!(
         out,
-        "{:>5}  {:<home$}  {:<away$}  {:>7}  {:>7}  {:>7}  {:>15}  {:<winner$}  why",
+        "{:>5}  {:<home$}  {:<away$}  {:>7}  {:>7}  {:>7}  {:>15}  {:<winner$}  reason",
         "round", "home", "away", "score", "goals", "fouls", "penalty points", "winner"
-    )?;
+        )?;
     for game in games {
         let [first, second] = game.teams();
         let points = game.penalty_points().map(|points| format!("{points:.1}"));
@@ -74,7 +74,7 @@ fn games(out: &mut String, games: &[ScoredGame]) -> std::fmt::Result {
             game.winner.as_ref().map_or("draw", |team| team.as_str()),
             game.result
         )?;
-        match &game.taken_out_by {
+        match &game.excluded_by {
             Some(team) => writeln!(out, " (does not count: {team} left)")?,
             None => writeln!(out)?,
         }
@@ -82,7 +82,7 @@ fn games(out: &mut String, games: &[ScoredGame]) -> std::fmt::Result {
     Ok(())
 }
 
-fn standings(out: &mut String, standings: &[Standing]) -> std::fmt::Result {
+fn standings(out: &mut String, standings: &[StandingsRow]) -> std::fmt::Result {
     let names = standings.iter().map(|row| row.team.as_str());
     let team = width("team", names);
     writeln!(
@@ -105,9 +105,9 @@ fn standings(out: &mut String, standings: &[Standing]) -> std::fmt::Result {
             row.penalty_points,
             rounds.join(" + ")
         )?;
-        match row.left {
-            Some(LeftAs::Withdrawn) => writeln!(out, " (withdrawn)")?,
-            Some(LeftAs::Disqualified) => writeln!(out, " (disqualified)")?,
+        match row.departure {
+            Some(DepartureKind::Withdrawn) => writeln!(out, " (withdrawn)")?,
+            Some(DepartureKind::Disqualified) => writeln!(out, " (disqualified)")?,
             None => writeln!(out)?,
         }
     }
@@ -147,7 +147,7 @@ fn ratings(out: &mut String, ratings: &Ratings) -> std::fmt::Result {
             if pools.len() > 1 {
                 write!(
                     out,
-                    ", pool {number} of {}, which never met the others",
+                    ", pool {number} of {} (the pools have no games against each other)",
                     pools.len()
                 )?;
             }
@@ -157,7 +157,7 @@ fn ratings(out: &mut String, ratings: &Ratings) -> std::fmt::Result {
     }
     writeln!(
         out,
-        "\nBradley-Terry, 400 points more are odds of 10 to 1; prior {} ± {}; interval: bootstrap over games, {} samples",
+        "\nBradley-Terry, a difference of 400 points means odds of 10 to 1; prior {} ± {}; interval: bootstrap over games, {} samples",
         ratings.prior.mean, ratings.prior.sd, ratings.resamples
     )
 }

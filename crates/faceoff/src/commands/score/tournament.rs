@@ -1,10 +1,10 @@
-//! A tournament from its games: results and why, standings, records of two teams, ratings.
+//! Scores a tournament from its games: results with reasons, standings, head-to-head records and ratings.
 
-use super::{lines::write_line, scored::ScoredTournament, table};
+use super::{lines::write_line, scored_tournament::ScoredTournament, table};
 use anyhow::ensure;
 use clap::Args;
 use faceoff_scoring::tournament::{
-    Bye, Departure, Departures, LeftAs, PlayedGame, RoundNumber, head_to_head,
+    Bye, Departure, Departures, DepartureKind, PlayedGame, RoundNumber, head_to_head,
     rating::{RatingError, rate},
     score_tournament_with,
 };
@@ -16,19 +16,19 @@ use std::{
 
 #[derive(Debug, Clone, Default, Args)]
 pub struct TournamentArgs {
-    /// A team that withdrew, and the round from which its games do not count: that under way, or the next
+    /// A team that withdrew, and the first round whose games do not count: the running round, or the next
     #[arg(long, value_name = "TEAM=ROUND")]
     withdrawn: Vec<TeamAndRound>,
-    /// A disqualified team, and the round from which its games do not count; it stands below all others
+    /// A disqualified team, and the first round whose games do not count; the team is ranked below all others
     #[arg(long, value_name = "TEAM=ROUND")]
     disqualified: Vec<TeamAndRound>,
-    /// A round in which a team had no opponent and got the points of a win for it, as Swiss tournaments give them
+    /// A round in which a team had a bye, which counts as a win, as in Swiss tournaments
     #[arg(long = "bye", value_name = "TEAM=ROUND")]
     byes: Vec<TeamAndRound>,
-    /// Print JSON; so it is anyway where standard output is no terminal
+    /// Print JSON [default if standard output is not a terminal]
     #[arg(long, conflicts_with = "table")]
     json: bool,
-    /// Print tables for people; so it is anyway on a terminal
+    /// Print tables [default if standard output is a terminal]
     #[arg(long)]
     table: bool,
 }
@@ -42,7 +42,7 @@ struct TeamAndRound {
 impl FromStr for TeamAndRound {
     type Err = String;
     fn from_str(s: &str) -> Result<Self, String> {
-        // No team's name has an equals sign.
+        // Names of teams have no equals sign.
         let (team, round) = s
             .split_once('=')
             .ok_or("expected a team and a round, as in \"AJoy=2\"")?;
@@ -57,10 +57,10 @@ impl FromStr for TeamAndRound {
 }
 
 impl TournamentArgs {
-    /// Scores the games and prints all of it.
+    /// Scores the games and prints the results.
     ///
     /// # Errors
-    /// If a team leaves twice or never played, if games that say so are no mirrored pair, or if writing fails.
+    /// If a team leaves twice or has no game, a mirrored pair is invalid, or writing fails.
     pub fn score(
         self,
         games: &[PlayedGame],
@@ -109,18 +109,18 @@ impl TournamentArgs {
         let list = |teams: Vec<TeamAndRound>, left_as| {
             teams.into_iter().map(move |left| Departure {
                 team: left.team,
-                left_as,
+                kind: left_as,
                 from_round: left.round,
             })
         };
         let departures = Departures::new(
-            list(self.withdrawn, LeftAs::Withdrawn)
-                .chain(list(self.disqualified, LeftAs::Disqualified)),
+            list(self.withdrawn, DepartureKind::Withdrawn)
+                .chain(list(self.disqualified, DepartureKind::Disqualified)),
         )?;
         for team in departures.teams() {
             ensure!(
                 games.iter().any(|game| game.teams().contains(&team)),
-                "{team} is said to have left, but is in no game; check the name"
+                "{team} is named as withdrawn or disqualified, but has no game; check the name"
             );
         }
         Ok(departures)
@@ -169,7 +169,7 @@ mod tests {
     }
 
     #[test]
-    fn the_tables_tell_why_and_what_does_not_count() {
+    fn tables_show_reasons_and_games_that_do_not_count() {
         let mut unfinished = game(2, "Ajax", "Zed", [3, 4]);
         unfinished["submissions"] = json!(["v1", "v2"]);
         let input = json!([game(1, "Zed", "Ajax", [0, 2]), unfinished]);
@@ -182,7 +182,7 @@ mod tests {
         let words = |line: usize| lines[line].join(" ");
         assert_eq!(
             words(0),
-            "round home away score goals fouls penalty points winner why"
+            "round home away score goals fouls penalty points winner reason"
         );
         assert_eq!(
             words(1),
@@ -201,7 +201,7 @@ mod tests {
     }
 
     #[test]
-    fn submissions_are_rated_apart_and_open_ends_are_said() {
+    fn submissions_are_rated_separately() {
         let labelled = |round, goals: [u32; 2], label: &str| {
             json!({"round": round, "home": "Ajax", "away": "Zed", "goals": goals, "fouls": [0, 0],
                    "penalty_points": [0, 0], "submissions": [label, label]})
@@ -213,7 +213,7 @@ mod tests {
         ]);
         let (out, _) = printed(table(&[], &[]), &input).unwrap();
         assert!(
-            out.contains("ratings by results, pool 1 of 2, which never met the others"),
+            out.contains("ratings by results, pool 1 of 2 (the pools have no games against each other)"),
             "{out}"
         );
         let row = out
@@ -227,16 +227,16 @@ mod tests {
     }
 
     #[test]
-    fn a_disqualified_team_stands_last() {
+    fn disqualified_team_is_ranked_last() {
         let input = json!([game(1, "Zed", "Ajax", [0, 2])]);
         let (out, _) = printed(table(&[], &["Zed=2"]), &input).unwrap();
-        let place = |words: &str| out.find(words).unwrap();
-        assert!(place("   1  Ajax") < place("   2  Zed "), "{out}");
+        let position = |text: &str| out.find(text).unwrap();
+        assert!(position("   1  Ajax") < position("   2  Zed "), "{out}");
         assert!(out.contains("(disqualified)"), "{out}");
     }
 
     #[test]
-    fn who_leaves_is_named_with_its_round_and_has_played() {
+    fn departure_without_team_or_round_is_refused() {
         for (text, expected) in [
             ("Zed", "expected a team and a round, as in \"AJoy=2\""),
             ("Zed=two", "round: expected a number, got \"two\""),
@@ -252,16 +252,16 @@ mod tests {
         let error = |args| format!("{:#}", printed(args, &input).unwrap_err());
         assert_eq!(
             error(table(&["Zde=1"], &[])),
-            "Zde is said to have left, but is in no game; check the name"
+            "Zde is named as withdrawn or disqualified, but has no game; check the name"
         );
         assert_eq!(
             error(table(&["Zed=1"], &["Zed=2"])),
-            "Zed is said to leave twice; keep the one that counts"
+            "Zed has two departures; keep the one that counts"
         );
     }
 
     #[test]
-    fn a_field_that_is_too_large_to_rate_is_scored_all_the_same() {
+    fn large_field_is_scored_without_ratings() {
         let chain: Vec<Value> = (0..200)
             .map(|n| game(1, &format!("T{n}"), &format!("T{}", n + 1), [1, 0]))
             .collect();
@@ -276,7 +276,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_mirrored_pair_prints_nothing() {
+    fn invalid_mirrored_pair_is_refused() {
         let mut half = game(1, "Zed", "Ajax", [0, 2]);
         half["pair"] = json!(1);
         let error = printed(TournamentArgs::JSON, &json!([half, half])).unwrap_err();

@@ -1,7 +1,7 @@
-//! What other machines are given.
+//! Configuration of remote workers.
 
 use crate::{
-    commands::{files_client::bucket_client, introduction::introduction},
+    commands::{files_client::bucket_client, capabilities::own_capabilities},
     config::Config,
 };
 use faceoff_http::LinkKey;
@@ -9,8 +9,8 @@ use faceoff_runner::AgentEnvironment;
 use faceoff_worker::{BucketConfig, RemoteConfig};
 use std::net::SocketAddr;
 
-/// How work is given to other machines, if it is.
-pub(super) fn config(
+/// The settings of remote workers; `None` if NATS is not configured.
+pub(super) fn remote_config(
     config: &Config,
     listens_on: SocketAddr,
     link_key: &LinkKey,
@@ -19,7 +19,7 @@ pub(super) fn config(
     let Some(nats) = config.nats.connection() else {
         anyhow::ensure!(
             config.workers.play,
-            "workers.play is false and no nats.url is set: nobody would play"
+            "workers.play is false and nats.url is not set: no worker would run evaluations"
         );
         return Ok(None);
     };
@@ -35,10 +35,10 @@ pub(super) fn config(
     let files = files.or_else(|| config.server.public_url.clone());
     Ok(Some(RemoteConfig {
         nats,
-        files: files.unwrap_or_else(|| format!("http://{listens_on}")),
-        key: link_key.of_grants(),
+        files_url: files.unwrap_or_else(|| format!("http://{listens_on}")),
+        key: link_key.grant_key(),
         bucket,
         checked_episodes: config.workers.checked_episodes,
-        like: introduction(agent, config.slots())?,
+        required: own_capabilities(agent, config.slots())?,
     }))
 }

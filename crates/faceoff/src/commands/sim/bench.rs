@@ -1,4 +1,4 @@
-//! `faceoff sim bench`: how fast the simulator is on one core.
+//! `faceoff sim bench`: measures the speed of the simulator on one core.
 
 use anyhow::{Result, ensure};
 use clap::{Args, ValueEnum};
@@ -15,12 +15,12 @@ use std::{
     time::{Duration, Instant},
 };
 
-/// Measure the simulator on one core: controller, constraints and observation included.
+/// Measures the simulator on one core, including controller, constraints and observation.
 #[derive(Debug, Args)]
 pub struct BenchArgs {
     /// hit (two robots), defend, prepare, or tournament (two robots with an agent each).
     #[arg(long)]
-    task: Played,
+    task: BenchTask,
     /// Episodes of at most 500 control steps; in a tournament, windows of 500.
     #[arg(long, default_value_t = 20)]
     episodes: u32,
@@ -35,20 +35,19 @@ pub struct BenchArgs {
     json: bool,
 }
 
-/// How the agent that holds still speaks.
-const HOLDS: Interpolation = Interpolation::Cubic;
+/// Interpolation of the agent that holds still.
+const HOLD_INTERPOLATION: Interpolation = Interpolation::Cubic;
 
-/// What is played.
 #[derive(Debug, Clone, Copy, ValueEnum, Serialize)]
 #[serde(rename_all = "lowercase")]
-enum Played {
+enum BenchTask {
     Hit,
     Defend,
     Prepare,
     Tournament,
 }
 
-impl Played {
+impl BenchTask {
     fn name(self) -> &'static str {
         self.task().map_or("tournament", Task::as_str)
     }
@@ -65,7 +64,7 @@ impl Played {
 
 #[derive(Debug, Serialize)]
 struct Report {
-    task: Played,
+    task: BenchTask,
     profile: Profile,
     episodes: u32,
     control_steps: u64,
@@ -75,7 +74,7 @@ struct Report {
 }
 
 impl BenchArgs {
-    /// Plays the episodes with agents that hold still and prints the speed.
+    /// Runs the episodes with agents that hold still and prints the speed.
     pub fn run(self) -> Result<()> {
         ensure!(self.episodes > 0, "--episodes: expected at least 1, got 0");
         let (control_steps, time) = match self.task.task() {
@@ -112,12 +111,12 @@ impl BenchArgs {
 
     fn play_episodes(&self, task: Task) -> (u64, Duration) {
         let arena = Arena::new(self.profile, self.seed, self.seed.model_mismatch());
-        let hold = HOLDS.held(&INITIAL_Q);
-        let hold = &hold[..HOLDS.len()];
+        let hold = HOLD_INTERPOLATION.hold_position(&INITIAL_Q);
+        let hold = &hold[..HOLD_INTERPOLATION.len()];
         let (mut steps, mut time) = (0, Duration::ZERO);
         for index in 0..self.episodes {
             let start = Instant::now();
-            let mut episode = arena.episode(task, index, HOLDS);
+            let mut episode = arena.episode(task, index, HOLD_INTERPOLATION);
             while episode.step(black_box(hold)).end.is_none() {
                 black_box(episode.observation());
             }
@@ -130,14 +129,14 @@ impl BenchArgs {
     fn play_game(&self) -> (u64, Duration) {
         let (factors, settings) = (self.profile.factors(), PerturbationSettings::default());
         let setup = GameSetup {
-            interpolation: [HOLDS; 2],
+            interpolation: [HOLD_INTERPOLATION; 2],
             factors,
             plant: Plant::under(factors, &settings, self.seed.model_mismatch()),
             settings,
             seed: self.seed,
         };
-        let hold = HOLDS.held(&INITIAL_Q);
-        let hold = &hold[..HOLDS.len()];
+        let hold = HOLD_INTERPOLATION.hold_position(&INITIAL_Q);
+        let hold = &hold[..HOLD_INTERPOLATION.len()];
         let steps = u64::from(self.episodes) * u64::from(WINDOW_STEPS);
         let start = Instant::now();
         let mut game = Game::new(setup);

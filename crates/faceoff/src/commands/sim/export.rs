@@ -1,20 +1,20 @@
-//! `faceoff sim export`: the ideal model for other programs.
+//! `faceoff sim export`: writes the ideal model for other programs.
 
 use anyhow::{Context as _, Result, ensure};
 use clap::{Args, ValueEnum};
 use faceoff_sim::export;
 use std::{io::Write as _, path::PathBuf};
 
-/// Write the ideal model of robot, table and puck for other programs.
+/// Writes the ideal model of robot, table and puck for other programs.
 #[derive(Debug, Args)]
 pub struct ExportArgs {
     /// urdf: the arm. mjcf: arm, table and puck. python: a module of the numbers. svg: a drawing.
     #[arg(long)]
     format: Format,
-    /// plant: what moves, with universal joint and mallet. controller: seven joints, no mallet.
+    /// plant: the simulated robot, with universal joint and mallet. controller: seven joints, no mallet.
     #[arg(long, default_value = "plant")]
     model: Model,
-    /// File to write; standard output where it is left out.
+    /// File to write [default: standard output].
     #[arg(long)]
     out: Option<PathBuf>,
 }
@@ -42,7 +42,7 @@ impl ExportArgs {
         };
         ensure!(
             self.model == Model::Plant || matches!(self.format, Format::Urdf | Format::Mjcf),
-            "--model controller: expected --format urdf or mjcf; the other formats tell of both models"
+            "--model controller: expected --format urdf or mjcf; the other formats contain both models"
         );
         let text = match self.format {
             Format::Urdf => export::urdf(model),

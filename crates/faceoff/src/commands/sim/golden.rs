@@ -1,10 +1,10 @@
-//! `faceoff sim golden`: whether this program has the ruleset's bits.
+//! `faceoff sim golden`: prints the golden hashes, which show whether this build reproduces the ruleset bit by bit.
 
 use anyhow::{Context as _, Result};
 use faceoff_sim::golden;
 use std::io::Write as _;
 
-/// Plays the golden episodes and games and prints a line for each: name and hash.
+/// Runs the golden episodes and games and prints name and hash of each.
 pub fn run() -> Result<()> {
     let mut out = std::io::stdout().lock();
     for golden in golden::all() {

@@ -1,4 +1,4 @@
-//! `faceoff sim kinematics`: positions, Jacobian and dynamics at given poses, for comparison with other programs.
+//! `faceoff sim kinematics`: computes positions, Jacobian and dynamics of poses, for comparison with other programs.
 
 use anyhow::{Context as _, Result, bail, ensure};
 use faceoff_sim::{
@@ -10,10 +10,10 @@ use faceoff_sim::{
 use serde::{Deserialize, Serialize};
 use std::io::{BufRead as _, IsTerminal as _, Read as _, Write};
 
-/// Angles and rates beyond this mean nothing.
+/// Largest accepted angle (rad) or rate (rad/s).
 const NUMBER_LIMIT: f64 = 1e4;
 
-/// A line of the input is at most this long: far more than two lists of nine numbers take.
+/// Longest line of the input, far longer than two lists of nine numbers.
 const LINE_LIMIT_BYTES: u64 = 64 << 10;
 
 /// One line of the input.
@@ -24,9 +24,9 @@ struct Pose {
     dq: Option<Vec<f64>>,
 }
 
-/// One line of the output; the robot's base frame. Matrices are lists of rows.
+/// One line of the output, in the robot's base frame. Matrices are lists of rows.
 #[derive(Debug, Serialize)]
-struct Answer {
+struct PoseModel {
     links: [[f64; 3]; JOINTS],
     rotations: [[f64; 9]; JOINTS],
     ee: [f64; 3],
@@ -55,7 +55,7 @@ struct Plant {
     bias: [f64; DOFS],
 }
 
-/// Reads poses from standard input and writes a line about each to standard output.
+/// Reads poses from standard input and writes one line per pose to standard output.
 pub fn run() -> Result<()> {
     let stdin = std::io::stdin();
     ensure!(
@@ -79,15 +79,15 @@ pub fn run() -> Result<()> {
             "line {number}: expected at most {LINE_LIMIT_BYTES} bytes"
         );
         if !line.trim().is_empty() {
-            let answer = read(&line).with_context(|| format!("line {number}"))?;
-            serde_json::to_writer(&mut out, &answer).map_err(std::io::Error::from)?;
+            let model = evaluate_line(&line).with_context(|| format!("line {number}"))?;
+            serde_json::to_writer(&mut out, &model).map_err(std::io::Error::from)?;
             out.write_all(b"\n")?;
         }
     }
     out.flush().context("standard output")
 }
 
-fn read(line: &str) -> Result<Answer> {
+fn evaluate_line(line: &str) -> Result<PoseModel> {
     let pose: Pose = serde_json::from_str(line)
         .context("expected a pose, as in {\"q\": [7 numbers], \"dq\": [7 numbers]}")?;
     let q = match joints("q", &pose.q)? {
@@ -105,7 +105,7 @@ fn read(line: &str) -> Result<Answer> {
         Some(Joints::Driven(driven)) => full(&driven),
         Some(Joints::All(dq)) => dq,
     };
-    Ok(answer(&q, &dq))
+    Ok(evaluate(&q, &dq))
 }
 
 enum Joints {
@@ -132,7 +132,7 @@ fn joints(field: &str, given: &[f64]) -> Result<Joints> {
     }
 }
 
-fn answer(q: &[f64; DOFS], dq: &[f64; DOFS]) -> Answer {
+fn evaluate(q: &[f64; DOFS], dq: &[f64; DOFS]) -> PoseModel {
     let kinematics = Kinematics::new(q);
     let ee = kinematics.end_effector.origin;
     let mut jacobian = [[0.0; JOINTS]; 6];
@@ -153,7 +153,7 @@ fn answer(q: &[f64; DOFS], dq: &[f64; DOFS]) -> Answer {
     let gravity = torques(&zero, &zero);
     let mut mass = [[0.0; JOINTS]; JOINTS];
     for joint in 0..JOINTS {
-        // The torques of a unit acceleration, less gravity, are a column.
+        // The torques of a unit acceleration minus gravity are one column.
         let mut unit = zero;
         unit[joint] = 1.0;
         let column = torques(&zero, &unit);
@@ -167,10 +167,10 @@ fn answer(q: &[f64; DOFS], dq: &[f64; DOFS]) -> Answer {
     let ConstraintValues {
         joint_pos,
         joint_vel,
-        ee: over_table,
+        ee: ee_constraint,
         link,
-    } = ConstraintValues::new(&positions, &driven, &kinematics);
-    Answer {
+        } = ConstraintValues::new(&positions, &driven, &kinematics);
+    PoseModel {
         links: kinematics.links.map(|link| link.origin.lane(0)),
         rotations: kinematics.links.map(|link| link.rotation(0)),
         ee: ee.lane(0),
@@ -181,9 +181,9 @@ fn answer(q: &[f64; DOFS], dq: &[f64; DOFS]) -> Answer {
         constraints: Constraints {
             joint_pos,
             joint_vel,
-            ee: over_table,
+            ee: ee_constraint,
             link,
-        },
+            },
         plant: Plant {
             q: *q,
             mallet: kinematics.cylinder_centre().lane(0),
@@ -199,7 +199,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn errors_name_the_field_and_what_was_expected() {
+    fn error_names_field_and_expectation() {
         for (line, expected) in [
             (
                 r#"{"q": [0, 0]}"#,
@@ -220,7 +220,7 @@ mod tests {
             ),
             ("[", "expected a pose"),
         ] {
-            let error = format!("{:#}", read(line).unwrap_err());
+            let error = format!("{:#}", evaluate_line(line).unwrap_err());
             assert!(error.contains(expected), "{line}: {error}");
         }
     }

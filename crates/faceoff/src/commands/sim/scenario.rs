@@ -1,4 +1,4 @@
-//! The scenario of `faceoff sim trace`, parsed once and checked field by field.
+//! The scenario of `faceoff sim trace`, parsed and checked field by field.
 
 use anyhow::{Context as _, Result, bail, ensure};
 use faceoff_sim::{Interpolation, JOINTS, MalletState, model::INITIAL_Q};
@@ -7,16 +7,16 @@ use serde::Deserialize;
 use serde_json::Value;
 use std::io::Read;
 
-/// A scenario file is at most this long: more than a whole game's trajectories at 1 kHz.
+/// Longest scenario file, longer than the trajectories of a whole game at 1 kHz.
 const INPUT_LIMIT_BYTES: u64 = 512 << 20;
 
-/// A scenario lasts at most this long: a game is 900 s.
+/// Longest scenario; a game takes 900 s.
 const DURATION_LIMIT_MS: u64 = 1_000_000;
 
-/// Numbers beyond this, in SI units, describe no air-hockey table.
+/// Largest accepted number, in SI units.
 const NUMBER_LIMIT: f64 = 1e4;
 
-/// What is written in the file.
+/// The fields of the file, before they are checked.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Raw {
@@ -35,11 +35,11 @@ struct Raw {
 
 #[derive(Debug)]
 pub struct Scenario {
-    /// Adds its opponent, terminations and success.
+    /// Adds the task's opponent, terminations and success.
     pub task: Option<Task>,
     /// Perturbations of the world.
     pub profile: Profile,
-    /// Evaluation seed and episode seed at once.
+    /// Used as evaluation seed and as episode seed.
     pub seed: Seed,
     /// [x, y, yaw, vx, vy, yaw rate].
     pub puck: [f64; 6],
@@ -49,11 +49,11 @@ pub struct Scenario {
     pub interpolation: Vec<Interpolation>,
     /// Per robot and control step, row-major.
     pub actions: Vec<Vec<Vec<f64>>>,
-    /// Robot 1's mallet per ms, where it is imposed.
+    /// Imposed mallet of robot 1, per ms.
     pub mallet: Vec<MalletState>,
-    /// ms.
+    /// Duration of the scenario, ms.
     pub duration_ms: u64,
-    /// ms between two lines.
+    /// Time between two lines of the output, ms.
     pub every_ms: u64,
 }
 
@@ -90,13 +90,13 @@ impl Scenario {
             (Some(task), Some(other)) => bail!("robots: expected 1 with task {task}, got {other}"),
             (None, Some(other)) => bail!("robots: expected 1 or 2, got {other}"),
         };
-        let own = if raw.task == Some(Task::Hit) {
+        let commanded = if raw.task == Some(Task::Hit) {
             1
         } else {
             robots
         };
         let joints = joints(raw.joints.unwrap_or_default(), robots)?;
-        let interpolation = interpolations(&raw.interpolation.unwrap_or_default(), own)?;
+        let interpolation = interpolations(&raw.interpolation.unwrap_or_default(), commanded)?;
         let actions = actions(&raw.actions.unwrap_or_default(), &interpolation)?;
         let mallet = raw
             .mallet
@@ -184,7 +184,7 @@ fn actions(given: &[Vec<Value>], interpolation: &[Interpolation]) -> Result<Vec<
             let shape = interpolation[robot].shape();
             let len = interpolation[robot].len();
             let mut flat = Vec::with_capacity(len);
-            // The recordings of REFERENCE.md write an action's rows one after the other.
+            // The recordings of REFERENCE.md concatenate the rows of an action.
             let in_rows = match action {
                 Value::Array(items) if items.len() == len => &[len][..],
                 _ => shape,
@@ -203,7 +203,7 @@ fn actions(given: &[Vec<Value>], interpolation: &[Interpolation]) -> Result<Vec<
 fn flatten(value: &Value, shape: &[usize], into: &mut Vec<f64>) -> Result<()> {
     match (value, shape) {
         (Value::Number(number), []) => {
-            into.push(number.as_f64().context("a number beyond what fits")?);
+            into.push(number.as_f64().context("a number that is too large")?);
             Ok(())
         }
         (Value::Array(items), [length, inner @ ..]) => {
@@ -228,7 +228,7 @@ fn numbers<const N: usize>(given: &[f64], field: impl Fn() -> String) -> Result<
 }
 
 fn check_finite(numbers: &[f64], field: impl Fn() -> String) -> Result<()> {
-    // Written so that a number that is none fails.
+    // NaN is refused, too.
     match numbers
         .iter()
         .find(|number| number.is_nan() || number.abs() > NUMBER_LIMIT)
@@ -263,7 +263,7 @@ mod tests {
     }
 
     #[test]
-    fn the_least_scenario_holds_one_robot() {
+    fn minimal_scenario_holds_one_robot() {
         let scenario =
             Scenario::read(r#"{"puck": [0, 0, 0, 1, 0, 0], "duration_ms": 10}"#.as_bytes())
                 .unwrap();
@@ -273,7 +273,7 @@ mod tests {
     }
 
     #[test]
-    fn an_actions_rows_may_be_joined() {
+    fn action_rows_may_be_concatenated() {
         let numbers: Vec<f64> = (0..14).map(f64::from).collect();
         let action = |action: Value| {
             let scenario = serde_json::json!({
@@ -288,7 +288,7 @@ mod tests {
     }
 
     #[test]
-    fn errors_name_the_field_and_what_was_expected() {
+    fn error_names_field_and_expectation() {
         let puck = r#""puck": [0, 0, 0, 0, 0, 0], "duration_ms": 10"#;
         for (json, expected) in [
             (

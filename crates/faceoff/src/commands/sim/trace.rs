@@ -12,7 +12,7 @@ use faceoff_types::EpisodeEnd;
 use serde::Serialize;
 use std::io::{IsTerminal as _, Write};
 
-/// One line: the state at a time. One entry per robot in each list.
+/// One line of the output: the state at one time. Each list has one entry per robot.
 #[derive(Debug, Serialize)]
 struct Line {
     t_ms: u64,
@@ -35,12 +35,12 @@ struct Constraints {
     link: f64,
 }
 
-/// The last line of a scenario with a task.
+/// The last line of the output of a scenario with a task.
 #[derive(Debug, Serialize)]
 struct Done {
     done: bool,
     steps: u32,
-    /// `null` where the scenario's time was over first.
+    /// `null` if the scenario's duration ended first.
     reason: Option<EpisodeEnd>,
     success: bool,
 }
@@ -68,7 +68,7 @@ fn trace(scenario: &Scenario, out: &mut impl Write) -> Result<()> {
     let mut steps = 0;
     let mut end = None;
     impose(&mut world, scenario, 0);
-    write(&world, 0, out)?;
+    write_state(&world, 0, out)?;
     for t_ms in 0..scenario.duration_ms {
         if t_ms % SUBSTEPS as u64 == 0 {
             let step = usize::try_from(t_ms).unwrap_or(usize::MAX) / SUBSTEPS;
@@ -89,7 +89,7 @@ fn trace(scenario: &Scenario, out: &mut impl Write) -> Result<()> {
         let t_ms = t_ms + 1;
         impose(&mut world, scenario, t_ms);
         if t_ms % scenario.every_ms == 0 {
-            write(&world, t_ms, out)?;
+            write_state(&world, t_ms, out)?;
         }
         if t_ms % SUBSTEPS as u64 == 0 {
             steps += 1;
@@ -103,8 +103,8 @@ fn trace(scenario: &Scenario, out: &mut impl Write) -> Result<()> {
     }
     if let Some(task) = scenario.task {
         let success = task::success(task, world.puck());
-        line(
-            &Done {
+        write_line(
+        &Done {
                 done: true,
                 steps,
                 reason: end,
@@ -122,18 +122,18 @@ fn impose(world: &mut World, scenario: &Scenario, t_ms: u64) {
         .ok()
         .and_then(|t| scenario.mallet.get(t))
         .copied();
-    let held = || {
+    let at_rest = || {
         scenario.mallet.last().map(|last| MalletState {
             velocity: [0.0; 2],
             ..*last
         })
     };
-    if let Some(mallet) = row.or_else(held) {
+    if let Some(mallet) = row.or_else(at_rest) {
         world.impose_mallet(Some(mallet));
     }
 }
 
-fn write(world: &World, t_ms: u64, out: &mut impl Write) -> Result<()> {
+fn write_state(world: &World, t_ms: u64, out: &mut impl Write) -> Result<()> {
     let robots = 0..world.robots();
     let mut state = Line {
         t_ms,
@@ -172,10 +172,10 @@ fn write(world: &World, t_ms: u64, out: &mut impl Write) -> Result<()> {
             link,
         });
     }
-    line(&state, out)
+    write_line(&state, out)
 }
 
-fn line(value: &impl Serialize, out: &mut impl Write) -> Result<()> {
+fn write_line(value: &impl Serialize, out: &mut impl Write) -> Result<()> {
     serde_json::to_writer(&mut *out, value).map_err(std::io::Error::from)?;
     out.write_all(b"\n")?;
     Ok(())

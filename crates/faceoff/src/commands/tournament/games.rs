@@ -1,20 +1,20 @@
-//! Games of the server in tables and lines.
+//! Text of games.
 
-use crate::commands::output::or_none;
+use crate::commands::output::lines_or;
 use faceoff_api::views::{
-    attempt::{AttemptEndView, AttemptView},
+    attempt::{AttemptOutcomeView, GameAttemptView},
     game::{GameStatus, GameView, PurposeView, TestGamesView},
 };
 
-/// Games, in a table.
-pub(in crate::commands) fn table(games: &[GameView]) -> String {
-    let wide = |side: usize| {
+/// Table of games.
+pub(in crate::commands) fn games_table(games: &[GameView]) -> String {
+    let width = |side: usize| {
         let lengths = games
             .iter()
             .map(|game| game.sides[side].team_name.as_str().chars().count());
         lengths.max().unwrap_or(0).max(4)
     };
-    let (home, away) = (wide(0), wide(1));
+    let (home, away) = (width(0), width(1));
     let mut lines: Vec<String> = games
         .iter()
         .map(|game| {
@@ -22,10 +22,10 @@ pub(in crate::commands) fn table(games: &[GameView]) -> String {
             format!(
                 "{}  {:<11}  {:<home$}  {:<away$}  {}",
                 game.id,
-                place(&game.purpose),
+                purpose_text(&game.purpose),
                 first.team_name,
                 second.team_name,
-                state(game)
+                state_text(game)
             )
         })
         .collect();
@@ -38,14 +38,14 @@ pub(in crate::commands) fn table(games: &[GameView]) -> String {
             ),
         );
     }
-    or_none(lines, "no game")
+    lines_or(lines, "no games")
 }
 
-/// What [`state`] prints of a game with a result.
-const COLUMNS: &str = "  score    goals    fouls   penalty points  winner and why";
+/// Headings of the columns that [`state_text`] prints for a game with a result.
+const COLUMNS: &str = "  score    goals    fouls   penalty points  winner and reason";
 
-/// Where it stands in the schedule, or what it is for.
-fn place(purpose: &PurposeView) -> String {
+/// Position of a game in the schedule, or its purpose.
+fn purpose_text(purpose: &PurposeView) -> String {
     match purpose {
         PurposeView::Round {
             round, matchday, ..
@@ -60,13 +60,13 @@ fn pair(numbers: [u32; 2]) -> String {
     format!("{}-{}", numbers[0], numbers[1])
 }
 
-fn state(game: &GameView) -> String {
+fn state_text(game: &GameView) -> String {
     let mut text = match &game.status {
         GameStatus::Queued => "queued".to_owned(),
         GameStatus::Running { attempt, .. } => format!("running, attempt {attempt}"),
-        GameStatus::Broken { reason, .. } => format!("broken by our fault: {reason}"),
+        GameStatus::Broken { reason, .. } => format!("platform fault: {reason}"),
         GameStatus::Void { reason, .. } => format!("void: {reason}"),
-        GameStatus::Cancelled { reason, .. } => format!("not played: {reason}"),
+        GameStatus::Cancelled { reason, .. } => format!("cancelled: {reason}"),
         GameStatus::Played { result, .. } => {
             let points = result.penalty_points.map(|points| format!("{points:.1}"));
             let winner = result.winner.as_ref();
@@ -87,10 +87,10 @@ fn state(game: &GameView) -> String {
     text
 }
 
-/// One game, in a few lines.
-pub(in crate::commands) fn whole(game: &GameView) -> String {
+/// A game in several lines.
+pub(in crate::commands) fn game_text(game: &GameView) -> String {
     let [home, away] = &game.sides;
-    let what = match &game.purpose {
+    let purpose = match &game.purpose {
         PurposeView::Round {
             round,
             matchday,
@@ -102,22 +102,22 @@ pub(in crate::commands) fn whole(game: &GameView) -> String {
             } else {
                 ""
             };
-            format!("round {round}, matchday {matchday}, meeting {meeting}{half}")
+            format!("round {round}, matchday {matchday}, pairing {meeting}{half}")
         }
         PurposeView::Test { .. } => {
-            "a test game against the baseline; it does not count".to_owned()
+            "test game against the baseline, does not count".to_owned()
         }
         PurposeView::Friendly { asked_by } => {
-            format!("a friendly game that {asked_by} asked for; it does not count")
+            format!("friendly game requested by {asked_by}, does not count")
         }
         PurposeView::Replay { replay, round, .. } => {
-            format!("of round {round}, played again (replay {replay}); it does not count")
+            format!("replay {replay} of round {round}, does not count")
         }
     };
     let mut lines = vec![
         format!("{} - {}", home.team_name, away.team_name),
         format!("  id        {}", game.id),
-        format!("  in        {}: {what}", game.tournament_name),
+        format!("  in        {}: {purpose}", game.tournament_name),
         format!("  home      submission {}", home.submission),
         format!("  away      submission {}", away.submission),
         format!("  seed      {}", game.seed_label),
@@ -129,26 +129,26 @@ pub(in crate::commands) fn whole(game: &GameView) -> String {
         }));
         lines.push(format!("            {COLUMNS}"));
     }
-    lines.push(format!("  stands    {}", state(game)));
+    lines.push(format!("  state     {}", state_text(game)));
     lines.push(format!("  next      {}", game.next));
     lines.join("\n")
 }
 
-/// What became of each time that a slot began a game.
-pub(in crate::commands) fn attempts(attempts: &[AttemptView]) -> String {
-    let line = |attempt: &AttemptView| {
+/// The attempts to run a game, one per line.
+pub(in crate::commands) fn attempts_text(attempts: &[GameAttemptView]) -> String {
+    let line = |attempt: &GameAttemptView| {
         let end = match (attempt.end, attempt.ended_at) {
             (Some(end), Some(at)) => {
-                let how = match end {
-                    AttemptEndView::Played => "played",
-                    AttemptEndView::Broken => "broken by our fault",
-                    AttemptEndView::GivenBack => "given back by its slot",
-                    AttemptEndView::Lost => "lost: its slot died",
-                    AttemptEndView::CalledOff => "called off",
+                let outcome = match end {
+                    AttemptOutcomeView::Played => "finished",
+                    AttemptOutcomeView::Broken => "platform fault",
+                    AttemptOutcomeView::GivenBack => "released by its slot",
+                    AttemptOutcomeView::Lost => "lost with its slot",
+                    AttemptOutcomeView::CalledOff => "cancelled",
                 };
-                format!("{how} {}", at.strftime("%Y-%m-%d %H:%M:%S UTC"))
+                format!("{outcome} {}", at.strftime("%Y-%m-%d %H:%M:%S UTC"))
             }
-            _ => "under way".to_owned(),
+            _ => "running".to_owned(),
         };
         let reason = match &attempt.reason {
             Some(reason) => format!(": {reason}"),
@@ -161,16 +161,16 @@ pub(in crate::commands) fn attempts(attempts: &[AttemptView]) -> String {
             attempt.worker
         )
     };
-    or_none(
+    lines_or(
         attempts.iter().map(line).collect(),
-        "no slot has begun it yet",
+        "no attempts yet",
     )
 }
 
-/// Test games that were queued, and teams without one.
-pub(in crate::commands) fn ordered(told: &TestGamesView) -> String {
-    let mut text = table(&told.ordered);
-    for team in &told.not_ordered {
+/// The requested test games, and the teams without one.
+pub(in crate::commands) fn requested_text(view: &TestGamesView) -> String {
+    let mut text = games_table(&view.ordered);
+    for team in &view.not_ordered {
         text.push_str(&format!("\n{}: none, {}", team.team_name, team.reason));
     }
     text

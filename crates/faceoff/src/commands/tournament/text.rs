@@ -1,29 +1,29 @@
-//! Tournaments in words.
+//! Text of tournaments.
 
-use crate::commands::{output::or_none, score::table};
+use crate::commands::{output::lines_or, score::table};
 use faceoff_api::views::{
-    certainty::CertaintyView,
+    champion_shares::ChampionSharesView,
     tournament::{EntrantView, RoundView, TournamentHead, TournamentPhase, TournamentView},
 };
-use faceoff_scoring::tournament::schedule::{Table, TableOf};
-use faceoff_types::{LeftAs, Publishes, RoundNumber, TournamentFormat, TournamentRules};
+use faceoff_scoring::tournament::schedule::{Table, TableScope};
+use faceoff_types::{DepartureKind, Publication, RoundNumber, TournamentFormat, TournamentRules};
 use jiff::Timestamp;
 
-pub(in crate::commands) fn list(tournaments: &[TournamentHead]) -> String {
+pub(in crate::commands) fn tournament_list(tournaments: &[TournamentHead]) -> String {
     let line =
-        |one: &TournamentHead| format!("{}  {}  {}: {}", one.id, one.name, phase(one), one.next);
-    or_none(
+        |head: &TournamentHead| format!("{}  {}  {}: {}", head.id, head.name, phase_text(head), head.next);
+    lines_or(
         tournaments.iter().map(line).collect(),
-        "no tournament yet; an organiser opens one: faceoff admin tournament open NAME",
+        "no tournaments yet; organisers open one with faceoff admin tournament open NAME",
     )
 }
 
-fn phase(head: &TournamentHead) -> String {
+fn phase_text(head: &TournamentHead) -> String {
     let phase = match head.phase {
         TournamentPhase::Open => "open",
-        TournamentPhase::Round => "a round is under way",
+        TournamentPhase::Round => "round running",
         TournamentPhase::Between => "between rounds",
-        TournamentPhase::Played => "all rounds are over",
+        TournamentPhase::Played => "all rounds finished",
         TournamentPhase::Closed => "closed",
     };
     let paused = match (&head.paused, head.phase) {
@@ -37,63 +37,63 @@ fn phase(head: &TournamentHead) -> String {
     format!("{phase}{paused}{champion}")
 }
 
-fn time(at: Timestamp) -> String {
+fn time_text(at: Timestamp) -> String {
     at.strftime("%Y-%m-%d %H:%M UTC").to_string()
 }
 
-/// All that is to be said of one.
-pub(in crate::commands) fn whole(tournament: &TournamentView) -> String {
+/// A tournament with rules, teams, rounds and standings.
+pub(in crate::commands) fn tournament_text(tournament: &TournamentView) -> String {
     let head = &tournament.head;
     let settings = &tournament.settings;
     let mut lines = vec![
-        format!("{} ({})", head.name, phase(head)),
+        format!("{} ({})", head.name, phase_text(head)),
         format!("  id        {}", head.id),
-        format!("  rules     {}", rules(&tournament.rules)),
+        format!("  rules     {}", rules_text(&tournament.rules)),
         format!(
-            "  beside    {} games a day that do not count for each team, recordings {}",
+            "  settings  up to {} friendly and test games per team and day; recordings {}",
             settings.free_games_per_day,
             match settings.publishes {
-                Publishes::Never => "not public",
-                Publishes::AtClose => "public when the tournament is closed",
-                Publishes::AtRelease => "public when their round is over",
+                Publication::Never => "not public",
+                Publication::AtClose => "public when the tournament is closed",
+                Publication::AtRelease => "public when their round has finished",
             }
         ),
         match tournament.baseline {
             Some(submission) => format!("  baseline  submission {submission}"),
-            None => "  baseline  none, so there are no test games".to_owned(),
+            None => "  baseline  none, so test games are not possible".to_owned(),
         },
     ];
     lines.extend(
         head.paused
             .as_ref()
-            .map(|paused| format!("  paused    since {}: {}", time(paused.at), paused.reason)),
+            .map(|paused| format!("  paused    since {}: {}", time_text(paused.at), paused.reason)),
     );
     if tournament.entrants.is_empty() {
-        lines.push("  teams     none: `faceoff admin tournament enter` takes them in".to_owned());
+        lines.push("  teams     none; enter them with `faceoff admin tournament enter`".to_owned());
     }
     for (number, entrant) in tournament.entrants.iter().enumerate() {
         let title = if number == 0 { "teams" } else { "" };
-        lines.push(format!("  {title:<8}  {}", self::entrant(entrant)));
+        lines.push(format!("  {title:<8}  {}", entrant_text(entrant)));
     }
-    lines.extend(tournament.rounds.iter().map(round));
+    lines.extend(tournament.rounds.iter().map(round_text));
     lines.push(format!("  next      {}", head.next));
     let tables = tournament.tables.iter();
     let tables: String = tables
         .filter(|table| !table.standings.is_empty())
-        .map(self::table)
+        .map(standings_text)
         .collect();
     lines.join("\n") + tables.trim_end()
 }
 
-fn rules(rules: &TournamentRules) -> String {
+fn rules_text(rules: &TournamentRules) -> String {
     let format = match &rules.format {
         TournamentFormat::RoundRobin { rounds } => {
-            format!("{}, in each everybody meets everybody", counted(*rounds))
+            format!("{}, round robin", round_count(*rounds))
         }
         TournamentFormat::Groups { groups, advance } => {
-            format!("{groups} groups, {advance} of each to the final round")
+            format!("{groups} groups, {advance} of each reach the final round")
         }
-        TournamentFormat::Swiss { rounds } => format!("{}, by the Swiss system", counted(*rounds)),
+        TournamentFormat::Swiss { rounds } => format!("{}, Swiss system", round_count(*rounds)),
     };
     let mirrored = if rules.mirrored {
         ", mirrored pairs"
@@ -101,59 +101,59 @@ fn rules(rules: &TournamentRules) -> String {
         ""
     };
     format!(
-        "{format}{mirrored}; {} control steps a game, {} ({})",
+        "{format}{mirrored}; {} control steps per game, {} ({})",
         rules.steps, rules.profile, rules.ruleset
     )
 }
 
-fn counted(rounds: RoundNumber) -> String {
+fn round_count(rounds: RoundNumber) -> String {
     match rounds.get() {
         1 => "one round".to_owned(),
-        many => format!("{many} rounds"),
+        count => format!("{count} rounds"),
     }
 }
 
-fn entrant(entrant: &EntrantView) -> String {
+fn entrant_text(entrant: &EntrantView) -> String {
     match &entrant.left {
         None => entrant.team_name.to_string(),
         Some(left) => {
-            let how = match left.r#as {
-                LeftAs::Withdrawn => "withdrawn",
-                LeftAs::Disqualified => "disqualified",
+            let kind = match left.r#as {
+                DepartureKind::Withdrawn => "withdrawn",
+                DepartureKind::Disqualified => "disqualified",
             };
             format!(
-                "{} ({how}, from round {} on: {})",
+                "{} ({kind} from round {}: {})",
                 entrant.team_name, left.from_round, left.reason
             )
         }
     }
 }
 
-/// A round in a line, or in a few.
-pub(in crate::commands) fn round(round: &RoundView) -> String {
+/// A round in one or several lines.
+pub(in crate::commands) fn round_text(round: &RoundView) -> String {
     let progress = &round.progress;
     let mut parts = vec![format!(
         "{} of {} games played",
         progress.played, progress.games
     )];
-    for (count, words) in [
+    for (count, state) in [
         (progress.running, "running"),
         (progress.queued, "queued"),
-        (progress.to_be_rerun, "void or broken, to be played again"),
-        (progress.cancelled, "not played"),
+        (progress.to_be_rerun, "to be repeated"),
+        (progress.cancelled, "cancelled"),
     ] {
         if count > 0 {
-            parts.push(format!("{count} {words}"));
+            parts.push(format!("{count} {state}"));
         }
     }
-    let over = match round.over_at {
-        Some(at) => format!(", over {}", time(at)),
+    let end = match round.over_at {
+        Some(at) => format!(", finished {}", time_text(at)),
         None => String::new(),
     };
     let mut text = format!(
-        "  round {:<3} started {}{over}: {}",
+        "  round {:<3} started {}{end}: {}",
         round.number.get(),
-        time(round.started_at),
+        time_text(round.started_at),
         parts.join(", ")
     );
     for (number, group) in (1..).zip(&round.groups) {
@@ -165,40 +165,40 @@ pub(in crate::commands) fn round(round: &RoundView) -> String {
     }
     for bye in &round.byes {
         text.push_str(&format!(
-            "\n            matchday {}: {} has nobody to play",
+            "\n            matchday {}: bye for {}",
             bye.matchday, bye.team_name
         ));
     }
     text
 }
 
-fn table(standings: &Table) -> String {
-    let of = match standings.of {
-        TableOf::Tournament => String::new(),
-        TableOf::Group(number) => format!("\n\ngroup {number}"),
-        TableOf::Final => "\n\nfinal".to_owned(),
+fn standings_text(standings: &Table) -> String {
+    let heading = match standings.scope {
+        TableScope::Tournament => String::new(),
+        TableScope::Group(number) => format!("\n\ngroup {number}"),
+        TableScope::Final => "\n\nfinal".to_owned(),
     };
-    format!("{of}\n{}", table::of_standings(&standings.standings))
+    format!("{heading}\n{}", table::standings_table(&standings.standings))
 }
 
-/// How sure the champion is.
-pub(in crate::commands) fn certainty(told: &CertaintyView) -> String {
-    if told.replays == 0 {
-        return "the schedule was not played again; an organiser has it: faceoff admin tournament replay TOURNAMENT TIMES"
+/// How often each team was champion in replays of the schedule.
+pub(in crate::commands) fn champion_shares_text(view: &ChampionSharesView) -> String {
+    if view.replays == 0 {
+        return "the schedule has not been replayed; organisers start replays with faceoff admin tournament replay TOURNAMENT TIMES"
             .to_owned();
     }
     let mut lines = vec![format!(
-        "played again {} times, {} of them to the end ({} of {} games){}",
-        told.replays,
-        told.complete,
-        told.games_played,
-        told.games,
-        match told.given_up {
+        "{} replays, {} of them complete ({} of {} games){}",
+        view.replays,
+        view.complete,
+        view.games_played,
+        view.games,
+        match view.given_up {
             0 => String::new(),
-            many => format!("; {many} were called off or broken"),
+            count => format!("; {count} cancelled or failed"),
         }
     )];
-    for share in &told.champions {
+    for share in &view.champions {
         let [low, high] = share.share_ci95;
         lines.push(format!(
             "{:<40} champion {:>4} times: {:>5.1} % (95 %: {:.1} to {:.1})",

@@ -5,7 +5,7 @@ use faceoff_dataset::{
     verify::{SeasonMismatch, VerifyError},
 };
 
-/// Why there is no "verified".
+/// Reason why a recording is not verified.
 #[derive(Debug, thiserror::Error)]
 pub(super) enum Failure {
     #[error(transparent)]
@@ -17,7 +17,7 @@ pub(super) enum Failure {
         hint: &'static str,
     },
     #[error("{0:#}")]
-    Here(anyhow::Error),
+    Local(anyhow::Error),
 }
 
 impl From<SeasonMismatch> for Failure {
@@ -39,19 +39,19 @@ impl Failure {
             | Self::Verify(
                 VerifyError::Differs(_) | VerifyError::Dataset(DatasetError::Altered(_)),
             ) => Exit::Failed,
-            Self::Verify(_) | Self::Here(_) => Exit::Misused,
+            Self::Verify(_) | Self::Local(_) => Exit::Misused,
         }
     }
 }
 
-/// Is the archive the one that was published?
+/// Checks that the archive has the published hash.
 pub(super) fn check_hash(
     expected: Option<&blake3::Hash>,
     found: Option<&str>,
 ) -> Result<(), Failure> {
     match (expected, found) {
-        (Some(_), None) => Err(Failure::Here(anyhow!(
-            "--blake3 is the hash of an archive, this is an unpacked folder; name dataset.zip or game.zip itself"
+        (Some(_), None) => Err(Failure::Local(anyhow!(
+            "--blake3 is the hash of an archive, but this is an unpacked folder; name dataset.zip or game.zip itself"
         ))),
         (Some(expected), Some(found)) if expected.to_hex().as_str() != found => {
             Err(Failure::from(DatasetError::Altered(format!(

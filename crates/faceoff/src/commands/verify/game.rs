@@ -1,4 +1,4 @@
-//! Verifying a game.
+//! Verification of games.
 
 use super::failure::{Failure, check_hash};
 use anyhow::Context;
@@ -12,7 +12,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 use std::{path::Path, time::Instant};
 
-/// What `--json` says of a verified game.
+/// Output of `--json` for a game.
 #[derive(Debug, Serialize)]
 pub(super) struct SimulatedGame {
     rallies: u32,
@@ -23,8 +23,8 @@ pub(super) struct SimulatedGame {
     result: GameScore,
 }
 
-/// Verifies with a progress bar on standard error, if that is a terminal; `blake3` is the published hash of
-/// the archive.
+/// Verifies a game, with a progress bar if standard error is a terminal. `blake3` is the published hash of the
+/// archive.
 pub(super) fn verify(path: &Path, blake3: Option<&blake3::Hash>) -> Result<SimulatedGame, Failure> {
     let recording = GameRecording::open(path)?;
     let archive = recording.archive()?.map(|digest| digest.blake3);
@@ -32,7 +32,7 @@ pub(super) fn verify(path: &Path, blake3: Option<&blake3::Hash>) -> Result<Simul
     let bar = ProgressBar::new(u64::from(recording.manifest().spec.steps)).with_style(
         ProgressStyle::with_template("{bar:40} {pos}/{len} steps, {per_sec}, {eta} left")
             .context("the progress bar's template")
-            .map_err(Failure::Here)?,
+            .map_err(Failure::Local)?,
     );
     let start = Instant::now();
     let verified = verify_game(&recording, &|steps| bar.inc(steps));
@@ -68,7 +68,7 @@ pub(super) fn describe(path: &Path, simulated: &SimulatedGame) -> String {
     } else {
         let limits = &result.limits;
         format!(
-            "; not by the rules' limits: answers took effect up to {} s, {} faults were allowed, and {} s in all",
+            "; with custom limits: answers accepted up to {} s, {} faults allowed, {} s in total",
             limits.in_time_s, limits.max_faults, limits.total_s
         )
     };
@@ -85,7 +85,7 @@ pub(super) fn describe(path: &Path, simulated: &SimulatedGame) -> String {
     )
 }
 
-/// What is asked of seasons cannot be asked of a game.
+/// Refuses `--secret` for a game.
 pub(super) fn refuse_season(has_secret: bool) -> Result<(), Failure> {
     if has_secret {
         return Err(Failure::from(DatasetError::Foreign(

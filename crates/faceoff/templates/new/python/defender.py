@@ -1,6 +1,6 @@
-"""Defends: meets the puck in front of the goal and gives way, so that it stays there. Change anything.
+"""Defends: meets the puck in front of the goal and retreats with it, so that it stops there.
 
-Positions are in the robot's own base frame: x grows towards the other goal; metres, radians, seconds.
+Positions are in the robot's base frame: x points towards the opponent's goal. Units: metres, radians, seconds.
 """
 
 import math
@@ -9,9 +9,9 @@ from mallet import Mallet
 from protocol import Agent, run
 from puck import Puck
 
-INCOMING = -0.3  # a puck with less vx comes at us, m/s
-MEET = 0.3  # how far in front of the goal line it is met, m
-GIVE_WAY = 0.31  # a mallet that retreats at this share of the puck's speed takes all of it away
+INCOMING_VX = -0.3  # a puck with a smaller vx is coming towards our goal, m/s
+MEET_DISTANCE = 0.3  # distance from the goal line at which the mallet meets the puck, m
+RETREAT_RATIO = 0.31  # a mallet that retreats at this fraction of the puck's speed stops it
 
 
 class Defender(Agent):
@@ -19,7 +19,7 @@ class Defender(Agent):
 
     def start(self) -> None:
         self.mallet, self.puck = Mallet(self.env), Puck(self.env)
-        self.contact = self.puck.radius + self.mallet.radius
+        self.contact_distance = self.puck.radius + self.mallet.radius
         self.started = False
 
     def reset(self) -> None:
@@ -33,16 +33,17 @@ class Defender(Agent):
             self.started = True
         puck.observe(*self.puck_state(observation))
 
-        if puck.vx > INCOMING:
-            # Nothing to do: wait in front of the goal, on the puck's side of it.
-            return mallet.go(mallet.goal + 0.14, max(-0.1, min(0.1, 0.3 * puck.y)), 1.0)
-        gap = math.hypot(puck.x - mallet.x, puck.y - mallet.y) - self.contact
+        if puck.vx > INCOMING_VX:
+            # The puck is no danger: wait in front of the goal, on the puck's side.
+            return mallet.move_to(mallet.goal + 0.14, max(-0.1, min(0.1, 0.3 * puck.y)), 1.0)
+        gap = math.hypot(puck.x - mallet.x, puck.y - mallet.y) - self.contact_distance
         if gap < 0.12 * puck.speed:
-            # It is about to touch: go back with it.
-            return mallet.move(GIVE_WAY * puck.vx, GIVE_WAY * puck.vy)
-        meet_x = min(mallet.goal + MEET, puck.x - self.contact)
-        _, meet_y, _, _ = puck.after((puck.x - self.contact - meet_x) / -puck.vx)
-        return mallet.go(meet_x, meet_y, 1.5)
+            # The contact is near: retreat in the puck's direction.
+            return mallet.move_at_velocity(RETREAT_RATIO * puck.vx, RETREAT_RATIO * puck.vy)
+        # Move to the point where the puck will be at the meeting distance.
+        meet_x = min(mallet.goal + MEET_DISTANCE, puck.x - self.contact_distance)
+        _, meet_y, _, _ = puck.predict((puck.x - self.contact_distance - meet_x) / -puck.vx)
+        return mallet.move_to(meet_x, meet_y, 1.5)
 
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
-"""Strikes the puck at the other goal: gets behind it, accelerates along a line, brakes. Change anything.
+"""Shoots the puck at the opponent's goal: moves behind the puck, accelerates along a line and brakes.
 
-Positions are in the robot's own base frame: x grows towards the other goal; metres, radians, seconds.
+Positions are in the robot's base frame: x points towards the opponent's goal. Units: metres, radians, seconds.
 """
 
 import math
@@ -9,9 +9,9 @@ from mallet import Mallet
 from protocol import Agent, run
 from puck import Puck
 
-STRIKE = 1.6  # speed of the mallet in a strike, m/s
-RUN_UP = 0.16  # and the way on which it gets there, m
-SLOW = 0.35  # a faster puck is waited for, m/s
+SHOT_SPEED = 1.6  # speed of the mallet in a shot, m/s
+RUN_UP = 0.16  # distance over which the mallet accelerates to that speed, m
+WAIT_SPEED = 0.35  # the agent waits while the puck is faster than this, m/s
 
 
 class Hitter(Agent):
@@ -19,14 +19,14 @@ class Hitter(Agent):
 
     def start(self) -> None:
         self.mallet, self.puck = Mallet(self.env), Puck(self.env)
-        self.contact = self.puck.radius + self.mallet.radius
-        self.other_goal = 2 * self.mallet.middle - self.mallet.goal
+        self.contact_distance = self.puck.radius + self.mallet.radius
+        self.opponent_goal = 2 * self.mallet.middle - self.mallet.goal
         self.started = False
 
     def reset(self) -> None:
         self.puck.reset()
         self.started = False
-        self.line: tuple[float, float, int] | None = None  # of a strike: direction, steps left
+        self.shot: tuple[float, float, int] | None = None  # direction and remaining steps of the current shot
 
     def act(self, observation: list[float]) -> list[list[float]]:
         mallet, puck = self.mallet, self.puck
@@ -35,47 +35,49 @@ class Hitter(Agent):
             self.started = True
         puck.observe(*self.puck_state(observation))
 
-        if self.line:
-            return self.strike(self.line)
-        if puck.speed > SLOW or puck.x > mallet.middle - 0.15:
-            return mallet.go(mallet.goal + 0.14, max(-0.1, min(0.1, 0.3 * puck.y)), 1.0)
-        # From behind the puck towards the middle of the goal, from as near to that line as the mallet gets.
-        way = math.hypot(self.other_goal - puck.x, puck.y)
-        back = self.contact + RUN_UP
-        start = mallet.inside(
-            puck.x - back * (self.other_goal - puck.x) / way, puck.y + back * puck.y / way
+        if self.shot:
+            return self.shoot(self.shot)
+        if puck.speed > WAIT_SPEED or puck.x > mallet.middle - 0.15:
+            # The puck is too fast or too far away: wait in front of the goal, on the puck's side.
+            return mallet.move_to(mallet.goal + 0.14, max(-0.1, min(0.1, 0.3 * puck.y)), 1.0)
+        # Start behind the puck, on the line from the centre of the opponent's goal through the puck.
+        distance = math.hypot(self.opponent_goal - puck.x, puck.y)
+        back = self.contact_distance + RUN_UP
+        start = mallet.nearest_allowed(
+            puck.x - back * (self.opponent_goal - puck.x) / distance, puck.y + back * puck.y / distance
         )
         if math.dist(start, (mallet.x, mallet.y)) < 0.012 and math.hypot(mallet.vx, mallet.vy) < 0.1:
             length = math.dist(start, (puck.x, puck.y))
-            return self.strike(((puck.x - start[0]) / length, (puck.y - start[1]) / length, 20))
-        return mallet.go(*self.around(*start), 1.0)
+            return self.shoot(((puck.x - start[0]) / length, (puck.y - start[1]) / length, 20))
+        return mallet.move_to(*self.waypoint(*start), 1.0)
 
-    def strike(self, line: tuple[float, float, int]) -> list[list[float]]:
+    def shoot(self, shot: tuple[float, float, int]) -> list[list[float]]:
+        """One step of a shot, or a braking step once it has ended."""
         mallet, puck = self.mallet, self.puck
-        dx, dy, left = line
+        dx, dy, steps_left = shot
         ahead = (puck.x - mallet.x) * dx + (puck.y - mallet.y) * dy
-        if left == 0 or ahead < 0.0:
-            self.line = None
-            return mallet.move(0.0, 0.0)
-        # Once it touches the puck, a moment more is enough.
-        self.line = (dx, dy, min(left, 2 if ahead < self.contact + 0.005 else left) - 1)
-        # Across the line it follows the puck, which may be rolling.
+        if steps_left == 0 or ahead < 0.0:
+            self.shot = None
+            return mallet.move_at_velocity(0.0, 0.0)
+        # After the contact, two more steps are enough.
+        self.shot = (dx, dy, min(steps_left, 2 if ahead < self.contact_distance + 0.005 else steps_left) - 1)
+        # Follow the puck sideways, because it may be rolling.
         across = (puck.y - mallet.y) * dx - (puck.x - mallet.x) * dy
-        return mallet.move(STRIKE * dx - 6 * across * dy, STRIKE * dy + 6 * across * dx)
+        return mallet.move_at_velocity(SHOT_SPEED * dx - 6 * across * dy, SHOT_SPEED * dy + 6 * across * dx)
 
-    def around(self, x: float, y: float) -> tuple[float, float]:
-        """The way to a point that does not lead through the puck: the point, or one beside the puck."""
-        mallet, puck, room = self.mallet, self.puck, self.contact + 0.02
-        way = max(math.hypot(x - mallet.x, y - mallet.y), 1e-6)
-        dx, dy = (x - mallet.x) / way, (y - mallet.y) / way
+    def waypoint(self, x: float, y: float) -> tuple[float, float]:
+        """The target point, or a point beside the puck if the direct path would touch it."""
+        mallet, puck, clearance = self.mallet, self.puck, self.contact_distance + 0.02
+        distance = max(math.hypot(x - mallet.x, y - mallet.y), 1e-6)
+        dx, dy = (x - mallet.x) / distance, (y - mallet.y) / distance
         along = (puck.x - mallet.x) * dx + (puck.y - mallet.y) * dy
-        left = (puck.y - mallet.y) * dx - (puck.x - mallet.x) * dy  # the puck, seen along the way
-        if along < 0.0 or along > way + room or abs(left) > room:
+        left = (puck.y - mallet.y) * dx - (puck.x - mallet.x) * dy  # puck's offset to the left of the path
+        if along < 0.0 or along > distance + clearance or abs(left) > clearance:
             return x, y
-        # Pass on the side that is nearer, unless the rim is there.
+        # Pass the puck on the nearer side, or on the other one if the rim is in the way.
         for side in (-1.0, 1.0) if left > 0 else (1.0, -1.0):
-            beside = (puck.x - side * dy * (room + 0.03), puck.y + side * dx * (room + 0.03))
-            if mallet.inside(*beside) == beside:
+            beside = (puck.x - side * dy * (clearance + 0.03), puck.y + side * dx * (clearance + 0.03))
+            if mallet.nearest_allowed(*beside) == beside:
                 return beside
         return x, y
 

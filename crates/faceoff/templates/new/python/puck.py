@@ -1,15 +1,15 @@
-"""Where the puck is and where it will be, from observations that are noisy and sometimes missing."""
+"""Estimates the puck's state from noisy and sometimes missing observations, and predicts its motion."""
 
 import math
 from typing import Any
 
-TRUST = 0.35  # how far one observation moves the estimated velocity
-DRAG = 0.5  # share of its speed that the puck loses per second
-BOUNCE = 0.75  # share of its speed across a rim that a bounce leaves
+GAIN = 0.35  # weight of a new observation in the velocity estimate
+DRAG = 0.5  # fraction of its speed that the puck loses per second
+RESTITUTION = 0.75  # fraction of the speed across the rim that remains after a bounce
 
 
 class Puck:
-    """An estimate: x, y (m) and vx, vy (m/s) in the robot's own base frame."""
+    """Estimated position x, y (m) and velocity vx, vy (m/s) in the robot's base frame."""
 
     def __init__(self, env: dict[str, Any]) -> None:
         self.dt: float = env["dt"]
@@ -18,33 +18,33 @@ class Puck:
         self.reset()
 
     def reset(self) -> None:
-        self.seen: tuple[float, float] | None = None
+        self.last_observed: tuple[float, float] | None = None
 
     def observe(self, x: float, y: float, yaw: float, vx: float, vy: float, yaw_rate: float) -> None:
-        """Takes in an observation of the puck."""
-        if self.seen is None:
+        """Updates the estimate with an observation."""
+        if self.last_observed is None:
             self.x, self.y, self.vx, self.vy = x, y, vx, vy
-        elif (x, y) == self.seen and vx == vy == 0.0:
-            # Not seen: the old place came again. It will have slid on.
-            self.x, self.y, self.vx, self.vy = self.after(self.dt)
+        elif (x, y) == self.last_observed and vx == vy == 0.0:
+            # The puck was not seen and the old position is repeated: predict its motion instead.
+            self.x, self.y, self.vx, self.vy = self.predict(self.dt)
         else:
-            # Two witnesses for the velocity: what is reported, and the way since the last step.
-            _, _, old_vx, old_vy = self.after(self.dt)
+            # There are two measurements of the velocity: the observed one, and the distance since the last step.
+            _, _, old_vx, old_vy = self.predict(self.dt)
             new_vx, new_vy = 0.5 * (vx + (x - self.x) / self.dt), 0.5 * (vy + (y - self.y) / self.dt)
             was_hit = abs(new_vx - old_vx) + abs(new_vy - old_vy) > 0.7
-            trust = 1.0 if was_hit else TRUST
-            self.vx, self.vy = old_vx + trust * (new_vx - old_vx), old_vy + trust * (new_vy - old_vy)
+            gain = 1.0 if was_hit else GAIN
+            self.vx, self.vy = old_vx + gain * (new_vx - old_vx), old_vy + gain * (new_vy - old_vy)
             self.x, self.y = x, y
-        self.seen = (x, y)
+        self.last_observed = (x, y)
 
-    def after(self, time: float) -> tuple[float, float, float, float]:
-        """x, y, vx, vy after some time (s, at most 1.5); bounces off the long rims count, all else does not."""
+    def predict(self, time: float) -> tuple[float, float, float, float]:
+        """x, y, vx, vy after some time (s, at most 1.5), with bounces off the long rims but no other contacts."""
         time = min(time, 1.5)
         slide, fade = time * (1 - 0.5 * DRAG * time), 1 - DRAG * time
         x, y, vx, vy = self.x + self.vx * slide, self.y + self.vy * slide, self.vx * fade, self.vy * fade
         while abs(y) > self.y_max:
             rim = math.copysign(self.y_max, y)
-            y, vy = rim - BOUNCE * (y - rim), -BOUNCE * vy
+            y, vy = rim - RESTITUTION * (y - rim), -RESTITUTION * vy
         return x, y, vx, vy
 
     @property

@@ -1,4 +1,4 @@
-"""Speaks with the agent as the evaluator does: python3 -m unittest. Add what your agent shall keep to."""
+"""Talks to the agent as the evaluator does: python3 -m unittest. Add tests for your own agent here."""
 
 import io
 import json
@@ -25,37 +25,37 @@ ENV = {
         "joint_vel_limit": [[-limit for limit in VELOCITY_LIMIT], VELOCITY_LIMIT],
     },
 }
-MY_AGENT = next(
-    thing
-    for thing in vars(agent).values()
-    if isinstance(thing, type) and issubclass(thing, protocol.Agent) and thing is not protocol.Agent
+AGENT_CLASS = next(
+    value
+    for value in vars(agent).values()
+    if isinstance(value, type) and issubclass(value, protocol.Agent) and value is not protocol.Agent
 )
 
 
-class MyAgent(unittest.TestCase):
-    def test_speaks_the_protocol_from_hello_to_bye(self) -> None:
-        questions = [
+class AgentTest(unittest.TestCase):
+    def test_agent_speaks_the_protocol(self) -> None:
+        messages = [
             {"type": "hello", "protocol": 1, "task": "defend", "agent_id": 1, "env": ENV},
             {"type": "reset", "episode": 17},
             *({"type": "step", "step": k, "obs": [1.0, 0.1, 0, -1, 0, 0, *POSE, *[0.0] * 7]} for k in range(9)),
             {"type": "end", "episode": 17, "steps": 9},
             {"type": "bye"},
         ]
-        answers = io.BytesIO()
-        protocol.run(MY_AGENT, [json.dumps(question).encode() for question in questions], answers)
-        kinds = [json.loads(line)["type"] for line in answers.getvalue().splitlines()]
+        output = io.BytesIO()
+        protocol.run(AGENT_CLASS, [json.dumps(message).encode() for message in messages], output)
+        kinds = [json.loads(line)["type"] for line in output.getvalue().splitlines()]
         self.assertEqual(kinds, ["ready", "ready", *["act"] * 9])
 
-    def test_keeps_its_limits_whatever_the_puck_does(self) -> None:
-        """Pucks at random places that jump, vanish and race: the arm never does."""
-        chance, mine = random.Random(2023), MY_AGENT("defend", 1, ENV)
-        mine.reset()
+    def test_agent_keeps_its_limits(self) -> None:
+        """The puck jumps, disappears and races, but the arm stays within its limits."""
+        rng, policy = random.Random(2023), AGENT_CLASS("defend", 1, ENV)
+        policy.reset()
         last, puck = POSE, (1.0, 0.0, 0.0, 0.0, 0.0, 0.0)
         for _ in range(1000):
-            if chance.random() < 0.05:
-                place = (chance.uniform(0.6, 2.4), chance.uniform(-0.48, 0.48), 0.0)
-                puck = (*place, chance.gauss(0, 1.5), chance.gauss(0, 1.5), 0.0)
-            pose, speeds = mine.act([*puck, *last, *[0.0] * 7])
+            if rng.random() < 0.05:
+                position = (rng.uniform(0.6, 2.4), rng.uniform(-0.48, 0.48), 0.0)
+                puck = (*position, rng.gauss(0, 1.5), rng.gauss(0, 1.5), 0.0)
+            pose, speeds = policy.act([*puck, *last, *[0.0] * 7])
             for before, q, dq, limit in zip(last, pose, speeds, VELOCITY_LIMIT):
                 self.assertLess(abs(dq), 0.95 * limit)
                 self.assertLess(abs(q - before), 0.95 * limit * 0.02)

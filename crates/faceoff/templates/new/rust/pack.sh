@@ -1,5 +1,5 @@
 #!/bin/sh
-# Builds the agent and puts it into the bundle.
+# Builds the agent and copies it into the bundle.
 set -eu
 cd "$(dirname "$0")"
 cargo build --release --target-dir target

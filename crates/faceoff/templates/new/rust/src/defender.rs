@@ -1,21 +1,22 @@
-//! Defends: meets the puck in front of the goal and gives way, so that it stays there. Change anything.
+//! Defends: meets the puck in front of the goal and retreats with it, so that it stops there.
 //!
-//! Positions are in the robot's own base frame: x grows towards the other goal; metres, radians, seconds.
+//! Positions are in the robot's base frame: x points towards the opponent's goal. Units: metres, radians, seconds.
 
 use crate::{mallet::Mallet, puck::Puck};
 use faceoff_agent::{Action, Agent, Env, Failure, Observation};
 
-/// A puck with less vx comes at us, m/s.
-const INCOMING: f64 = -0.3;
-/// How far in front of the goal line it is met, m.
-const MEET: f64 = 0.3;
-/// A mallet that retreats at this share of the puck's speed takes all of it away.
-const GIVE_WAY: f64 = 0.31;
+/// A puck with a smaller vx is coming towards our goal, m/s.
+const INCOMING_VX: f64 = -0.3;
+/// Distance from the goal line at which the mallet meets the puck, m.
+const MEET_DISTANCE: f64 = 0.3;
+/// A mallet that retreats at this fraction of the puck's speed stops it.
+const RETREAT_RATIO: f64 = 0.31;
 
 pub struct Policy {
     mallet: Mallet,
     puck: Puck,
-    contact: f64,
+    /// Distance of the centres of puck and mallet at a contact, m.
+    contact_distance: f64,
     started: bool,
 }
 
@@ -24,7 +25,7 @@ impl Policy {
         Self {
             mallet: Mallet::new(env),
             puck: Puck::new(env),
-            contact: env.puck.radius + env.mallet.radius,
+            contact_distance: env.puck.radius + env.mallet.radius,
             started: false,
         }
     }
@@ -43,19 +44,22 @@ impl Agent for Policy {
             self.started = true;
         }
         self.puck.observe(observation.puck());
-        let puck = self.puck.now;
+        let puck = self.puck.state;
 
-        if puck.vx > INCOMING {
-            // Nothing to do: wait in front of the goal, on the puck's side of it.
-            return Ok(mallet.go([mallet.goal + 0.14, (0.3 * puck.y).clamp(-0.1, 0.1)], 1.0));
+        if puck.vx > INCOMING_VX {
+            // The puck is no danger: wait in front of the goal, on the puck's side.
+            return Ok(mallet.move_to([mallet.goal + 0.14, (0.3 * puck.y).clamp(-0.1, 0.1)], 1.0));
         }
-        let gap = (puck.x - mallet.x).hypot(puck.y - mallet.y) - self.contact;
+        let gap = (puck.x - mallet.x).hypot(puck.y - mallet.y) - self.contact_distance;
         if gap < 0.12 * puck.speed() {
-            // It is about to touch: go back with it.
-            return Ok(mallet.r#move(GIVE_WAY * puck.vx, GIVE_WAY * puck.vy));
+            // The contact is near: retreat in the puck's direction.
+            return Ok(mallet.move_at_velocity(RETREAT_RATIO * puck.vx, RETREAT_RATIO * puck.vy));
         }
-        let meet_x = (mallet.goal + MEET).min(puck.x - self.contact);
-        let meet = self.puck.after((puck.x - self.contact - meet_x) / -puck.vx);
-        Ok(mallet.go([meet_x, meet.y], 1.5))
+        // Move to the point where the puck will be at the meeting distance.
+        let meet_x = (mallet.goal + MEET_DISTANCE).min(puck.x - self.contact_distance);
+        let meet = self
+            .puck
+            .predict((puck.x - self.contact_distance - meet_x) / -puck.vx);
+        Ok(mallet.move_to([meet_x, meet.y], 1.5))
     }
 }

@@ -1,34 +1,36 @@
-//! Strikes the puck at the other goal: gets behind it, accelerates along a line, brakes. Change anything.
+//! Shoots the puck at the opponent's goal: moves behind the puck, accelerates along a line and brakes.
 //!
-//! Positions are in the robot's own base frame: x grows towards the other goal; metres, radians, seconds.
+//! Positions are in the robot's base frame: x points towards the opponent's goal. Units: metres, radians, seconds.
 
 use crate::{mallet::Mallet, puck::Puck};
 use faceoff_agent::{Action, Agent, Env, Failure, Observation};
 
-/// Speed of the mallet in a strike, m/s.
-const STRIKE: f64 = 1.6;
-/// And the way on which it gets there, m.
+/// Speed of the mallet in a shot, m/s.
+const SHOT_SPEED: f64 = 1.6;
+/// Distance over which the mallet accelerates to that speed, m.
 const RUN_UP: f64 = 0.16;
-/// A faster puck is waited for, m/s.
-const SLOW: f64 = 0.35;
+/// The agent waits while the puck is faster than this, m/s.
+const WAIT_SPEED: f64 = 0.35;
 
-/// A strike: its direction, and the control steps that are left.
-struct Line {
+/// A shot: its direction, and the remaining control steps.
+struct Shot {
     dx: f64,
     dy: f64,
-    left: u32,
+    steps_left: u32,
 }
 
 pub struct Policy {
     mallet: Mallet,
     puck: Puck,
-    contact: f64,
+    /// Distance of the centres of puck and mallet at a contact, m.
+    contact_distance: f64,
     /// x of the table's centre, m.
     middle: f64,
-    /// x of the other goal's line, m.
-    other_goal: f64,
+    /// x of the opponent's goal line, m.
+    opponent_goal: f64,
     started: bool,
-    line: Option<Line>,
+    /// The current shot.
+    shot: Option<Shot>,
 }
 
 impl Policy {
@@ -36,62 +38,64 @@ impl Policy {
         let middle = env.robot.base_distance_m().unwrap_or(1.51);
         Self {
             middle,
-            other_goal: middle + env.table.length / 2.0,
+            opponent_goal: middle + env.table.length / 2.0,
             mallet: Mallet::new(env),
             puck: Puck::new(env),
-            contact: env.puck.radius + env.mallet.radius,
+            contact_distance: env.puck.radius + env.mallet.radius,
             started: false,
-            line: None,
+            shot: None,
         }
     }
 
-    fn strike(&mut self, Line { dx, dy, left }: Line) -> Action {
-        let (mallet, puck) = (&mut self.mallet, self.puck.now);
+    /// One step of a shot, or a braking step once it has ended.
+    fn shoot(&mut self, Shot { dx, dy, steps_left }: Shot) -> Action {
+        let (mallet, puck) = (&mut self.mallet, self.puck.state);
         let ahead = (puck.x - mallet.x) * dx + (puck.y - mallet.y) * dy;
-        if left == 0 || ahead < 0.0 {
-            return mallet.r#move(0.0, 0.0);
+        if steps_left == 0 || ahead < 0.0 {
+            return mallet.move_at_velocity(0.0, 0.0);
         }
-        // Once it touches the puck, a moment more is enough.
-        let left = if ahead < self.contact + 0.005 {
-            left.min(2)
+        // After the contact, two more steps are enough.
+        let steps_left = if ahead < self.contact_distance + 0.005 {
+            steps_left.min(2)
         } else {
-            left
+            steps_left
         };
-        self.line = Some(Line {
+        self.shot = Some(Shot {
             dx,
             dy,
-            left: left - 1,
+            steps_left: steps_left - 1,
         });
-        // Across the line it follows the puck, which may be rolling.
+        // Follow the puck sideways, because it may be rolling.
         let across = (puck.y - mallet.y) * dx - (puck.x - mallet.x) * dy;
-        mallet.r#move(
-            STRIKE * dx - 6.0 * across * dy,
-            STRIKE * dy + 6.0 * across * dx,
+        mallet.move_at_velocity(
+            SHOT_SPEED * dx - 6.0 * across * dy,
+            SHOT_SPEED * dy + 6.0 * across * dx,
         )
     }
 
-    /// The way to a point that does not lead through the puck: the point, or one beside the puck.
-    fn around(&self, [x, y]: [f64; 2]) -> [f64; 2] {
-        let (mallet, puck, room) = (&self.mallet, self.puck.now, self.contact + 0.02);
-        let way = (x - mallet.x).hypot(y - mallet.y).max(1e-6);
-        let (dx, dy) = ((x - mallet.x) / way, (y - mallet.y) / way);
+    /// The target point, or a point beside the puck if the direct path would touch it.
+    fn waypoint(&self, [x, y]: [f64; 2]) -> [f64; 2] {
+        let (mallet, puck, clearance) =
+            (&self.mallet, self.puck.state, self.contact_distance + 0.02);
+        let distance = (x - mallet.x).hypot(y - mallet.y).max(1e-6);
+        let (dx, dy) = ((x - mallet.x) / distance, (y - mallet.y) / distance);
         let along = (puck.x - mallet.x) * dx + (puck.y - mallet.y) * dy;
-        // The puck, seen along the way.
+        // The puck's offset to the left of the path.
         let left = (puck.y - mallet.y) * dx - (puck.x - mallet.x) * dy;
-        if along < 0.0 || along > way + room || left.abs() > room {
+        if along < 0.0 || along > distance + clearance || left.abs() > clearance {
             return [x, y];
         }
-        // Pass on the side that is nearer, unless the rim is there.
-        let near = if left > 0.0 { -1.0 } else { 1.0 };
-        [near, -near]
+        // Pass the puck on the nearer side, or on the other one if the rim is in the way.
+        let near_side = if left > 0.0 { -1.0 } else { 1.0 };
+        [near_side, -near_side]
             .map(|side| {
                 [
-                    puck.x - side * dy * (room + 0.03),
-                    puck.y + side * dx * (room + 0.03),
+                    puck.x - side * dy * (clearance + 0.03),
+                    puck.y + side * dx * (clearance + 0.03),
                 ]
             })
             .into_iter()
-            .find(|beside| mallet.inside(beside[0], beside[1]) == *beside)
+            .find(|beside| mallet.nearest_allowed(beside[0], beside[1]) == *beside)
             .unwrap_or([x, y])
     }
 }
@@ -100,7 +104,7 @@ impl Agent for Policy {
     fn reset(&mut self) {
         self.puck.reset();
         self.started = false;
-        self.line = None;
+        self.shot = None;
     }
 
     fn act(&mut self, observation: &Observation) -> Result<Action, Failure> {
@@ -109,31 +113,32 @@ impl Agent for Policy {
             self.started = true;
         }
         self.puck.observe(observation.puck());
-        if let Some(line) = self.line.take() {
-            return Ok(self.strike(line));
+        if let Some(shot) = self.shot.take() {
+            return Ok(self.shoot(shot));
         }
-        let (mallet, puck) = (&mut self.mallet, self.puck.now);
-        if puck.speed() > SLOW || puck.x > self.middle - 0.15 {
-            return Ok(mallet.go([mallet.goal + 0.14, (0.3 * puck.y).clamp(-0.1, 0.1)], 1.0));
+        let (mallet, puck) = (&mut self.mallet, self.puck.state);
+        if puck.speed() > WAIT_SPEED || puck.x > self.middle - 0.15 {
+            // The puck is too fast or too far away: wait in front of the goal, on the puck's side.
+            return Ok(mallet.move_to([mallet.goal + 0.14, (0.3 * puck.y).clamp(-0.1, 0.1)], 1.0));
         }
-        // From behind the puck towards the middle of the goal, from as near to that line as the mallet gets.
-        let way = (self.other_goal - puck.x).hypot(puck.y);
-        let back = self.contact + RUN_UP;
-        let start = mallet.inside(
-            puck.x - back * (self.other_goal - puck.x) / way,
-            puck.y + back * puck.y / way,
+        // Start behind the puck, on the line from the centre of the opponent's goal through the puck.
+        let distance = (self.opponent_goal - puck.x).hypot(puck.y);
+        let back = self.contact_distance + RUN_UP;
+        let start = mallet.nearest_allowed(
+            puck.x - back * (self.opponent_goal - puck.x) / distance,
+            puck.y + back * puck.y / distance,
         );
-        let away = (start[0] - mallet.x).hypot(start[1] - mallet.y);
-        if away < 0.012 && mallet.vx.hypot(mallet.vy) < 0.1 {
+        let remaining = (start[0] - mallet.x).hypot(start[1] - mallet.y);
+        if remaining < 0.012 && mallet.vx.hypot(mallet.vy) < 0.1 {
             let (to_x, to_y) = (puck.x - start[0], puck.y - start[1]);
             let length = to_x.hypot(to_y);
-            return Ok(self.strike(Line {
+            return Ok(self.shoot(Shot {
                 dx: to_x / length,
                 dy: to_y / length,
-                left: 20,
+                steps_left: 20,
             }));
         }
-        let beside = self.around(start);
-        Ok(self.mallet.go(beside, 1.0))
+        let waypoint = self.waypoint(start);
+        Ok(self.mallet.move_to(waypoint, 1.0))
     }
 }

@@ -1,15 +1,15 @@
-//! Where the puck is and where it will be, from observations that are noisy and sometimes missing.
+//! Estimates the puck's state from noisy and sometimes missing observations, and predicts its motion.
 
 use faceoff_agent::Env;
 
-/// How far one observation moves the estimated velocity.
-const TRUST: f64 = 0.35;
-/// Share of its speed that the puck loses per second.
+/// Weight of a new observation in the velocity estimate.
+const GAIN: f64 = 0.35;
+/// Fraction of its speed that the puck loses per second.
 const DRAG: f64 = 0.5;
-/// Share of its speed across a rim that a bounce leaves.
-const BOUNCE: f64 = 0.75;
+/// Fraction of the speed across the rim that remains after a bounce.
+const RESTITUTION: f64 = 0.75;
 
-/// Place (m) and velocity (m/s) in the robot's own base frame.
+/// Position (m) and velocity (m/s) in the robot's base frame.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Motion {
     pub x: f64,
@@ -24,12 +24,12 @@ impl Motion {
     }
 }
 
-/// An estimate.
+/// The estimated puck.
 pub struct Puck {
     dt: f64,
     y_max: f64,
-    seen: Option<[f64; 2]>,
-    pub now: Motion,
+    last_observed: Option<[f64; 2]>,
+    pub state: Motion,
 }
 
 impl Puck {
@@ -37,52 +37,52 @@ impl Puck {
         Self {
             dt: env.dt,
             y_max: env.table.width / 2.0 - env.puck.radius,
-            seen: None,
-            now: Motion::default(),
+            last_observed: None,
+            state: Motion::default(),
         }
     }
 
     pub fn reset(&mut self) {
-        self.seen = None;
+        self.last_observed = None;
     }
 
-    /// Takes in an observation of the puck.
+    /// Updates the estimate with an observation.
     pub fn observe(&mut self, [x, y, _, vx, vy, _]: [f64; 6]) {
-        let expected = self.after(self.dt);
-        self.now = if self.seen.is_none() {
+        let expected = self.predict(self.dt);
+        self.state = if self.last_observed.is_none() {
             Motion { x, y, vx, vy }
-        } else if self.seen == Some([x, y]) && vx == 0.0 && vy == 0.0 {
-            // Not seen: the old place came again. It will have slid on.
+        } else if self.last_observed == Some([x, y]) && vx == 0.0 && vy == 0.0 {
+            // The puck was not seen and the old position is repeated: use its predicted motion instead.
             expected
         } else {
-            // Two witnesses for the velocity: what is reported, and the way since the last step.
-            let new_vx = 0.5 * (vx + (x - self.now.x) / self.dt);
-            let new_vy = 0.5 * (vy + (y - self.now.y) / self.dt);
+            // There are two measurements of the velocity: the observed one, and the distance since the last step.
+            let new_vx = 0.5 * (vx + (x - self.state.x) / self.dt);
+            let new_vy = 0.5 * (vy + (y - self.state.y) / self.dt);
             let was_hit = (new_vx - expected.vx).abs() + (new_vy - expected.vy).abs() > 0.7;
-            let trust = if was_hit { 1.0 } else { TRUST };
-            let vx = expected.vx + trust * (new_vx - expected.vx);
-            let vy = expected.vy + trust * (new_vy - expected.vy);
+            let gain = if was_hit { 1.0 } else { GAIN };
+            let vx = expected.vx + gain * (new_vx - expected.vx);
+            let vy = expected.vy + gain * (new_vy - expected.vy);
             Motion { x, y, vx, vy }
         };
-        self.seen = Some([x, y]);
+        self.last_observed = Some([x, y]);
     }
 
-    /// The motion after some time (s, at most 1.5); bounces off the long rims count, all else does not.
-    pub fn after(&self, time: f64) -> Motion {
+    /// The motion after some time (s, at most 1.5), with bounces off the long rims but no other contacts.
+    pub fn predict(&self, time: f64) -> Motion {
         let time = time.min(1.5);
         let (slide, fade) = (time * (1.0 - 0.5 * DRAG * time), 1.0 - DRAG * time);
-        let Motion { x, y, vx, vy } = self.now;
-        let mut then = Motion {
+        let Motion { x, y, vx, vy } = self.state;
+        let mut predicted = Motion {
             x: x + vx * slide,
             y: y + vy * slide,
             vx: vx * fade,
             vy: vy * fade,
         };
-        while then.y.abs() > self.y_max {
-            let rim = self.y_max.copysign(then.y);
-            then.y = rim - BOUNCE * (then.y - rim);
-            then.vy *= -BOUNCE;
+        while predicted.y.abs() > self.y_max {
+            let rim = self.y_max.copysign(predicted.y);
+            predicted.y = rim - RESTITUTION * (predicted.y - rim);
+            predicted.vy *= -RESTITUTION;
         }
-        then
+        predicted
     }
 }

@@ -1,6 +1,6 @@
-//! Speaks with the agent as the evaluator does. Add what your agent shall keep to.
+//! Talks to the agent as the evaluator does. Add tests for your own agent here.
 
-use crate::{ABOUT, mallet::forward, policy::Policy};
+use crate::{AGENT_INFO, mallet::forward, policy::Policy};
 use faceoff_agent::serve;
 use serde_json::{Value, json};
 
@@ -10,7 +10,7 @@ const VELOCITY_LIMIT_DEGREES: [f64; 7] = [85.0, 85.0, 100.0, 75.0, 130.0, 135.0,
 fn hello() -> Value {
     let position = [2.96706, 2.0944, 2.96706, 2.0944, 2.96706, 2.0944, 3.05433];
     let velocity = VELOCITY_LIMIT_DEGREES.map(f64::to_radians);
-    let both = |limit: [f64; 7]| json!([limit.map(|x| -x), limit]);
+    let range = |limit: [f64; 7]| json!([limit.map(|x| -x), limit]);
     json!({"type": "hello", "protocol": 1, "task": "defend", "agent_id": 1, "env": {
         "dt": 0.02,
         "table": {"length": 1.948, "width": 1.038, "goal_width": 0.25},
@@ -19,29 +19,29 @@ fn hello() -> Value {
         "robot": {
             "ee_desired_height": 0.1645,
             "base_frame": [[[1, 0, 0, -1.51], [0, 1, 0, 0], [0, 0, 1, -0.1], [0, 0, 0, 1]]],
-            "joint_pos_limit": both(position),
-            "joint_vel_limit": both(velocity),
+            "joint_pos_limit": range(position),
+            "joint_vel_limit": range(velocity),
         },
     }})
 }
 
-/// What it answers to these pucks, one per control step.
+/// The agent's answers to these puck states, one per control step.
 fn answers(pucks: &[[f64; 6]]) -> Vec<Value> {
-    let mut questions = vec![hello(), json!({"type": "reset", "episode": 17})];
+    let mut messages = vec![hello(), json!({"type": "reset", "episode": 17})];
     for (step, puck) in pucks.iter().enumerate() {
         let observation = [&puck[..], &POSE, &[0.0; 7]].concat();
-        questions.push(json!({"type": "step", "step": step, "obs": observation}));
+        messages.push(json!({"type": "step", "step": step, "obs": observation}));
     }
-    questions.push(json!({"type": "bye"}));
-    let lines: Vec<String> = questions.iter().map(Value::to_string).collect();
+    messages.push(json!({"type": "bye"}));
+    let lines: Vec<String> = messages.iter().map(Value::to_string).collect();
     let mut output = Vec::new();
     serve(
-        ABOUT,
+        AGENT_INFO,
         |hello| Policy::new(&hello.env),
         lines.join("\n").as_bytes(),
         &mut output,
     )
-    .expect("it answers");
+    .expect("the agent responds");
     let text = String::from_utf8(output).expect("UTF-8");
     text.lines()
         .map(|line| serde_json::from_str(line).expect("JSON"))
@@ -49,9 +49,9 @@ fn answers(pucks: &[[f64; 6]]) -> Vec<Value> {
 }
 
 #[test]
-fn speaks_the_protocol_from_hello_to_bye() {
-    let said = answers(&[[1.0, 0.1, 0.0, -1.0, 0.0, 0.0]; 9]);
-    let kinds: Vec<&str> = said
+fn agent_speaks_the_protocol() {
+    let answers = answers(&[[1.0, 0.1, 0.0, -1.0, 0.0, 0.0]; 9]);
+    let kinds: Vec<&str> = answers
         .iter()
         .filter_map(|answer| answer["type"].as_str())
         .collect();
@@ -59,18 +59,18 @@ fn speaks_the_protocol_from_hello_to_bye() {
 }
 
 #[test]
-fn keeps_its_limits_whatever_the_puck_does() {
-    // Pucks that jump about and race; the numbers only have to differ.
+fn agent_keeps_its_limits() {
+    // The puck jumps and races; the numbers are arbitrary.
     let pucks: Vec<[f64; 6]> = (0..1000)
         .map(|step| {
-            let place = f64::from(step / 20);
-            let (x, y) = (1.5 + 0.9 * (7.0 * place).sin(), 0.48 * (11.0 * place).sin());
+            let phase = f64::from(step / 20);
+            let (x, y) = (1.5 + 0.9 * (7.0 * phase).sin(), 0.48 * (11.0 * phase).sin());
             [
                 x,
                 y,
                 0.0,
-                3.0 * (5.0 * place).sin(),
-                3.0 * (3.0 * place).sin(),
+                3.0 * (5.0 * phase).sin(),
+                3.0 * (3.0 * phase).sin(),
                 0.0,
             ]
         })

@@ -1,0 +1,174 @@
+//! Descriptions of the ends of episodes.
+
+use faceoff_sim::{
+    episode::task::{PLAYABLE_Y_M, TASK_RULES},
+    table::geometry::TABLE,
+};
+use faceoff_types::{AgentFaultKind, EpisodeEnd, Task};
+
+/// What happened and what would have been a success, in one sentence without a full stop.
+///
+/// `puck` is its last true state in the table frame: x, y (m), yaw (rad), and their rates (m/s, rad/s). `steps` is the number
+/// of control steps, and `fault` the agent fault that ended the episode, if any.
+#[must_use]
+pub fn describe_end(
+    task: Task,
+    end: EpisodeEnd,
+    puck: &[f64; 6],
+    steps: u32,
+    fault: Option<&AgentFaultKind>,
+) -> String {
+    let [x, y, _, vx, vy, _] = *puck;
+    // Not `hypot`: it would make the program depend on the C library of newer systems.
+    let speed = (vx * vx + vy * vy).sqrt();
+    match end {
+        EpisodeEnd::AgentFault => match fault {
+            Some(fault) => format!("the agent's fault ended the episode: {fault}"),
+            None => "a fault of the agent ended the episode".to_owned(),
+        },
+        EpisodeEnd::LeftTable => left_the_table(task, x, y, speed),
+        EpisodeEnd::CrossedMiddle if task == Task::Prepare => format!(
+            "puck crossed the middle line: x = {} m, and it had to stay at x ≤ {} m",
+            relative_to(x, 0.0),
+            rule_value(TASK_RULES.success_x_m[1])
+        ),
+        EpisodeEnd::CrossedMiddle if task == Task::Hit => format!(
+            "puck came back without a goal: x = {} m in the opponent's half, moving back at {} m/s",
+            relative_to(x, 0.0),
+            relative_to(-vx, 0.0)
+        ),
+        EpisodeEnd::CrossedMiddle => format!(
+            "puck was sent back across the middle: x = {} m, vx = {} m/s; it had to stay in the agent's half",
+            relative_to(x, 0.0),
+            relative_to(vx, 0.0)
+        ),
+        EpisodeEnd::Stopped => format!(
+            "puck stopped (below {} m/s) at {}",
+            rule_value(TASK_RULES.defend_stopped_m_s),
+            position_text(task, x, y, vx)
+        ),
+        EpisodeEnd::ReachedAxis => format!(
+            "puck reached the table's long axis (|y| < {} m) at {}",
+            rule_value(TASK_RULES.prepare_axis_m),
+            position_text(task, x, y, vx)
+        ),
+        EpisodeEnd::Horizon if task == Task::Hit => format!(
+            "time was up after {steps} steps, without a goal: puck at x = {} m, y = {} m, {} m/s",
+            rounded(x),
+            rounded(y),
+            rounded(speed)
+        ),
+        EpisodeEnd::Horizon => format!(
+            "time was up after {steps} steps: puck at {}",
+            position_text(task, x, y, vx)
+        ),
+    }
+}
+
+fn left_the_table(task: Task, x: f64, y: f64, speed: f64) -> String {
+    let goal = TABLE.goal_width_m / 2.0;
+    let y_text = rounded(y);
+    if speed > TASK_RULES.lost_speed_m_s {
+        return format!(
+            "puck was lost: its speed exceeded {} m/s",
+            TASK_RULES.lost_speed_m_s
+        );
+    }
+    if x > TABLE.half_length_m() && y.abs() < goal {
+        let slow = task == Task::Hit && speed < TASK_RULES.hit_min_goal_speed_m_s;
+        let verdict = match (task, slow) {
+            (Task::Hit, false) => "goal",
+            (Task::Hit, true) => "no goal, since it was too slow",
+            _ => "puck left through the opponent's goal",
+        };
+        return format!(
+            "{verdict}: puck passed the line x = {} m at y = {y_text} m, inside ±{} m, with {} m/s",
+            rule_value(TABLE.half_length_m()),
+            rule_value(goal),
+            rounded(speed)
+        );
+    }
+    if x < -TABLE.half_length_m() && y.abs() < goal {
+        return format!(
+            "own goal: puck passed x = {} m at y = {y_text} m",
+            rule_value(-TABLE.half_length_m())
+        );
+    }
+    if x.abs() > TABLE.half_length_m() {
+        return format!(
+            "puck left the table beside the goal: x = {} m, y = {} m, outside ±{} m",
+            rounded(x),
+            relative_to(y, goal.copysign(y)),
+            rule_value(goal)
+        );
+    }
+    format!(
+        "puck left the table over a long side: x = {} m, y = {y_text} m",
+        rounded(x)
+    )
+}
+
+/// The puck's position compared with the success region (`defend`, `prepare`), and other conditions that are not met.
+fn position_text(task: Task, x: f64, y: f64, vx: f64) -> String {
+    let [from, to] = TASK_RULES.success_x_m;
+    let inside = |within: bool| if within { "inside" } else { "outside" };
+    let nearest = if (x - from).abs() < (x - to).abs() {
+        from
+    } else {
+        to
+    };
+    let mut text = format!(
+        "x = {} m, {} {} … {}",
+        relative_to(x, nearest),
+        inside(from < x && x <= to),
+        rule_value(from),
+        rule_value(to)
+    );
+    if task == Task::Prepare && y.abs() >= PLAYABLE_Y_M {
+        text += &format!(
+            "; y = {} m, outside ±{} m",
+            relative_to(y, PLAYABLE_Y_M.copysign(y)),
+            rule_value(PLAYABLE_Y_M)
+        );
+    }
+    if vx >= TASK_RULES.success_vx_m_s {
+        text += &format!(
+            "; vx = {} m/s, not below {}",
+            relative_to(vx, TASK_RULES.success_vx_m_s),
+            rule_value(TASK_RULES.success_vx_m_s)
+        );
+    }
+    text
+}
+
+/// The value with two decimals, or with as many more as are needed to show on which side of the bound it is.
+fn relative_to(value: f64, bound: f64) -> String {
+    let side = value.partial_cmp(&bound);
+    let shows_side = |decimals: &usize| {
+        let rounded: Option<f64> = format!("{value:.decimals$}").parse().ok();
+        rounded.and_then(|rounded| rounded.partial_cmp(&bound)) == side
+    };
+    let decimals = (2..17).find(shows_side).unwrap_or(17);
+    with_minus_sign(&format!("{value:.decimals$}"))
+}
+
+fn rounded(value: f64) -> String {
+    with_minus_sign(&format!("{value:.2}"))
+}
+
+/// A value of the rules, to a hundredth of a millimetre.
+fn rule_value(value: f64) -> String {
+    with_minus_sign(&((value * 1e5).round() / 1e5).to_string())
+}
+
+/// Replaces a hyphen by a minus sign, and drops it if the number is rounded to zero.
+fn with_minus_sign(text: &str) -> String {
+    match text.strip_prefix('-') {
+        Some(digits) if digits.chars().all(|c| matches!(c, '0' | '.')) => digits.to_owned(),
+        Some(digits) => format!("−{digits}"),
+        None => text.to_owned(),
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,248 @@
+use crate::{
+    arena::Arena,
+    record::{AnswerTiming, EpisodeStart, StepRow, StepSink},
+    time_sum::TimeSum,
+};
+use faceoff_sim::{EPISODE_STEPS, Episode};
+use faceoff_types::{
+    AgentFault, AgentFaultKind, AgentTask, EpisodeEnd, EpisodeOutcome, Interpolation, Phase, Task,
+};
+
+/// A running episode. It provides the observations for the agent, takes its answers and computes their effects. The caller
+/// provides the answers, from a process, a recording or a function:
+///
+/// ```
+/// # use faceoff_episode::{AnswerTiming, Arena, RunningEpisode, NullSink};
+/// # use faceoff_types::{Interpolation, Phase, Profile, Seed, Task};
+/// # let seed = Seed::from_number(1);
+/// let arena = Arena::new(Profile::Ideal, seed, seed.model_mismatch());
+/// let mut running = RunningEpisode::begin(&arena, Task::Hit, 0, Some(Interpolation::Linear), NullSink);
+/// let outcome = loop {
+///     let joint_positions = running.question()?.observation[6..13].to_vec();
+///     let timing = AnswerTiming {
+///         computation_time_s: 0.001,
+///         host_time_s: 0.0,
+///         cpu_time_s: None,
+///     };
+///     match running.answer(&joint_positions, timing) {
+///         Ok(None) => {}
+///         Ok(Some(outcome)) => break outcome,
+///         Err(fault) => break running.outcome_after_fault(Phase::Step, fault, None),
+///     }
+/// };
+/// assert!(outcome.steps <= 500);
+/// # Ok::<(), faceoff_episode::NonFiniteObservation>(())
+/// ```
+///
+/// The sink receives the start of the episode and each step. The caller reports its end to the sink: a try that does not
+/// count is started again instead.
+#[derive(Debug)]
+pub struct RunningEpisode<S> {
+    task: Task,
+    episode: u32,
+    max_steps: u32,
+    world: Episode,
+    times: TimeSum,
+    end: Option<EpisodeEnd>,
+    /// The fault, if the last answer made the world diverge.
+    diverged: Option<AgentFaultKind>,
+    sink: S,
+}
+
+/// The next observation, which the agent has to answer with an action.
+#[derive(Debug, Clone, Copy)]
+pub struct Question<'a> {
+    /// The control step, from 0.
+    pub step: u32,
+    /// 23 numbers with an opponent on the table, 20 without (PROTOCOL); finite.
+    pub observation: &'a [f64],
+}
+
+/// The initial observation is not finite. It is not sent to an agent: JSON would have null, and the agent's reaction would
+/// count as its fault.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("the simulator's first observation of {agent_task}, episode {episode} is not finite")]
+pub struct NonFiniteObservation {
+    /// The task of the agent.
+    pub agent_task: AgentTask,
+    /// Index within the evaluation; in a game, number of the rally.
+    pub episode: u32,
+}
+
+impl<S: StepSink> RunningEpisode<S> {
+    /// Starts an episode. Without an interpolation from the agent, only its fault can follow; the initial state, which is the
+    /// same for all agents, is recorded nevertheless.
+    pub fn begin(
+        arena: &Arena,
+        task: Task,
+        episode: u32,
+        interpolation: Option<Interpolation>,
+        mut sink: S,
+    ) -> Self {
+        let world = arena.episode(task, episode, interpolation.unwrap_or(Interpolation::Cubic));
+        sink.begin(EpisodeStart {
+            episode,
+            seed: arena.seed(task, episode),
+            interpolation,
+            state: &world.state(),
+        });
+        Self {
+            task,
+            episode,
+            max_steps: EPISODE_STEPS,
+            world,
+            times: TimeSum::default(),
+            end: None,
+            diverged: None,
+            sink,
+        }
+    }
+
+    /// Ends the episode after `max_steps` control steps, if that is before the task's horizon.
+    #[must_use]
+    pub fn with_max_steps(self, max_steps: u32) -> Self {
+        Self { max_steps, ..self }
+    }
+
+    /// The next observation for the agent.
+    ///
+    /// # Errors
+    /// If the simulator failed, which is neither an end nor an agent fault.
+    pub fn question(&self) -> Result<Question<'_>, NonFiniteObservation> {
+        let (step, observation) = (self.world.steps(), self.world.observation());
+        // Later observations are finite, since a diverging world ends the episode.
+        if step == 0 && !are_finite(observation) {
+            return Err(NonFiniteObservation {
+                agent_task: AgentTask::Qualifying(self.task),
+                episode: self.episode,
+            });
+        }
+        Ok(Question { step, observation })
+    }
+
+    /// Simulates one control step. `action` is row-major, finite, and has the length of the interpolation. Returns the outcome
+    /// at the end of the episode, after which this must not be called again.
+    ///
+    /// # Errors
+    /// If the action made the world diverge: an agent fault, which ends the episode. The sink receives the step as any other,
+    /// so that a replay of the answers ends in the same way.
+    pub fn answer(
+        &mut self,
+        action: &[f64],
+        timing: AnswerTiming,
+    ) -> Result<Option<EpisodeOutcome>, AgentFaultKind> {
+        debug_assert_eq!(self.end, None, "the episode has ended");
+        let step = self.world.steps();
+        self.sink.observe(self.world.observation());
+        let outcome = self.world.step(action);
+        self.times.add(timing.computation_time_s);
+        self.sink.step(&StepRow {
+            step,
+            action,
+            timing,
+            state: &self.world.state(),
+            constraints: outcome.constraints,
+            next_observation: self.world.observation(),
+            puck_lost: self.world.is_puck_lost(),
+            impacts: self.world.world().impacts(),
+        });
+        let detail = match self.world.divergence() {
+            Some(divergence) => Some(divergence.what.to_string()),
+            None if !are_finite(self.world.observation()) => {
+                Some("an observation is not finite".to_owned())
+            }
+            None => None,
+        };
+        if let Some(detail) = detail {
+            self.end = Some(EpisodeEnd::AgentFault);
+            let fault = AgentFaultKind::Diverged { detail };
+            self.diverged = Some(fault.clone());
+            return Err(fault);
+        }
+        let horizon = (self.steps() >= self.max_steps).then_some(EpisodeEnd::Horizon);
+        self.end = outcome.end.or(horizon);
+        Ok(self.end.map(|end| self.outcome(end, None)))
+    }
+
+    /// The outcome after an agent fault in `phase`.
+    pub fn outcome_after_fault(
+        &self,
+        phase: Phase,
+        fault: AgentFaultKind,
+        line: Option<String>,
+    ) -> EpisodeOutcome {
+        let fault = AgentFault {
+            fault,
+            agent_task: AgentTask::Qualifying(self.task),
+            episode: (phase != Phase::StartUp).then_some(self.episode),
+            step: (phase == Phase::Step).then(|| self.faulty_step()),
+            line,
+        };
+        self.outcome(EpisodeEnd::AgentFault, Some(fault))
+    }
+
+    /// The outcome after a fault from another source, such as a recording. `None` if it cannot be a fault of this episode
+    /// after the steps simulated so far.
+    pub fn outcome_after_recorded_fault(&self, fault: AgentFault) -> Option<EpisodeOutcome> {
+        let AgentFault {
+            agent_task,
+            episode,
+            step,
+            ..
+        } = fault;
+        let is_consistent = match (episode, step) {
+            (Some(episode), Some(step)) => episode == self.episode && step == self.faulty_step(),
+            (Some(episode), None) => episode == self.episode && self.steps() == 0,
+            (None, None) => self.steps() == 0,
+            (None, Some(_)) => false,
+        };
+        // Divergence is detected here, so the fault must agree with it.
+        let agrees = match &self.diverged {
+            Some(diverged) => fault.fault == *diverged,
+            None => self.end.is_none() && !matches!(fault.fault, AgentFaultKind::Diverged { .. }),
+        };
+        let possible = agrees && agent_task == AgentTask::Qualifying(self.task) && is_consistent;
+        possible.then(|| self.outcome(EpisodeEnd::AgentFault, Some(fault)))
+    }
+
+    /// The step of a fault: the one whose answer is due, or whose action made the world diverge.
+    fn faulty_step(&self) -> u32 {
+        self.steps() - u32::from(self.diverged.is_some())
+    }
+
+    /// How the episode ended; `None` while it is running, and after a fault that the caller detected.
+    pub const fn end(&self) -> Option<EpisodeEnd> {
+        self.end
+    }
+
+    /// The fault, if the last answer made the world diverge.
+    pub const fn diverged(&self) -> Option<&AgentFaultKind> {
+        self.diverged.as_ref()
+    }
+
+    pub fn steps(&self) -> u32 {
+        self.world.steps()
+    }
+
+    /// The sink of the episode.
+    pub const fn sink(&mut self) -> &mut S {
+        &mut self.sink
+    }
+
+    fn outcome(&self, end: EpisodeEnd, fault: Option<AgentFault>) -> EpisodeOutcome {
+        EpisodeOutcome {
+            task: self.task,
+            episode: self.episode,
+            steps: self.steps(),
+            end,
+            success: fault.is_none() && self.world.success(),
+            violations: self.world.violations(),
+            computation_time: self.times.summary(),
+            fault,
+        }
+    }
+}
+
+pub(crate) fn are_finite(observation: &[f64]) -> bool {
+    observation.iter().all(|value| value.is_finite())
+}

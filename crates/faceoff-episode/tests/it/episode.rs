@@ -1,0 +1,223 @@
+use faceoff_episode::{
+    AnswerTiming, Arena, RunningEpisode, EpisodeStart, NullSink, Question, RecordError, StepRow, StepSink,
+};
+use faceoff_sim::Bounds;
+use faceoff_types::{
+    AgentFault, AgentFaultKind, EpisodeEnd, EpisodeOutcome, Interpolation, Phase, Profile, Ruleset,
+    Seed, Task,
+};
+
+/// Records everything that a sink receives. Floats are formatted so that they round-trip to the bit.
+#[derive(Default)]
+struct SinkLog {
+    lines: Vec<String>,
+    actions: Vec<Vec<f64>>,
+    times: Vec<AnswerTiming>,
+}
+
+impl StepSink for SinkLog {
+    fn begin(&mut self, start: EpisodeStart<'_>) {
+        self.lines.push(format!("{start:?}"));
+    }
+    fn observe(&mut self, observation: &[f64]) {
+        self.lines.push(format!("{observation:?}"));
+    }
+    fn step(&mut self, row: &StepRow<'_>) {
+        self.lines.push(format!("{row:?}"));
+        self.actions.push(row.action.to_vec());
+        self.times.push(row.timing);
+    }
+    fn end(&mut self, outcome: &EpisodeOutcome, _: u32) -> Result<(), RecordError> {
+        self.lines.push(format!("{outcome:?}"));
+        Ok(())
+    }
+}
+
+fn arena() -> Arena {
+    let seed = Seed::from_number(3);
+    Arena::new(Profile::Evaluation, seed, seed.model_mismatch())
+}
+
+fn begin<S: StepSink>(task: Task, sink: S) -> RunningEpisode<S> {
+    RunningEpisode::begin(&arena(), task, 4, Some(Interpolation::Cubic), sink)
+}
+
+/// Answers with slightly moved joint positions, and a computation time that depends on the step.
+fn answer<S: StepSink>(running: &mut RunningEpisode<S>) -> Option<EpisodeOutcome> {
+    let question = running.question().unwrap();
+    let mut action = question.observation[6..13].to_vec();
+    action[0] += 0.01;
+    action.extend([0.0; 7]);
+    let timing = AnswerTiming {
+        computation_time_s: 0.001 * f64::from(question.step),
+        host_time_s: 0.0,
+        cpu_time_s: None,
+    };
+    running.answer(&action, timing).unwrap()
+}
+
+#[test]
+fn replayed_answers_give_the_same_recording() {
+    for task in Task::ALL {
+        let mut played = SinkLog::default();
+        let mut running = begin(task, &mut played);
+        let outcome = loop {
+            if let Some(outcome) = answer(&mut running) {
+                break outcome;
+            }
+        };
+        assert_eq!(running.end(), Some(outcome.end));
+        assert_eq!((outcome.task, outcome.episode), (task, 4));
+        let max_s = 0.001 * f64::from(outcome.steps - 1);
+        assert_eq!(outcome.computation_time.max_s, max_s);
+
+        let mut running = begin(task, SinkLog::default());
+        let mut replayed = None;
+        for (action, timing) in played.actions.iter().zip(&played.times) {
+            assert_eq!(replayed, None, "the episode ends with the last answer");
+            replayed = running.answer(action, *timing).unwrap();
+        }
+        assert_eq!(replayed, Some(outcome));
+        assert_eq!(running.sink().lines, played.lines);
+    }
+}
+
+#[test]
+fn episode_can_be_limited_in_steps() {
+    let mut running = begin(Task::Hit, NullSink).with_max_steps(2);
+    assert_eq!(answer(&mut running), None);
+    let outcome = answer(&mut running).unwrap();
+    assert_eq!((outcome.steps, outcome.end), (2, EpisodeEnd::Horizon));
+}
+
+#[test]
+fn fault_has_the_position_of_the_pending_answer() {
+    let mut running = begin(Task::Defend, NullSink);
+    for (phase, episode, step) in [
+        (Phase::StartUp, None, None),
+        (Phase::Reset, Some(4), None),
+        (Phase::Step, Some(4), Some(2)),
+    ] {
+        while phase == Phase::Step && running.steps() < 2 {
+            assert_eq!(answer(&mut running), None);
+        }
+        let line = Some("oops".to_owned());
+        let outcome = running.outcome_after_fault(phase, AgentFaultKind::NonFinite, line);
+        let fault = outcome.fault.clone().unwrap();
+        assert_eq!((fault.episode, fault.step), (episode, step));
+        assert_eq!(fault.agent_task, Task::Defend.into());
+        assert_eq!(outcome.end, EpisodeEnd::AgentFault);
+        assert!(!outcome.success);
+        assert_eq!(running.outcome_after_recorded_fault(fault), Some(outcome));
+    }
+}
+
+#[test]
+fn inconsistent_recorded_fault_is_refused() {
+    let mut running = begin(Task::Defend, NullSink).with_max_steps(2);
+    assert_eq!(answer(&mut running), None);
+    let outcome = running.outcome_after_fault(Phase::Step, AgentFaultKind::NonFinite, None);
+    let fault = outcome.fault.unwrap();
+    let with = |change: &dyn Fn(&mut AgentFault)| {
+        let mut fault = fault.clone();
+        change(&mut fault);
+        fault
+    };
+    for inconsistent in [
+        with(&|fault| fault.agent_task = Task::Hit.into()),
+        with(&|fault| fault.episode = Some(5)),
+        with(&|fault| fault.step = Some(0)),
+        with(&|fault| fault.step = None),
+        with(&|fault| (fault.episode, fault.step) = (None, None)),
+        with(&|fault| fault.episode = None),
+    ] {
+        assert_eq!(running.outcome_after_recorded_fault(inconsistent.clone()), None, "{inconsistent}");
+    }
+    assert!(running.outcome_after_recorded_fault(fault.clone()).is_some());
+    assert!(answer(&mut running).is_some());
+    let after_the_end = with(&|fault| fault.step = Some(2));
+    assert_eq!(running.outcome_after_recorded_fault(after_the_end), None);
+}
+
+/// An action with all numbers at the bound, in the direction in which each joint already turns.
+fn extreme_action(observation: &[f64]) -> Vec<f64> {
+    let dq = &observation[13..20];
+    (0..Interpolation::Trajectory.len())
+        .map(|i| 1e4f64.copysign(dq[i % 7]))
+        .collect()
+}
+
+fn begin_within<S: StepSink>(bounds: Bounds, sink: S) -> RunningEpisode<S> {
+    let interpolation = Some(Interpolation::Trajectory);
+    let arena = arena().with_bounds(bounds);
+    RunningEpisode::begin(&arena, Task::Prepare, 4, interpolation, sink)
+}
+
+#[test]
+fn divergence_is_an_agent_fault() {
+    let timing = AnswerTiming {
+        computation_time_s: 0.001,
+        host_time_s: 0.0,
+        cpu_time_s: None,
+    };
+    let narrow = Bounds {
+        joint_rad_s: 50.0,
+        ..Bounds::WIDE
+    };
+    let mut played = SinkLog::default();
+    let mut running = begin_within(narrow, &mut played);
+    let kind = loop {
+        let Question { observation, .. } = running.question().unwrap();
+        assert!(observation.iter().all(|number| number.is_finite()));
+        let action = extreme_action(observation);
+        match running.answer(&action, timing) {
+            Ok(None) => {}
+            Ok(Some(outcome)) => panic!("it ended by {:?}", outcome.end),
+            Err(kind) => break kind,
+        }
+    };
+    assert!(matches!(kind, AgentFaultKind::Diverged { .. }), "{kind:?}");
+    assert!(
+        kind.to_string()
+            .contains("made the simulated world diverge")
+    );
+    assert_eq!(running.diverged(), Some(&kind));
+    let outcome = running.outcome_after_fault(Phase::Step, kind, Some("{}".to_owned()));
+    let fault = outcome.fault.clone().unwrap();
+    // The diverging step is recorded, and the fault has its number.
+    assert_eq!(fault.step, Some(outcome.steps - 1));
+    assert_eq!(
+        (outcome.end, outcome.success),
+        (EpisodeEnd::AgentFault, false)
+    );
+
+    // A replay of the answers ends in the same way and accepts no other fault.
+    let mut running = begin_within(narrow, SinkLog::default());
+    let (last, before) = played.actions.split_last().unwrap();
+    for action in before {
+        assert_eq!(running.answer(action, timing), Ok(None));
+        assert_eq!(running.outcome_after_recorded_fault(fault.clone()), None);
+    }
+    running.answer(last, timing).unwrap_err();
+    assert_eq!(running.sink().lines, played.lines);
+    let with = |change: &dyn Fn(&mut AgentFault)| {
+        let mut fault = fault.clone();
+        change(&mut fault);
+        fault
+    };
+    for other in [
+        with(&|fault| fault.fault = AgentFaultKind::NonFinite),
+        with(&|fault| fault.fault = AgentFaultKind::Diverged { detail: "x".into() }),
+        with(&|fault| fault.step = Some(outcome.steps)),
+        with(&|fault| fault.step = None),
+    ] {
+        assert_eq!(running.outcome_after_recorded_fault(other.clone()), None, "{other}");
+    }
+    assert_eq!(running.outcome_after_recorded_fault(fault), Some(outcome));
+
+    // The first ruleset had no such bounds.
+    let mut running = begin_within(Bounds::of(Ruleset::First), NullSink);
+    for action in &played.actions {
+        assert!(running.answer(action, timing).is_ok());
+    }
+}

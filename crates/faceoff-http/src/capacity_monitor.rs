@@ -1,0 +1,106 @@
+//! Logs a warning for each evaluation day that will not finish before its deadline.
+
+use faceoff_api::views::capacity::{DayLoad, Fit};
+use faceoff_service::{config::Capacity, views::capacity};
+use faceoff_store::{Change, Event, Store, StoreError};
+use faceoff_types::{Clock, StageDay, StageName};
+use std::{collections::BTreeSet, time::Duration};
+use tokio::sync::broadcast::error::RecvError;
+
+/// Between two checks without a cutoff. The forecast is in hours, so a minute is often enough.
+const INTERVAL: Duration = Duration::from_secs(60);
+
+/// An evaluation day that does not fit into its time, judged by the recent duration of such episodes.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CapacityWarning {
+    pub stage: StageName,
+    /// The open episodes, the deadline, and a sentence about both.
+    pub load: DayLoad,
+}
+
+/// Checks the forecast of all stages, and remembers which days did not fit, so that it warns once of each.
+#[derive(Debug)]
+pub struct CapacityMonitor {
+    store: Store,
+    clock: Clock,
+    capacity: Capacity,
+    /// Days of the last check that did not fit, with whether their cutoff has passed.
+    overfull: BTreeSet<(StageDay, bool)>,
+}
+
+impl CapacityMonitor {
+    /// A monitor that has not checked anything yet.
+    #[must_use]
+    pub const fn new(store: Store, clock: Clock, capacity: Capacity) -> Self {
+        Self {
+            store,
+            clock,
+            capacity,
+            overfull: BTreeSet::new(),
+        }
+    }
+
+    /// The days that do not fit now, but did at the last check, or whose cutoff has passed since. Days without a measured
+    /// duration are not among them.
+    ///
+    /// # Errors
+    /// If the database cannot be read.
+    pub async fn check(&mut self) -> Result<Vec<CapacityWarning>, StoreError> {
+        let now = self.clock.now();
+        let (mut new, mut overfull) = (Vec::new(), BTreeSet::new());
+        for stage in self.store.stages().await? {
+            let forecast = capacity::forecast(&self.store, &self.capacity, stage.id, now);
+            let overfull_days = forecast.await?.days.into_iter();
+            for load in overfull_days.filter(|load| load.fit == Fit::Not) {
+                let day = StageDay {
+                    stage: stage.id,
+                    date: load.day,
+                };
+                let key = (day, load.is_under_way);
+                overfull.insert(key);
+                if !self.overfull.contains(&key) {
+                    new.push(CapacityWarning {
+                        stage: stage.name.clone(),
+                        load,
+                    });
+                }
+            }
+        }
+        self.overfull = overfull;
+        Ok(new)
+    }
+
+    /// Logs a line for each day that does not fit any more. Checks at each cutoff and every minute, until `shutdown` completes.
+    pub async fn run(mut self, shutdown: impl Future<Output = ()>) {
+        tokio::pin!(shutdown);
+        let mut events = self.store.events();
+        loop {
+            match self.check().await {
+                Ok(warnings) => {
+                    for CapacityWarning { stage, load } in warnings {
+                        tracing::warn!(%stage, day = %load.day, "{}", load.summary);
+                    }
+                }
+                Err(error) => {
+                    tracing::debug!(%error, "cannot read the capacity forecast; trying again");
+                }
+            }
+            let timer = tokio::time::sleep(INTERVAL);
+            tokio::pin!(timer);
+            loop {
+                tokio::select! {
+                    () = &mut shutdown => return,
+                    () = &mut timer => break,
+                    change = events.recv() => match change {
+                        Ok(Change::Recorded(record))
+                            if matches!(record.event, Event::DayStarted { .. }) => break,
+                        // A missed event may have been a cutoff.
+                        Err(RecvError::Lagged(_)) => break,
+                        Err(RecvError::Closed) => return,
+                        Ok(_) => {}
+                    },
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,269 @@
+//! Blind stages: results are visible to organisers only, on every page and in the whole API.
+
+use crate::site::{ADMIN, Answer, Site, TestTeam, result};
+use reqwest::Method;
+use serde_json::{Value, json};
+
+async fn change(site: &Site, body: Value) -> Answer {
+    let path = format!("/api/v1/stages/{}", site.stage().await);
+    let request = site.request(Method::PATCH, &path, Some(ADMIN));
+    Answer::of(request.json(&body).send().await.unwrap()).await
+}
+
+/// A blind day of two teams. Returns the paths of their evaluations in the API.
+async fn blind_day(site: &Site) -> ([TestTeam; 2], [String; 2]) {
+    let teams = [site.team("Alpha").await, site.team("Beta").await];
+    let mut submissions = Vec::new();
+    for team in &teams {
+        submissions.push(site.valid_submission(team, "agent").await);
+    }
+    let blind = change(site, json!({ "blind": true })).await.json(200);
+    assert_eq!(blind["blind"], true);
+    let paths = [
+        site.evaluate(&teams[0], &submissions[0]).await,
+        site.evaluate(&teams[1], &submissions[1]).await,
+    ];
+    (teams, paths)
+}
+
+/// Texts that reveal a score.
+const REVEALING: [&str; 12] = [
+    "success_rate",
+    "successes",
+    "\"tier\"",
+    "\"score\"",
+    "penalty_points\"",
+    "blake3\":\"",
+    "51.1",
+    "0.511",
+    "59.98",
+    "60.0 ",
+    "777.5",
+    "told_apart",
+];
+
+#[track_caller]
+fn check_reveals_nothing(answer: &Answer) {
+    for text in REVEALING {
+        assert!(!answer.body.contains(text), "{text} is in {}", answer.body);
+    }
+}
+
+#[tokio::test]
+async fn blind_results_are_visible_to_organisers_only() {
+    let site = Site::start().await;
+    let ([alpha, beta], [alpha_evaluation, beta_evaluation]) = blind_day(&site).await;
+    site.finish_evaluation(&result([0.511, 0.622, 0.733], 777.5)).await;
+    site.finish_evaluation(&result([0.1, 0.2, 0.3], 10.0)).await;
+    let ids = [&alpha_evaluation, &beta_evaluation].map(|path| path.rsplit('/').next().unwrap().to_owned());
+    let compared = format!("{alpha_evaluation}/compare/{}", ids[1]);
+    let pages = [
+        "/".to_owned(),
+        "/tasks/hit".to_owned(),
+        "/season".to_owned(),
+        alpha_evaluation.replace("/api/v1", ""),
+        format!("/teams/{}", alpha.id),
+    ];
+
+    for token in [None, Some(&alpha.token), Some(&beta.token)] {
+        let token = token.map(String::as_str);
+        for board in [
+            "/api/v1/board",
+            "/api/v1/board/hit",
+            "/api/v1/board?revision=1",
+        ] {
+            let answer = site.get(board, token).await;
+            check_reveals_nothing(&answer);
+            let board = answer.json(200);
+            assert_eq!(
+                (&board["blind"], &board["rows"]),
+                (&json!(true), &json!([]))
+            );
+        }
+        let season = site.get("/api/v1/season", token).await;
+        check_reveals_nothing(&season);
+        let season = season.json(200);
+        assert_ne!(season["days"][0]["released_at"], json!(null));
+        assert_eq!(
+            season["days"][0]["seed"],
+            json!(null),
+            "scores could be computed from the seed"
+        );
+        site.get(&compared, token).await.problem(
+            409,
+            "blind",
+            &["Qualifying", "blind", "organisers reveal"],
+        );
+        for page in &pages {
+            let page = site.get(page, token).await;
+            assert_eq!(page.status, 200, "{}", page.body);
+            let html = scraper::Html::parse_document(&page.body);
+            assert!(html.errors.is_empty(), "{:?}", html.errors);
+            check_reveals_nothing(&page);
+        }
+        let page = site.get(&compared.replace("/api/v1", ""), token).await;
+        assert_eq!(page.status, 409);
+        check_reveals_nothing(&page);
+        let board = site.get("/", token).await.body;
+        for words in [
+            "blind",
+            "No date is set",
+            "Hidden until the organisers reveal",
+        ] {
+            assert!(board.contains(words), "{words} is not in {board}");
+        }
+    }
+
+    let own = site.get(&alpha_evaluation, Some(&alpha.token)).await;
+    check_reveals_nothing(&own);
+    let own = own.json(200);
+    assert_eq!(
+        (&own["state"], &own["blind"]),
+        (&json!("finished"), &json!(true))
+    );
+    assert_eq!(
+        own["progress"]["episodes_done"],
+        own["progress"]["episodes_total"]
+    );
+    assert_eq!((own.get("result"), own.get("dataset")), (None, None));
+    for list in [
+        "/api/v1/evaluations",
+        "/api/v1/me",
+        "/api/v1/submissions",
+        "/api/v1/evaluations?day=2026-03-01",
+    ] {
+        let answer = site.get(list, Some(&alpha.token)).await;
+        assert_eq!(answer.status, 200);
+        if list != "/api/v1/submissions" {
+            check_reveals_nothing(&answer);
+        }
+    }
+    for file in ["dataset", "violations"] {
+        let path = format!("{alpha_evaluation}/{file}");
+        site.get(&path, Some(&alpha.token))
+            .await
+            .problem(409, "blind", &["Qualifying"]);
+        site.get(&path, None)
+            .await
+            .problem(401, "unauthenticated", &[]);
+        site.get(&path, Some(&beta.token))
+            .await
+            .problem(404, "not-found", &[]);
+    }
+    site.post(
+        &format!("{alpha_evaluation}/publish"),
+        Some(&alpha.token),
+        &json!({}),
+    )
+    .await
+    .problem(409, "blind", &[]);
+
+    // The organiser sees everything; an invalid organiser token shows nothing.
+    let board = site.get("/api/v1/board", Some(ADMIN)).await.json(200);
+    assert_eq!(
+        (&board["blind"], board["rows"].as_array().unwrap().len()),
+        (&json!(true), 2)
+    );
+    let full = site.get(&alpha_evaluation, Some(ADMIN)).await.json(200);
+    assert_eq!(full["result"]["tasks"]["hit"]["success_rate"], 0.511);
+    assert_eq!(site.get(&compared, Some(ADMIN)).await.status, 200);
+    let page = site.get("/", Some(ADMIN)).await.body;
+    assert!(
+        page.contains("only organisers see this board") && page.contains("51.1"),
+        "{page}"
+    );
+    site.get("/api/v1/board", Some("fo_admin_wrong"))
+        .await
+        .problem(401, "unauthenticated", &[]);
+
+    // Once revealed, results cannot be hidden again.
+    let opened = change(&site, json!({ "blind": false })).await.json(200);
+    assert_eq!(opened["blind"], false);
+    let board = site.get("/api/v1/board", None).await.json(200);
+    assert_eq!(
+        (&board["blind"], board["rows"].as_array().unwrap().len()),
+        (&json!(false), 2)
+    );
+    assert_ne!(
+        site.get("/api/v1/season", None).await.json(200)["days"][0]["seed"],
+        json!(null)
+    );
+    let own = site.get(&alpha_evaluation, Some(&alpha.token)).await.json(200);
+    assert_eq!(
+        (own.get("blind"), &own["result"]["penalty_points"]),
+        (None, &json!(777.5))
+    );
+    let dataset = site
+        .get(&format!("{alpha_evaluation}/dataset"), Some(&alpha.token))
+        .await;
+    assert_eq!(dataset.status, 200);
+    change(&site, json!({ "blind": true })).await.problem(
+        409,
+        "conflict",
+        &["2 evaluations", "that was visible"],
+    );
+}
+
+#[tokio::test]
+async fn faults_of_a_blind_stage_are_hidden() {
+    let site = Site::start().await;
+    let ([alpha, _], [alpha_evaluation, beta_evaluation]) = blind_day(&site).await;
+    site.run_shards(2).await;
+    site.finish_evaluation(&result([0.1, 0.2, 0.3], 10.0)).await;
+    let own = site.get(&alpha_evaluation, Some(&alpha.token)).await.json(200);
+    assert_eq!(own["state"], "agent_failed");
+    assert_ne!(own["released_at"], json!(null));
+    assert_eq!((own.get("faults"), own.get("log")), (None, None));
+    let page = site.get(&alpha_evaluation.replace("/api/v1", ""), None).await.body;
+    assert!(
+        page.contains("results are hidden") && !page.contains("protocol"),
+        "{page}"
+    );
+    let board = site.get("/", None).await.body;
+    assert!(!board.contains("failed"), "{board}");
+    let all = site.get(&alpha_evaluation, Some(ADMIN)).await.json(200);
+    assert_eq!(all["faults"].as_array().unwrap().len(), 2);
+    drop(beta_evaluation);
+    change(&site, json!({ "blind": false })).await.json(200);
+    let own = site.get(&alpha_evaluation, Some(&alpha.token)).await.json(200);
+    assert_eq!(own["faults"].as_array().unwrap().len(), 2);
+}
+
+#[tokio::test]
+async fn blind_setting_is_validated_and_for_organisers_only() {
+    let site = Site::start().await;
+    let team = site.team("Alpha").await;
+    let new = json!({ "name": "Final", "blind": true, "publishes": "never", "standings": { "mean_of_last": 3 } });
+    let made = site
+        .post("/api/v1/stages", Some(ADMIN), &new)
+        .await
+        .json(201);
+    assert_eq!(made["blind"], true);
+    assert_eq!(
+        (&made["publishes"], &made["standings"]),
+        (&json!("never"), &json!({ "mean_of_last": 3 }))
+    );
+    for (field, wrong) in [
+        ("blind", json!("yes")),
+        ("publishes", json!("tomorrow")),
+        ("standings", json!("worst")),
+        ("standings", json!({ "mean_of_last": 0 })),
+        ("standings", json!({ "mean_of_last": 101 })),
+        ("standings", json!({ "mean_of_last": -1 })),
+    ] {
+        let body = json!({ field: wrong });
+        change(&site, body)
+            .await
+            .problem(422, "invalid-content", &[field]);
+    }
+    let path = format!("/api/v1/stages/{}", site.stage().await);
+    for (token, status) in [(None, 401), (Some(team.token.as_str()), 403)] {
+        let request = site.request(Method::PATCH, &path, token);
+        let answer = request
+            .json(&json!({ "blind": true }))
+            .send()
+            .await
+            .unwrap();
+        assert_eq!(answer.status().as_u16(), status);
+    }
+}

@@ -1,0 +1,192 @@
+//! Paginated lists.
+
+use crate::{
+    site::{ADMIN, Answer, Site, TestTeam, result, string},
+    tournament::cup::Cup,
+};
+use serde_json::{Value, json};
+use std::collections::BTreeSet;
+
+/// The path of the next page, from the `Link` header.
+fn next_page(answer: &Answer) -> Option<String> {
+    let link = answer.headers.get("link")?.to_str().unwrap();
+    let (path, rel) = link.strip_prefix('<').unwrap().split_once('>').unwrap();
+    assert_eq!(rel, "; rel=\"next\"");
+    Some(path.to_owned())
+}
+
+/// The values of a field on all pages. Calls `between` between two pages.
+async fn collect_pages(
+    site: &Site,
+    path: &str,
+    token: Option<&str>,
+    field: &str,
+    between: impl AsyncFn(usize),
+) -> Vec<String> {
+    let mut found = Vec::new();
+    let mut path = path.to_owned();
+    for page in 0.. {
+        let answer = site.get(&path, token).await;
+        let rows = answer.json(200);
+        let rows = rows.as_array().unwrap();
+        found.extend(rows.iter().map(|row| string(&row[field])));
+        match next_page(&answer) {
+            Some(next) => path = next,
+            None => break,
+        }
+        between(page).await;
+    }
+    found
+}
+
+async fn no_change(_: usize) {}
+
+async fn run_day(site: &Site, teams: usize) {
+    let started = site.post("/api/v1/days", Some(ADMIN), &json!({})).await;
+    started.json(200);
+    for _ in 0..teams {
+        site.finish_evaluation(&result([0.5; 3], 10.0)).await;
+    }
+}
+
+#[tokio::test]
+async fn pages_list_each_row_once_while_rows_are_added() {
+    let site = Site::start().await;
+    let names = ["Delta", "Beta", "Epsilon", "Gamma", "Alpha"];
+    for name in names {
+        site.team(name).await;
+    }
+    let add = async |page: usize| {
+        // One sorts before the rows that were read, one after them.
+        site.team(&format!("A before {page}")).await;
+        site.team(&format!("Zeta {page}")).await;
+    };
+    let path = "/api/v1/teams?limit=2";
+    let found = collect_pages(&site, path, Some(ADMIN), "name", add).await;
+    let once: BTreeSet<&String> = found.iter().collect();
+    assert_eq!(once.len(), found.len(), "{found:?}");
+    for name in names {
+        assert!(found.iter().any(|one| one == name), "{name}: {found:?}");
+    }
+}
+
+#[tokio::test]
+async fn submissions_and_evaluations_are_listed_newest_first() {
+    let site = Site::start().await;
+    let [alpha, beta]: [TestTeam; 2] = [site.team("Alpha").await, site.team("Beta").await];
+    let mut uploaded = Vec::new();
+    // All with the same time stamp.
+    for _ in 0..5 {
+        let path = site.valid_submission(&alpha, "a").await;
+        uploaded.push(path.rsplit('/').next().unwrap().to_owned());
+    }
+    site.valid_submission(&beta, "b").await;
+    uploaded.reverse();
+    let own = Some(alpha.token.as_str());
+    let add = async |_| {
+        site.valid_submission(&alpha, "a").await;
+    };
+    let path = "/api/v1/submissions?limit=2";
+    assert_eq!(collect_pages(&site, path, own, "id", add).await, uploaded);
+
+    for _ in 0..5 {
+        run_day(&site, 2).await;
+        site.next_day();
+    }
+    let all = site.get("/api/v1/evaluations", own).await;
+    assert_eq!(next_page(&all), None);
+    let all: Vec<String> = all
+        .json(200)
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|row| string(&row["id"]))
+        .collect();
+    assert_eq!(all.len(), 5);
+    let add = async |page| {
+        if page == 0 {
+            run_day(&site, 2).await;
+        }
+    };
+    let path = "/api/v1/evaluations?limit=2";
+    assert_eq!(collect_pages(&site, path, own, "id", add).await, all);
+    // The link to the next page keeps the other parameters.
+    let filtered = "/api/v1/evaluations?day=2026-03-02&limit=1";
+    let alpha_days = collect_pages(&site, filtered, own, "day", no_change).await;
+    assert_eq!(alpha_days, ["2026-03-02"]);
+    let first = site.get(filtered, Some(ADMIN)).await;
+    assert!(
+        next_page(&first)
+            .unwrap()
+            .contains("day=2026-03-02&limit=1&after=")
+    );
+    let mut team_names = collect_pages(&site, filtered, Some(ADMIN), "team_name", no_change).await;
+    team_names.sort();
+    assert_eq!(team_names, ["Alpha", "Beta"]);
+}
+
+#[tokio::test]
+async fn growing_lists_are_paginated() {
+    let cup = Cup::open(&["A", "B", "C"], json!({})).await;
+    let site = &cup.site;
+    cup.start_round().await;
+    for title in ["one", "two"] {
+        let new = json!({ "title": title, "text": title });
+        let announced = site.post("/api/v1/announcements", Some(ADMIN), &new).await;
+        announced.json(201);
+        let question = json!({ "text": title });
+        let asked = site
+            .post("/api/v1/questions", Some(cup.token("A")), &question)
+            .await;
+        asked.json(201);
+        let invitation = json!({ "role": "organiser", "note": title });
+        let invited = site
+            .post("/api/v1/invitations", Some(ADMIN), &invitation)
+            .await;
+        let code = &invited.json(201)["code"];
+        let user = json!({ "code": code, "name": title });
+        let joined = site.post("/api/v1/invitations/accept", None, &user).await;
+        joined.json(201);
+    }
+    let games = cup.games().await[0]["tournament"].clone();
+    let games = format!("/api/v1/tournaments/{}/games", string(&games));
+    let lists = [
+        "/api/v1/announcements",
+        "/api/v1/questions",
+        "/api/v1/invitations",
+        "/api/v1/people",
+        "/api/v1/tokens",
+        "/api/v1/teams",
+        &games,
+    ];
+    for list in lists {
+        let whole = site.get(list, Some(ADMIN)).await;
+        assert_eq!(next_page(&whole), None, "{list}");
+        let whole: Vec<Value> = serde_json::from_str(&whole.body).unwrap();
+        let whole: Vec<String> = whole.iter().map(|row| string(&row["id"])).collect();
+        assert!(whole.len() > 1, "{list}");
+        let path = format!("{list}?limit=1");
+        let collected = collect_pages(site, &path, Some(ADMIN), "id", no_change).await;
+        assert_eq!(collected, whole, "{list}");
+    }
+    let all = lists.into_iter().chain([
+        "/api/v1/registrations",
+        "/api/v1/proposals",
+        "/api/v1/evaluations",
+    ]);
+    for list in all {
+        for limit in ["0", "201"] {
+            let path = format!("{list}?limit={limit}");
+            let refused = site.get(&path, Some(ADMIN)).await;
+            refused.problem(422, "invalid-content", &["limit", "1 to 200"]);
+        }
+        for (after, words) in [
+            ("nothing", "after"),
+            ("00000000-0000-7000-8000-000000000000", "start again"),
+        ] {
+            let path = format!("{list}?after={after}");
+            let refused = site.get(&path, Some(ADMIN)).await;
+            refused.problem(400, "invalid-request", &[words]);
+        }
+    }
+}

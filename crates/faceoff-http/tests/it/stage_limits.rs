@@ -1,0 +1,113 @@
+//! Agent limits and upload quotas of a stage. Those that the stage does not set are the server's.
+
+use crate::site::{ADMIN, Answer, GZIP, Site};
+use faceoff_store::Job;
+use reqwest::Method;
+use serde_json::{Value, json};
+
+async fn change(site: &Site, body: Value) -> Answer {
+    let path = format!("/api/v1/stages/{}", site.stage().await);
+    let request = site.request(Method::PATCH, &path, Some(ADMIN));
+    Answer::of(request.json(&body).send().await.unwrap()).await
+}
+
+#[tokio::test]
+async fn stage_limits_are_rules_and_apply_to_validation_runs() {
+    let site = Site::start().await;
+    let team = site.team("Alpha").await;
+    let before = site.get("/api/v1/stages", None).await.json(200)[0].clone();
+    assert_eq!((before.get("limits"), before.get("uploads")), (None, None));
+    let limits = json!({ "limits": { "memory_bytes": 67108864, "step_s": 0.5 } });
+    change(&site, limits.clone())
+        .await
+        .problem(409, "not-confirmed", &["revision 2"]);
+    let mut limits = limits;
+    limits["confirm"] = json!("Qualifying");
+    let changed = change(&site, limits).await.json(200);
+    assert_eq!(
+        changed["limits"],
+        json!({ "memory_bytes": 67108864, "step_s": 0.5 })
+    );
+    assert_eq!(changed["revision"], 2);
+    assert_eq!(changed["revisions"][0].get("limits"), None);
+    site.upload(&team.token, GZIP.to_vec()).await.json(201);
+    let Job::Validation { limits, .. } = site.claim().await.job else {
+        panic!("expected a validation run");
+    };
+    assert_eq!((limits.memory_bytes, limits.pids), (Some(64 << 20), None));
+    // An empty object restores the server's limits.
+    let no_limits = json!({ "limits": {}, "confirm": "Qualifying" });
+    assert_eq!(change(&site, no_limits).await.json(200).get("limits"), None);
+}
+
+#[tokio::test]
+async fn upload_quotas_are_those_of_the_open_stage() {
+    let site = Site::start().await;
+    let team = site.team("Alpha").await;
+    let quotas = json!({ "uploads": { "waiting": 1, "day_bytes": 10 } });
+    assert_eq!(
+        change(&site, quotas).await.json(200)["uploads"],
+        json!({ "waiting": 1, "day_bytes": 10 })
+    );
+    let upload = async || site.upload(&team.token, GZIP.to_vec()).await;
+    upload().await.json(201);
+    upload()
+        .await
+        .problem(429, "too-many-pending", &["1 uploads"]);
+    change(&site, json!({ "uploads": { "day_bytes": 10 } }))
+        .await
+        .json(200);
+    upload().await.json(201);
+    let problem = upload()
+        .await
+        .problem(429, "day-quota-spent", &["at most 10 bytes"]);
+    assert_eq!(
+        (&problem["limit_bytes"], &problem["used_bytes"]),
+        (&json!(10), &json!(8))
+    );
+    change(&site, json!({ "uploads": { "stored_bytes": 9 } }))
+        .await
+        .json(200);
+    upload()
+        .await
+        .problem(409, "stored-quota-spent", &["at most 9 bytes"]);
+    change(&site, json!({ "uploads": {} })).await.json(200);
+    upload().await.json(201);
+}
+
+#[tokio::test]
+async fn invalid_limits_and_quotas_are_refused_by_name() {
+    let site = Site::start().await;
+    for (body, words) in [
+        (
+            json!({ "limits": { "memory_bytes": 10 } }),
+            &["limits.memory_bytes", "at least 16777216", "got 10"][..],
+        ),
+        (
+            json!({ "limits": { "pids": 1 } }),
+            &["limits.pids", "at least 2"],
+        ),
+        (
+            json!({ "limits": { "cpus": 0 } }),
+            &["limits.cpus", "0.01 to 1024"],
+        ),
+        (json!({ "limits": { "step_s": -1 } }), &["limits.step_s"]),
+        (json!({ "limits": { "memory": 1 } }), &["memory"]),
+        (json!({ "limits": { "pids": "many" } }), &["pids"]),
+        (
+            json!({ "uploads": { "waiting": 0 } }),
+            &["uploads.waiting", "at least 1"],
+        ),
+        (
+            json!({ "uploads": { "day_bytes": 0 } }),
+            &["uploads.day_bytes"],
+        ),
+        (json!({ "uploads": { "per_week": 1 } }), &["per_week"]),
+    ] {
+        let mut body = body;
+        body["confirm"] = json!("Qualifying");
+        change(&site, body)
+            .await
+            .problem(422, "invalid-content", words);
+    }
+}

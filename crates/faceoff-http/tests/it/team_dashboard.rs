@@ -1,0 +1,421 @@
+//! The team dashboard, as used by a browser without scripts.
+
+use crate::{
+    browser::{Browser, PASSWORD, first_text, forms},
+    html::texts,
+    site::{ADMIN, Answer, GZIP, MAX_BUNDLE, Site, TestTeam, result, string},
+};
+use faceoff_types::{ValidationOutcome, ValidationTiming, Task};
+use scraper::{Html, Selector};
+use serde_json::json;
+
+/// Parses a dashboard page. It must be valid, load only its two scripts, and have nothing inline.
+#[track_caller]
+pub fn dashboard_page(answer: &Answer, status: u16) -> Html {
+    assert_eq!(answer.status.as_u16(), status, "{}", answer.body);
+    let html = Html::parse_document(&answer.body);
+    assert!(html.errors.is_empty(), "{:?}\n{}", html.errors, answer.body);
+    let scripts = Selector::parse("script").unwrap();
+    let scripts: Vec<_> = html.select(&scripts).collect();
+    let sources: Vec<_> = scripts
+        .iter()
+        .map(|script| {
+            assert_eq!(script.text().collect::<String>(), "");
+            let source = script.attr("src").unwrap();
+            source.split('?').next().unwrap()
+        })
+        .collect();
+    assert_eq!(sources, ["/static/dashboard.js", "/static/live.js"]);
+    let policy = answer.header("content-security-policy");
+    assert!(policy.contains("script-src 'self';") && !policy.contains("unsafe"));
+    assert!(!answer.body.contains("style=") && !answer.body.contains("onclick"));
+    html
+}
+
+/// The location of a redirect after a form.
+#[track_caller]
+pub fn redirect_target(answer: &Answer) -> String {
+    assert_eq!(answer.status, 303, "{}", answer.body);
+    answer.header("location").to_owned()
+}
+
+pub fn links(html: &Html, selector: &str) -> Vec<String> {
+    html.select(&Selector::parse(selector).unwrap())
+        .map(|element| element.value().attr("href").unwrap().to_owned())
+        .collect()
+}
+
+async fn member<'a>(site: &'a Site, team: &TestTeam, name: &str) -> Browser<'a> {
+    let role = json!({ "role": "member", "team": team.id, "note": name });
+    Browser::join(site, name, role).await
+}
+
+fn valid(log: &str) -> ValidationOutcome {
+    ValidationOutcome::Valid {
+        runtime: "native".into(),
+        agent_name: "<b>striker</b>".into(),
+        timing: vec![ValidationTiming {
+            task: Task::Hit,
+            steps: 321,
+            mean_s: 0.0005,
+            p99_s: 0.00123,
+            max_s: 0.015,
+            points_per_episode: 0.5,
+        }],
+        log: log.into(),
+    }
+}
+
+#[tokio::test]
+async fn member_uploads_and_selects_the_active_submission() {
+    let site = Site::start().await;
+    let team = site.team("Alpha").await;
+    let mut ada = member(&site, &team, "Ada").await;
+    let empty = dashboard_page(&ada.open("/desk").await, 200);
+    assert_eq!(texts(&empty, "h1"), ["Alpha"]);
+    assert!(texts(&empty, "[data-live=submissions]")[0].contains("None yet"));
+    assert!(texts(&empty, "[data-live=next]")[0].contains("None: upload a bundle"));
+
+    let sent = ada.upload("/desk/upload", "striker.tar.gz", &GZIP).await;
+    assert_eq!(
+        (sent.status.as_u16(), sent.header("location")),
+        (303, "/desk?done=uploaded")
+    );
+    let html = dashboard_page(&ada.open("/desk?done=uploaded").await, 200);
+    assert!(texts(&html, "[role=status]")[0].starts_with("Uploaded."));
+    assert_eq!(texts(&html, ".entry .state"), ["validating"]);
+    assert_eq!(
+        texts(&html, "[data-moving]").len(),
+        1,
+        "the script follows it"
+    );
+    let log = site
+        .get("/api/v1/events?limit=1", Some(ADMIN))
+        .await
+        .json(200);
+    assert_eq!(log["events"][0]["actor_name"], "Ada", "{log}");
+
+    site.finish_validation(valid("ready\n<i>on</i>\n")).await;
+    let html = dashboard_page(&ada.open("/desk").await, 200);
+    assert_eq!(
+        texts(&html, ".entry .state"),
+        ["valid", "active at the next cutoff"]
+    );
+    assert!(texts(&html, "[data-live=next]")[0].contains("<b>striker</b>"));
+    let page = links(&html, ".entry h3 a").remove(0);
+    let html = dashboard_page(&ada.open(&page).await, 200);
+    assert_eq!(texts(&html, "h1"), ["<b>striker</b>"]);
+    assert_eq!(texts(&html, "pre"), ["ready <i>on</i>"]);
+    assert_eq!(
+        texts(&html, "[data-live=verdict] tbody td"),
+        ["321", "0.50", "1.23", "15.00", "0.5"]
+    );
+
+    // The newest valid submission is active; an older one can be selected.
+    ada.upload("/desk/upload", "second.zip", b"PK\x03\x04\x14\x00")
+        .await;
+    site.finish_validation(valid("")).await;
+    let html = dashboard_page(&ada.open("/desk").await, 200);
+    assert_eq!(texts(&html, ".entry[aria-current] .note").len(), 1);
+    let chosen = ada.submit(&format!("{page}/activate"), &[]).await;
+    assert_eq!(chosen.header("location"), "/desk?done=activated");
+    let html = dashboard_page(&ada.open("/desk?done=activated").await, 200);
+    assert_eq!(links(&html, ".entry[aria-current] h3 a").join(" "), page);
+    let withdrawn = ada.submit(&format!("{page}/withdraw"), &[]).await;
+    assert_eq!(withdrawn.header("location"), "/desk?done=withdrawn");
+    let html = dashboard_page(&ada.open("/desk").await, 200);
+    assert!(links(&html, ".entry[aria-current] h3 a").is_empty());
+    // A second withdrawal is refused as in the API, and the page is shown with the error.
+    let twice = ada.submit(&format!("{page}/withdraw"), &[]).await;
+    let html = dashboard_page(&twice, 409);
+    assert!(
+        texts(&html, "[role=alert]")[0].contains("withdrawn"),
+        "{}",
+        twice.body
+    );
+
+    let words = [("label", "Fast one"), ("note", "two\r\nlines")];
+    let described = ada.submit(&format!("{page}/describe"), &words).await;
+    assert_eq!(described.header("location"), format!("{page}?done=described"));
+    let html = dashboard_page(&ada.open(&page).await, 200);
+    assert_eq!(texts(&html, "h1"), ["Fast one"]);
+    let long = "x".repeat(81);
+    let refused = ada
+        .submit(
+            &format!("{page}/describe"),
+            &[("label", &long), ("note", "kept")],
+        )
+        .await;
+    let html = dashboard_page(&refused, 422);
+    assert!(texts(&html, "[role=alert]")[0].contains("1 to 80 characters"));
+    assert_eq!(texts(&html, "textarea"), ["kept"]);
+}
+
+#[tokio::test]
+async fn invalid_archive_is_refused_on_the_page() {
+    let site = Site::start().await;
+    let team = site.team("Alpha").await;
+    let mut ada = member(&site, &team, "Ada").await;
+    let large = [&GZIP[..], &vec![0; MAX_BUNDLE as usize]].concat();
+    for (name, archive, status, words) in [
+        ("large.tar.gz", large.as_slice(), 413, "at most 65536 bytes"),
+        (
+            "notes.txt",
+            b"not an archive".as_slice(),
+            415,
+            "expected a .tar.gz",
+        ),
+        ("empty.zip", b"".as_slice(), 400, "got an empty body"),
+        ("", b"".as_slice(), 400, "no file was chosen"),
+    ] {
+        let refused = ada.upload("/desk/upload", name, archive).await;
+        let html = dashboard_page(&refused, status);
+        let alert = &texts(&html, "[role=alert]")[0];
+        assert!(alert.contains(words), "{alert}");
+        assert_eq!(texts(&html, "form[data-upload]").len(), 1, "the form is shown again");
+    }
+    // An archive of exactly the maximum size is accepted.
+    let most = [&GZIP[..], &vec![0; MAX_BUNDLE as usize - GZIP.len()]].concat();
+    assert_eq!(
+        ada.upload("/desk/upload", "most.tgz", &most).await.status,
+        303
+    );
+    let stored = site.get("/api/v1/submissions", Some(&team.token)).await;
+    let stored = stored.json(200);
+    assert_eq!(stored.as_array().unwrap().len(), 1, "{stored}");
+    assert_eq!(
+        (stored[0]["bytes"].as_u64(), string(&stored[0]["file_name"])),
+        (Some(MAX_BUNDLE), "most.tgz".into())
+    );
+    let hash = blake3::hash(&most).to_string();
+    assert_eq!(
+        string(&stored[0]["blake3"]),
+        hash,
+        "only the file is stored, without the multipart framing"
+    );
+}
+
+#[tokio::test]
+async fn visitor_is_redirected_to_sign_in_and_back() {
+    let site = Site::start().await;
+    let team = site.team("Alpha").await;
+    drop(member(&site, &team, "Ada").await);
+    let mut browser = Browser::new(&site);
+    for (path, next) in [
+        ("/desk", "%2Fdesk"),
+        ("/desk/access?x=1", "%2Fdesk%2Faccess%3Fx%3D1"),
+        ("/organiser/day", "%2Forganiser%2Fday"),
+    ] {
+        let redirected = browser.open(path).await;
+        assert_eq!(redirected.status, 303);
+        assert_eq!(redirected.header("location"), format!("/sign-in?next={next}"));
+    }
+    let sent = browser
+        .submit("/desk/access/tokens", &[("name", "a")])
+        .await;
+    assert_eq!(sent.header("location"), "/sign-in?next=%2Fdesk");
+    let sent = browser.upload("/desk/upload", "a.zip", &GZIP).await;
+    assert_eq!(sent.header("location"), "/sign-in?next=%2Fdesk");
+
+    let page = browser.open("/sign-in?next=%2Fdesk%2Faccess").await;
+    let form = forms("/sign-in", &page).remove(0);
+    let next = ("next".to_owned(), "/desk/access".to_owned());
+    assert!(form.fields.contains(&next), "{form:?}");
+    let fields = [
+        ("name", "Ada"),
+        ("password", PASSWORD),
+        ("next", "/desk/access"),
+    ];
+    let signed_in = browser.submit("/sign-in", &fields).await;
+    assert_eq!(signed_in.header("location"), "/desk/access");
+    // Redirects to other sites are refused.
+    let foreign = browser
+        .open("/sign-in?next=https%3A%2F%2Fevil.example")
+        .await;
+    assert!(!foreign.body.contains("evil"));
+    for evil in [
+        "//evil.example",
+        "https://evil.example/desk",
+        "/desk\\..\\x",
+    ] {
+        let fields = [fields[0], fields[1], ("next", evil)];
+        let signed_in = browser.submit("/sign-in", &fields).await;
+        assert_eq!(signed_in.header("location"), "/account");
+    }
+}
+
+#[tokio::test]
+async fn token_is_shown_once_and_can_be_revoked() {
+    let site = Site::start().await;
+    let team = site.team("Alpha").await;
+    let mut ada = member(&site, &team, "Ada").await;
+    let fields = [("name", "CI"), ("owner", "team"), ("days", "30")];
+    let made = ada.submit("/desk/access/tokens", &fields).await;
+    let html = dashboard_page(&made, 201);
+    let secret = texts(&html, ".secret code").remove(0);
+    let me = site.get("/api/v1/whoami", Some(&secret)).await.json(200);
+    assert_eq!(me["role"], "team");
+    assert_eq!(me["token"]["expires_at"], "2026-03-31T10:00:00Z");
+    let page = ada.open("/desk/access").await;
+    dashboard_page(&page, 200);
+    assert!(!page.body.contains(&secret), "the secret is shown once");
+    let id = string(&me["token"]["id"]);
+    let revoked = ada
+        .submit(&format!("/desk/access/tokens/{id}/revoke"), &[])
+        .await;
+    assert_eq!(revoked.header("location"), "/desk/access?done=revoked");
+    assert_eq!(site.get("/api/v1/whoami", Some(&secret)).await.status, 401);
+    let nameless = [("name", " "), ("owner", "me"), ("days", "")];
+    let refused = dashboard_page(&ada.submit("/desk/access/tokens", &nameless).await, 422);
+    assert!(texts(&refused, "[role=alert]")[0].contains("1 to 80 characters"));
+    // A personal token without expiry.
+    let own = [("name", "mine"), ("owner", "me"), ("days", "")];
+    let made = ada.submit("/desk/access/tokens", &own).await;
+    let secret = texts(&dashboard_page(&made, 201), ".secret code").remove(0);
+    let me = site.get("/api/v1/whoami", Some(&secret)).await.json(200);
+    assert_eq!(
+        (&me["role"], &me["token"]["expires_at"]),
+        (&json!("member"), &json!(null))
+    );
+}
+
+#[tokio::test]
+async fn member_invites_revokes_an_invitation_and_leaves() {
+    let site = Site::start().await;
+    let team = site.team("Alpha").await;
+    let mut ada = member(&site, &team, "Ada").await;
+    let made = ada
+        .submit("/desk/access/invitations", &[("note", "Ben")])
+        .await;
+    let link = texts(&dashboard_page(&made, 201), ".secret code").remove(0);
+    let mut ben = Browser::new(&site);
+    let fields = [("name", "Ben"), ("password", PASSWORD)];
+    assert_eq!(ben.submit(&link, &fields).await.status, 303);
+    let html = dashboard_page(&ada.open("/desk/access").await, 200);
+    assert_eq!(
+        texts(&html, "section[aria-labelledby=people] tbody th"),
+        ["Ada you", "Ben"]
+    );
+    let made = ada
+        .submit("/desk/access/invitations", &[("note", "Eve")])
+        .await;
+    let link = texts(&dashboard_page(&made, 201), ".secret code").remove(0);
+    let listed = forms("/desk/access", &ada.open("/desk/access").await);
+    let revoke_form = listed
+        .iter()
+        .find(|form| form.action.contains("/invitations/"))
+        .unwrap();
+    let revoked = ada.submit(&revoke_form.action, &[]).await;
+    assert_eq!(revoked.header("location"), "/desk/access?done=uninvited");
+    let eve = Browser::new(&site)
+        .submit(&link, &[("name", "Eve"), ("password", PASSWORD)])
+        .await;
+    assert_eq!(eve.status, 409);
+    // Members cannot remove each other, but can leave by confirming their own name.
+    let users = site.get("/api/v1/people", Some(ADMIN)).await.json(200);
+    let id = |name: &str| {
+        let all = users.as_array().unwrap();
+        string(&all.iter().find(|one| one["name"] == name).unwrap()["id"])
+    };
+    let remove = |name: &str| format!("/desk/access/people/{}/remove", id(name));
+    let other = ada.submit(&remove("Ben"), &[("confirm", "Ben")]).await;
+    assert_eq!(other.status, 403);
+    let wrong = ben.submit(&remove("Ben"), &[("confirm", "Ada")]).await;
+    assert!(first_text(&wrong, "[role=alert]").contains("nothing is done yet"));
+    let left = ben.submit(&remove("Ben"), &[("confirm", "Ben")]).await;
+    assert_eq!(left.status, 303);
+    assert_eq!(ben.open("/desk").await.status, 303, "redirected to sign in");
+}
+
+#[tokio::test]
+async fn submission_of_another_team_is_not_found() {
+    let site = Site::start().await;
+    let [alpha, beta] = [site.team("Alpha").await, site.team("Beta").await];
+    let path = site.valid_submission(&beta, "agent").await;
+    let path = path.replace("/api/v1", "/desk");
+    let mut ada = member(&site, &alpha, "Ada").await;
+    assert_eq!(ada.open(&path).await.status, 404);
+    for action in ["activate", "withdraw", "describe"] {
+        let fields = [("label", "mine"), ("note", "")];
+        let refused = ada.submit(&format!("{path}/{action}"), &fields).await;
+        assert_eq!(refused.status, 404, "{action}: {}", refused.body);
+    }
+    assert_eq!(ada.open("/desk/submissions/none").await.status, 404);
+    let mut ben = member(&site, &beta, "Ben").await;
+    let html = dashboard_page(&ben.open("/desk").await, 200);
+    assert_eq!(texts(&html, ".entry .state").len(), 2, "it is still active");
+}
+
+#[tokio::test]
+async fn dashboard_forms_refuse_foreign_origins() {
+    let site = Site::start().await;
+    let team = site.team("Alpha").await;
+    site.valid_submission(&team, "agent").await;
+    let terms = json!({ "text": "Be fair." });
+    let mut ada = member(&site, &team, "Ada").await;
+    site.post("/api/v1/terms", Some(ADMIN), &terms)
+        .await
+        .json(201);
+    ada.submit("/desk/access/invitations", &[("note", "Ben")])
+        .await;
+    ada.submit("/desk/access/tokens", &[("name", "CI")]).await;
+    let first_page = dashboard_page(&ada.open("/desk").await, 200);
+    let submission = links(&first_page, ".entry h3 a").remove(0);
+    let mut actions = Vec::new();
+    for path in [
+        "/desk",
+        submission.as_str(),
+        "/desk/questions",
+        "/desk/access",
+    ] {
+        let page = ada.open(path).await;
+        dashboard_page(&page, 200);
+        for form in forms(path, &page).into_iter().filter(|form| form.is_post) {
+            let before = site.get("/api/v1/events?limit=1", Some(ADMIN)).await;
+            for answer in ada.submit_from_foreign_page(&form).await {
+                assert_eq!(answer.status, 403, "{form:?}: {}", answer.body);
+            }
+            let after = site.get("/api/v1/events?limit=1", Some(ADMIN)).await;
+            assert_eq!(before.body, after.body, "{form:?} did something");
+            actions.push(form.action);
+        }
+    }
+    for expected in [
+        "/desk/upload",
+        "/desk/terms",
+        "/withdraw",
+        "/describe",
+        "/questions",
+        "/access/tokens",
+        "/access/invitations",
+        "/revoke",
+        "/remove",
+        "/sign-out",
+    ] {
+        let found = actions.iter().any(|action| action.ends_with(expected));
+        assert!(found, "{expected} is not among {actions:?}");
+    }
+    let accepted = ada.submit("/desk/terms", &[("version", "1")]).await;
+    assert_eq!(accepted.header("location"), "/desk?done=terms");
+    let body = ada.open("/desk").await.body;
+    assert!(!body.contains("Terms to accept"));
+}
+
+#[tokio::test]
+async fn dashboard_lists_evaluations_with_their_files() {
+    let site = Site::start().await;
+    let team = site.team("Alpha").await;
+    site.valid_submission(&team, "agent").await;
+    site.post("/api/v1/days", Some(ADMIN), &json!({}))
+        .await
+        .json(200);
+    site.finish_evaluation(&result([0.5; 3], 100.0)).await;
+    let mut ada = member(&site, &team, "Ada").await;
+    let html = dashboard_page(&ada.open("/desk").await, 200);
+    let row = texts(&html, "section[aria-labelledby=evaluations] tbody tr").remove(0);
+    assert!(row.starts_with("2026-03-01finished 50.0"), "{row}");
+    let dataset = links(&html, "a[href$='/dataset']").remove(0);
+    assert_eq!(ada.open(&dataset).await.status, 200, "authenticated by the session");
+    let archive = links(&html, "a[href$='/archive']").remove(0);
+    assert_eq!(ada.open(&archive).await.status, 200);
+}

@@ -1,0 +1,228 @@
+//! Test games and friendly games: visibility, quotas, and when they are allowed.
+
+use super::{cup::Cup, fake_slot::GameOutcome};
+use crate::site::{ADMIN, Answer, string};
+use reqwest::Method;
+use serde_json::{Value, json};
+
+/// A tournament whose baseline belongs to an additional team.
+async fn cup_with_baseline(names: &[&str], settings: Value) -> Cup {
+    let mut cup = Cup::open(names, json!({ "settings": settings })).await;
+    let body = json!({});
+    cup.site
+        .post(
+            &format!("{}/test-games", cup.path),
+            Some(cup.token(names[0])),
+            &body,
+        )
+        .await
+        .problem(409, "conflict", &["no baseline"]);
+    cup.add_team("Organisers").await;
+    let submissions = cup
+        .site
+        .get("/api/v1/submissions", Some(cup.token("Organisers")))
+        .await
+        .json(200);
+    let changed = cup
+        .change(json!({ "baseline": submissions[0]["id"] }))
+        .await
+        .json(200);
+    assert_eq!(changed["baseline"], submissions[0]["id"]);
+    cup
+}
+
+async fn test_game(cup: &Cup, team: &str) -> Answer {
+    let path = format!("{}/test-games", cup.path);
+    cup.site
+        .post(&path, Some(cup.token(team)), &json!({}))
+        .await
+}
+
+async fn friendly(cup: &Cup, team: &str, opponent: &str) -> Answer {
+    let path = format!("{}/friendly-games", cup.path);
+    let body = json!({ "opponent": opponent });
+    cup.site.post(&path, Some(cup.token(team)), &body).await
+}
+
+async fn delete(cup: &Cup, path: &str, token: &str) -> Answer {
+    let request = cup.site.request(Method::DELETE, path, Some(token));
+    Answer::of(request.send().await.unwrap()).await
+}
+
+#[tokio::test]
+async fn test_game_is_private_and_does_not_count() {
+    let cup = cup_with_baseline(&["A", "B"], json!({})).await;
+    let created = test_game(&cup, "A").await.json(201);
+    let game = &created["ordered"][0];
+    assert_eq!(
+        (
+            &game["purpose"],
+            &game["asked_by"],
+            &game["sides"][1]["team_name"]
+        ),
+        (&json!("test"), &json!("A"), &json!("Organisers"))
+    );
+    let path = format!("/api/v1/games/{}", string(&game["id"]));
+    cup.play_next(|_, _| GameOutcome::goals(3, 0)).await.unwrap();
+    for (token, is_visible) in [
+        (None, false),
+        (Some(cup.token("B")), false),
+        (Some(cup.token("A")), true),
+        (Some(cup.token("Organisers")), true),
+        (Some(ADMIN), true),
+    ] {
+        for resource in ["", "/live", "/recording", "/sides/1"] {
+            let answer = cup.site.get(&format!("{path}{resource}"), token).await;
+            assert_eq!(answer.status != 404, is_visible, "{resource} {}", answer.body);
+        }
+    }
+    // The team may download its own side at once, but never both sides, which contain the seed.
+    let own_side = cup
+        .site
+        .get(&format!("{path}/sides/1"), Some(cup.token("A")))
+        .await;
+    assert!(own_side.body.starts_with("PK side-1.zip"));
+    cup.site
+        .get(&format!("{path}/recording"), Some(cup.token("A")))
+        .await
+        .problem(403, "forbidden", &["never becomes public"]);
+    let view = cup.view().await;
+    assert_eq!(view["tables"][0]["standings"], json!([]));
+    assert_eq!(cup.games().await, Vec::<Value>::new());
+    let listed = async |token: &str| {
+        let path = format!("{}/free-games", cup.path);
+        cup.site
+            .get(&path, Some(token))
+            .await
+            .json(200)
+            .as_array()
+            .unwrap()
+            .len()
+    };
+    assert_eq!(
+        [
+            listed(cup.token("A")).await,
+            listed(cup.token("B")).await,
+            listed(ADMIN).await
+        ],
+        [1, 0, 1]
+    );
+}
+
+#[tokio::test]
+async fn daily_quota_of_test_games_applies_to_teams_only() {
+    let cup = cup_with_baseline(&["A", "B"], json!({ "free_games_per_day": 2 })).await;
+    test_game(&cup, "A").await.json(201);
+    let played = friendly(&cup, "A", "B").await;
+    assert_eq!(
+        played.header("location"),
+        format!("/api/v1/games/{}", string(&played.json(201)["id"]))
+    );
+    let refused = test_game(&cup, "A").await;
+    let problem = refused.problem(429, "free-games-spent", &["at most 2", "requested 2"]);
+    assert_eq!(
+        (&problem["limit"], &problem["used"]),
+        (&json!(2), &json!(2))
+    );
+    assert_eq!(
+        refused.header("retry-after"),
+        "50400",
+        "from ten o'clock to midnight"
+    );
+    friendly(&cup, "A", "B")
+        .await
+        .problem(429, "free-games-spent", &[]);
+    // B has its own quota, and organisers have no limit.
+    friendly(&cup, "B", "a").await.json(201);
+    let all = cup.post("test-games", json!({})).await.json(201);
+    assert_eq!(all["ordered"].as_array().unwrap().len(), 2);
+    let some = cup
+        .post("test-games", json!({ "teams": ["A", "Organisers"] }))
+        .await;
+    some.problem(409, "conflict", &["Organisers", "cannot play against itself"]);
+    cup.site.next_day();
+    test_game(&cup, "A").await.json(201);
+    // A team cannot start test games of another team.
+    let path = format!("{}/test-games", cup.path);
+    let body = json!({ "teams": ["B"] });
+    cup.site
+        .post(&path, Some(cup.token("A")), &body)
+        .await
+        .problem(403, "forbidden", &["only for itself"]);
+}
+
+#[tokio::test]
+async fn team_declines_and_cancels_friendly_games() {
+    let cup = cup_with_baseline(&["A", "B"], json!({})).await;
+    let invitation = json!({ "role": "member", "team": cup.teams["B"].id, "note": "Bob" });
+    let made = cup
+        .site
+        .post("/api/v1/invitations", Some(ADMIN), &invitation)
+        .await
+        .json(201);
+    let join = json!({ "code": made["code"], "name": "Bob" });
+    let joined = cup
+        .site
+        .post("/api/v1/invitations/accept", None, &join)
+        .await
+        .json(201);
+    let bob = string(&joined["secret"]);
+    let team = format!("/api/v1/teams/{}", cup.teams["B"].id);
+    let set_declines = async |declines: bool| {
+        let request = cup.site.request(Method::PATCH, &team, Some(&bob));
+        let body = json!({ "declines_friendly_games": declines });
+        Answer::of(request.json(&body).send().await.unwrap())
+            .await
+            .json(200)
+    };
+    assert_eq!(
+        cup.site.get(&team, None).await.json(200)["declines_friendly_games"],
+        false
+    );
+    let queued = friendly(&cup, "A", "B").await.json(201);
+    assert_eq!(set_declines(true).await["declines_friendly_games"], true);
+    friendly(&cup, "A", "B")
+        .await
+        .problem(409, "conflict", &["B plays no friendly games"]);
+    // B may still request friendly games itself.
+    friendly(&cup, "B", "A").await.json(201);
+    assert_eq!(set_declines(false).await["declines_friendly_games"], false);
+    friendly(&cup, "A", "B").await.json(201);
+
+    let path = format!("/api/v1/games/{}", string(&queued["id"]));
+    delete(&cup, &path, cup.token("B"))
+        .await
+        .problem(403, "forbidden", &["requested the game"]);
+    let cancelled = delete(&cup, &path, cup.token("A")).await.json(200);
+    assert_eq!(
+        (&cancelled["state"], &cancelled["reason"]),
+        (&json!("cancelled"), &json!("by A, which had requested it"))
+    );
+    delete(&cup, &path, ADMIN)
+        .await
+        .problem(409, "conflict", &["over already"]);
+    cup.site
+        .get(&format!("{path}/sides/1"), Some(cup.token("A")))
+        .await
+        .problem(409, "conflict", &["cancelled"]);
+}
+
+#[tokio::test]
+async fn test_games_are_refused_during_a_round() {
+    let cup = cup_with_baseline(&["A", "B"], json!({})).await;
+    cup.start_round().await;
+    for answer in [test_game(&cup, "A").await, friendly(&cup, "A", "B").await] {
+        answer.problem(409, "conflict", &["a round is under way"]);
+    }
+    let round = string(&cup.games().await[0]["id"]);
+    let path = format!("/api/v1/games/{round}");
+    delete(&cup, &path, ADMIN)
+        .await
+        .problem(409, "conflict", &["of the schedule"]);
+    cup.play(|_, _| GameOutcome::goals(1, 0)).await;
+    test_game(&cup, "A").await.json(201);
+    // A team that is not in the tournament has no friendly games.
+    friendly(&cup, "Organisers", "A")
+        .await
+        .problem(409, "conflict", &["not in the tournament"]);
+}

@@ -1,0 +1,224 @@
+//! File transfer of remote workers: access by the grant of a job, while the worker holds its lease.
+
+use crate::site::{Answer, GZIP, Site};
+use faceoff_store::{ClaimedJob, Job};
+use faceoff_types::{BundleRef, PerturbationSettings};
+use faceoff_wire::{
+    game::GameSpec,
+    grant::{Grant, GrantKey, ExpectedRecording, WriteScope},
+};
+use reqwest::Method;
+use serde_json::json;
+
+async fn send(site: &Site, method: Method, path: &str, grant: &str, body: &'static [u8]) -> Answer {
+    let request = site
+        .request(method, path, None)
+        .header("authorization", format!("Grant {grant}"))
+        .body(body);
+    Answer::of(request.send().await.unwrap()).await
+}
+
+#[tokio::test]
+async fn grant_opens_its_files_while_the_lease_is_held() {
+    let site = Site::start().await;
+    let team = site.team("Alpha").await;
+    let submission = site.valid_submission(&team, "hold").await;
+    site.evaluate(&team, &submission).await;
+    let ClaimedJob { claim, job } = site.claim().await;
+    let Job::Shard { bundle, .. } = job else {
+        panic!("expected a shard");
+    };
+    let grant = Grant {
+        job_id: claim.job,
+        nonce: claim.nonce,
+        bundles: vec![bundle.clone()],
+        write_scope: WriteScope::Folder("runs/of-this/lease".into()),
+        expected_recording: ExpectedRecording::Game(game()),
+        program: String::new(),
+    };
+    let sealed = grant.seal(&site.grant_key()).unwrap();
+    let path_of = |bundle: &BundleRef| format!("/work/bundles/{}", bundle.blake3);
+
+    // Before a worker starts the job, its grant opens nothing: several workers may have received it.
+    for (method, path) in [
+        (Method::GET, path_of(&bundle)),
+        (Method::PUT, "/work/files/game.zip".to_owned()),
+    ] {
+        let answer = send(&site, method, &path, &sealed, b"").await;
+        answer.problem(403, "forbidden", &["no worker has started the job"]);
+    }
+    let start = async |slot: &str| {
+        let transferred = site.store.transfer_lease(&claim, slot, 30, site.now());
+        assert!(transferred.await.unwrap());
+    };
+    start("remote/rack-1/slot-0").await;
+    let fetched = send(&site, Method::GET, &path_of(&bundle), &sealed, b"").await;
+    assert_eq!(fetched.status, 200, "{}", fetched.body);
+    assert_eq!(fetched.header("content-length"), GZIP.len().to_string());
+    let another = format!("/work/bundles/{}", "0".repeat(64));
+    send(&site, Method::GET, &another, &sealed, b"")
+        .await
+        .problem(404, "not-found", &["bundle of this job"]);
+    let put = async |name: &str, grant: &str| {
+        send(
+            &site,
+            Method::PUT,
+            &format!("/work/files/{name}"),
+            grant,
+            b"rows",
+        )
+        .await
+    };
+    assert_eq!(put("game.zip", &sealed).await.status, 204);
+    let bytes_of = async || {
+        let key = "runs/of-this/lease/game.zip";
+        site.store.artifacts().size_bytes(key).await.unwrap()
+    };
+    assert_eq!(bytes_of().await, Some(4));
+    for outside in ["..%2Fanother", ".hidden", "a%20b", "steps.parquet"] {
+        put(outside, &sealed).await.problem(404, "not-found", &[]);
+    }
+
+    // A grant sealed by another server, one with the seal of another grant, and none at all.
+    let foreign = grant.seal(&GrantKey::from_secret(&[7; 32])).unwrap();
+    let (content, _) = sealed.split_once('.').unwrap();
+    let (_, other_seal) = foreign.split_once('.').unwrap();
+    for forged in [&foreign, &format!("{content}.{other_seal}"), ""] {
+        put("game.zip", forged)
+            .await
+            .problem(403, "forbidden", &["expected the grant of a job"]);
+    }
+    // A grant of another lease of the same job.
+    let earlier = Grant {
+        nonce: claim.job,
+        ..grant
+    };
+    let earlier = earlier.seal(&site.grant_key()).unwrap();
+    put("game.zip", &earlier)
+        .await
+        .problem(403, "forbidden", &["no longer holds the lease"]);
+
+    site.store.release(&claim, site.now()).await.unwrap();
+    for (method, path) in [
+        (Method::GET, path_of(&bundle)),
+        (Method::PUT, "/work/files/game.zip".to_owned()),
+    ] {
+        send(&site, method, &path, &sealed, b"").await.problem(
+            403,
+            "forbidden",
+            &["no longer holds the lease"],
+        );
+    }
+}
+
+/// A worker may report a job as done while it still sends a file. Such a file must not replace the one that was checked.
+#[tokio::test]
+async fn late_upload_does_not_replace_a_checked_file() {
+    let site = Site::start().await;
+    let team = site.team("Alpha").await;
+    let submission = site.valid_submission(&team, "hold").await;
+    site.evaluate(&team, &submission).await;
+    let ClaimedJob { claim, .. } = site.claim().await;
+    let slot = "remote/rack-1/slot-0";
+    let transferred = site.store.transfer_lease(&claim, slot, 30, site.now());
+    assert!(transferred.await.unwrap());
+    let grant = Grant {
+        job_id: claim.job,
+        nonce: claim.nonce,
+        bundles: Vec::new(),
+        write_scope: WriteScope::Folder("runs/of-this/lease".into()),
+        expected_recording: ExpectedRecording::Game(game()),
+        program: String::new(),
+    };
+    let sealed = grant.seal(&site.grant_key()).unwrap();
+    let bytes_of = async |name: &str| {
+        let key = format!("runs/of-this/lease/{name}");
+        site.store.artifacts().size_bytes(&key).await.unwrap()
+    };
+    // An upload whose headers and first half have arrived.
+    let start_upload = async |name: &'static str| {
+        let (rest, body) = tokio::sync::mpsc::channel::<Result<&'static [u8], std::io::Error>>(1);
+        rest.send(Ok(b"forged ")).await.unwrap();
+        let body = futures::stream::unfold(body, async |mut body| Some((body.recv().await?, body)));
+        let request = site
+            .request(Method::PUT, &format!("/work/files/{name}"), None)
+            .header("authorization", format!("Grant {sealed}"))
+            .body(reqwest::Body::wrap_stream(body));
+        let answer = tokio::spawn(request.send());
+        // The server receives the upload once there is a temporary file.
+        while std::fs::read_dir(site.folder.path().join("uploads"))
+            .unwrap()
+            .count()
+            == 0
+        {
+            tokio::time::sleep(std::time::Duration::from_millis(5)).await;
+        }
+        (rest, answer)
+    };
+    let (rest, answer) = start_upload("game.zip").await;
+    assert!(
+        site.store.workers().close_files(claim.nonce),
+        "nothing is being stored"
+    );
+    rest.send(Ok(b"rows")).await.unwrap();
+    drop(rest);
+    let answer = Answer::of(answer.await.unwrap().unwrap()).await;
+    answer.problem(403, "forbidden", &["its files cannot be changed"]);
+    assert_eq!(bytes_of("game.zip").await, None);
+
+    // The same after the check has ended and was forgotten.
+    site.store.workers().forget_files(claim.nonce);
+    let (rest, answer) = start_upload("game.zip").await;
+    site.store.release(&claim, site.now()).await.unwrap();
+    rest.send(Ok(b"rows")).await.unwrap();
+    drop(rest);
+    let answer = Answer::of(answer.await.unwrap().unwrap()).await;
+    answer.problem(403, "forbidden", &["no longer holds the lease"]);
+    assert_eq!(bytes_of("game.zip").await, None);
+}
+
+#[tokio::test]
+async fn banned_worker_loses_access() {
+    let site = Site::start().await;
+    let team = site.team("Alpha").await;
+    let submission = site.valid_submission(&team, "hold").await;
+    site.evaluate(&team, &submission).await;
+    let ClaimedJob { claim, job } = site.claim().await;
+    let Job::Shard { bundle, .. } = job else {
+        panic!("expected a shard");
+    };
+    let grant = Grant {
+        job_id: claim.job,
+        nonce: claim.nonce,
+        bundles: vec![bundle.clone()],
+        write_scope: WriteScope::None,
+        expected_recording: ExpectedRecording::None,
+        program: String::new(),
+    };
+    let sealed = grant.seal(&site.grant_key()).unwrap();
+    let path = format!("/work/bundles/{}", bundle.blake3);
+    let transferred = site
+        .store
+        .transfer_lease(&claim, "remote/rack-1/slot-0", 30, site.now());
+    assert!(transferred.await.unwrap());
+    assert_eq!(
+        send(&site, Method::GET, &path, &sealed, b"").await.status,
+        200
+    );
+    let banned = [("rack-1".to_owned(), "it lies".to_owned())];
+    site.store.workers().set_banned(banned);
+    send(&site, Method::GET, &path, &sealed, b"").await.problem(
+        403,
+        "forbidden",
+        &["this worker is banned"],
+    );
+}
+
+/// The spec of a game job.
+fn game() -> GameSpec {
+    let spec = json!({
+        "ruleset": "airhockey-2023.3", "steps": 500, "profile": "ideal", "seed": "0".repeat(64),
+        "mismatch_seed": "0".repeat(64), "perturbations": PerturbationSettings::default(),
+    });
+    serde_json::from_value(spec).unwrap()
+}

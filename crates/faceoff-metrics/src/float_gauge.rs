@@ -1,0 +1,5 @@
+use prometheus_client::metrics::gauge::Gauge;
+use std::sync::atomic::AtomicU64;
+
+/// A gauge with a fractional value, mostly seconds.
+pub(crate) type FloatGauge = Gauge<f64, AtomicU64>;

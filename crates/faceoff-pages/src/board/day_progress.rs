@@ -1,0 +1,126 @@
+//! Progress of the evaluation day: running and queued evaluations, and those that ended without a result.
+
+use crate::frame::PageProblem;
+use faceoff_api::views::evaluation::{EvaluationStatus, EvaluationView, Progress};
+use faceoff_service::{
+    app::AppState,
+    views::{evaluation, visibility::Visibility, team},
+};
+use faceoff_types::{DivisionName, EvaluationId, StageDay};
+use jiff::Timestamp;
+
+/// Evaluations of today, and running ones of the day before.
+pub(super) struct DayProgress {
+    /// Sum over all evaluations, finished ones included.
+    pub(super) episodes: Progress,
+    pub(super) evaluations: usize,
+    pub(super) running: Vec<Run>,
+    pub(super) queued: Vec<Run>,
+    /// Ended without a result.
+    pub(super) ended: Vec<Run>,
+    /// Expected end of the last evaluation, from recent durations; `None` if one of them is not known.
+    pub(super) expected_at: Option<Timestamp>,
+}
+
+/// An evaluation without a result.
+pub(super) struct Run {
+    pub(super) team: String,
+    pub(super) evaluation: EvaluationId,
+    pub(super) state: &'static str,
+    pub(super) progress: Progress,
+}
+
+impl DayProgress {
+    /// `division`: only teams of this division.
+    pub(super) async fn load(
+        app: &AppState,
+        visibility: &Visibility,
+        today: StageDay,
+        division: Option<&DivisionName>,
+    ) -> Result<Self, PageProblem> {
+        let mut evaluations = evaluation::current(app, visibility, today).await?;
+        if division.is_some() {
+            let mut teams = team::all(app).await?;
+            teams.retain(|team| team.division.as_ref() == division);
+            evaluations.retain(|of| teams.iter().any(|team| team.name == of.team_name));
+        }
+        evaluation::add_queue_positions(app, &mut evaluations).await?;
+        let mut progress = Self {
+            episodes: Progress {
+                episodes_done: 0,
+                episodes_total: 0,
+            },
+            evaluations: evaluations.len(),
+            running: Vec::new(),
+            queued: Vec::new(),
+            ended: Vec::new(),
+            expected_at: None,
+        };
+        let mut is_known = true;
+        for evaluation in evaluations {
+            if !evaluation.status.is_final() {
+                let expected = evaluation.queue.and_then(|queue| queue.expected_at);
+                is_known &= expected.is_some();
+                progress.expected_at = progress.expected_at.max(expected);
+            }
+            progress.add(evaluation);
+        }
+        progress.expected_at = progress.expected_at.filter(|_| is_known);
+        Ok(progress)
+    }
+
+    fn add(&mut self, evaluation: EvaluationView) {
+        let is_voided = evaluation.voided.is_some();
+        let (state, list) = match evaluation.status {
+            _ if is_voided => ("Voided by the organisers", &mut self.ended),
+            EvaluationStatus::Finished { .. } => {
+                self.count(evaluation.progress);
+                return;
+            }
+            // A blind stage hides the outcome: the evaluation counts as finished.
+            EvaluationStatus::AgentFailed { .. } if evaluation.blind => {
+                self.count(Progress {
+                    episodes_done: evaluation.progress.episodes_total,
+                    ..evaluation.progress
+                });
+                return;
+            }
+            EvaluationStatus::Queued => ("Queued", &mut self.queued),
+            EvaluationStatus::Running => ("Running", &mut self.running),
+            EvaluationStatus::Finalising => ("Computing the score", &mut self.running),
+            EvaluationStatus::AgentFailed { .. } => (
+                "Agent failed; the team sees the reason when the day is released",
+                &mut self.ended,
+            ),
+            EvaluationStatus::PlatformFailed { .. } => ("Stopped by a platform fault", &mut self.ended),
+            EvaluationStatus::NotPlayed { .. } => {
+                ("Not evaluated in time: the server was at capacity", &mut self.ended)
+            }
+            EvaluationStatus::Cancelled { .. } => ("Cancelled by the organisers", &mut self.ended),
+        };
+        list.push(Run {
+            team: evaluation.team_name.to_string(),
+            evaluation: evaluation.id,
+            state,
+            progress: evaluation.progress,
+        });
+        if !is_voided && !evaluation.status.is_final() {
+            self.count(evaluation.progress);
+        }
+    }
+
+    fn count(&mut self, progress: Progress) {
+        self.episodes.episodes_done += progress.episodes_done;
+        self.episodes.episodes_total += progress.episodes_total;
+    }
+
+    pub(super) fn is_running(&self) -> bool {
+        !(self.running.is_empty() && self.queued.is_empty())
+    }
+
+    /// Text on the page and for screen readers; it changes when an evaluation has ended.
+    pub(super) fn live_text(&self) -> String {
+        let done = self.evaluations - self.running.len() - self.queued.len();
+        format!("{done} of {} evaluations done", self.evaluations)
+    }
+}

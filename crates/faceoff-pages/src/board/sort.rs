@@ -1,0 +1,168 @@
+//! Sorting of a board: the column and the direction, with links to sort by another column.
+
+use super::address::Address;
+use faceoff_api::{
+    requests::{BoardColumn, BoardPageQuery, BoardSort},
+    views::board::BoardRow,
+};
+use faceoff_service::problem::{Problem, ProblemKind};
+use faceoff_types::Task;
+use std::cmp::Ordering;
+
+/// Head of a sortable column.
+pub(super) struct ColumnHead {
+    pub(super) title: &'static str,
+    /// Unit of the column; empty without one.
+    pub(super) unit: &'static str,
+    pub(super) class: &'static str,
+    /// The board sorted by this column; in the other direction if it is already.
+    pub(super) address: String,
+    /// `ascending` or `descending` if the board is sorted by this column; the value of `aria-sort`.
+    pub(super) direction: Option<&'static str>,
+}
+
+impl ColumnHead {
+    pub(super) fn symbol(&self) -> &'static str {
+        match self.direction {
+            Some("ascending") => "▴",
+            Some(_) => "▾",
+            None => "",
+        }
+    }
+}
+
+/// Columns of the overall board, or of the board of a task: column, title, unit, CSS class.
+fn columns(task: Option<Task>) -> Vec<(BoardColumn, &'static str, &'static str, &'static str)> {
+    let place = (BoardColumn::Place, "#", "", "rank");
+    let team = (BoardColumn::Team, "Team", "", "");
+    let points = (BoardColumn::Points, "Penalty", "points", "number");
+    match task {
+        Some(_) => vec![
+            place,
+            team,
+            (BoardColumn::Score, "Success", "percent", "number"),
+            points,
+        ],
+        None => vec![
+            place,
+            team,
+            (BoardColumn::Score, "Score", "percent", "number"),
+            (BoardColumn::Task(Task::Hit), "Hit", "success", "number"),
+            (
+                BoardColumn::Task(Task::Defend),
+                "Defend",
+                "success",
+                "number",
+            ),
+            (
+                BoardColumn::Task(Task::Prepare),
+                "Prepare",
+                "success",
+                "number",
+            ),
+            points,
+        ],
+    }
+}
+
+pub(super) struct Sort {
+    key: BoardSort,
+    pub(super) heads: Vec<ColumnHead>,
+}
+
+impl Sort {
+    /// # Errors
+    /// `InvalidRequest` if the board has no such column.
+    pub(super) fn new(
+        query: &BoardPageQuery,
+        task: Option<Task>,
+        address: &Address,
+    ) -> Result<Self, Problem> {
+        let by_rank = BoardSort {
+            column: BoardColumn::Place,
+            is_reversed: false,
+        };
+        let key = query.sort.unwrap_or(by_rank);
+        let columns = columns(task);
+        if !columns.iter().any(|(column, ..)| *column == key.column) {
+            return Err(Problem::new(
+                ProblemKind::InvalidRequest,
+                format!(
+                    "this board cannot be sorted by {:?}",
+                    key.column.as_str()
+                ),
+            ));
+        }
+        let head = |(column, title, unit, class)| {
+            let is_sorted = key.column == column;
+            let is_ascending = is_ascending_by_default(column) != key.is_reversed;
+            let next = BoardSort {
+                column,
+                is_reversed: is_sorted && !key.is_reversed,
+            };
+            ColumnHead {
+                title,
+                unit,
+                class,
+                address: address.with_sort(next),
+                direction: is_sorted.then_some(if is_ascending {
+                    "ascending"
+                } else {
+                    "descending"
+                }),
+            }
+        };
+        Ok(Self {
+            key,
+            heads: columns.into_iter().map(head).collect(),
+        })
+    }
+
+    /// The default: by rank, grouped by tier.
+    pub(super) fn is_by_rank(&self) -> bool {
+        self.key.column == BoardColumn::Place && !self.key.is_reversed
+    }
+
+    /// Equal rows keep the order of the board.
+    pub(super) fn apply(&self, rows: &mut [BoardRow], task: Option<Task>) {
+        rows.sort_by(|a, b| {
+            let order = compare(self.key.column, task, a, b);
+            if self.key.is_reversed {
+                order.reverse()
+            } else {
+                order
+            }
+        });
+    }
+}
+
+const fn is_ascending_by_default(column: BoardColumn) -> bool {
+    match column {
+        BoardColumn::Place | BoardColumn::Team | BoardColumn::Points => true,
+        BoardColumn::Score | BoardColumn::Task(_) => false,
+    }
+}
+
+/// Compares by a column; better values come first.
+fn compare(column: BoardColumn, task: Option<Task>, a: &BoardRow, b: &BoardRow) -> Ordering {
+    let rate = |row: &BoardRow, task: Task| {
+        let result = row.tasks.get(&task);
+        result.map_or(f64::NEG_INFINITY, |result| result.success_rate)
+    };
+    let points = |row: &BoardRow| match task.and_then(|task| row.tasks.get(&task)) {
+        Some(result) => result.penalty_points,
+        None => row.penalty_points,
+    };
+    match (column, task) {
+        (BoardColumn::Place, _) => a.rank.cmp(&b.rank),
+        (BoardColumn::Team, _) => {
+            let name = |row: &BoardRow| row.team.as_str().to_lowercase();
+            name(a).cmp(&name(b))
+        }
+        (BoardColumn::Score, Some(task)) | (BoardColumn::Task(task), _) => {
+            rate(b, task).total_cmp(&rate(a, task))
+        }
+        (BoardColumn::Score, None) => b.score.total_cmp(&a.score),
+        (BoardColumn::Points, _) => points(a).total_cmp(&points(b)),
+    }
+}

@@ -1,0 +1,68 @@
+//! Status of boards and stages as text: which results count, who sees them, and whether they are final.
+
+use super::figures::utc_minute;
+use faceoff_api::views::{board::BoardView, stage::PhaseView};
+use faceoff_types::CountingResult;
+
+pub(super) const fn phase_label(phase: PhaseView, is_signed_off: bool) -> &'static str {
+    match phase {
+        PhaseView::Upcoming => "upcoming",
+        PhaseView::Open => "open",
+        PhaseView::Closed if is_signed_off => "signed off",
+        PhaseView::Closed => "closed, provisional",
+    }
+}
+
+/// Which results the rows contain, for the caption of the table.
+pub(super) fn rows_caption(board: &BoardView) -> String {
+    let rule = counting_rule(board);
+    match board.day {
+        None => rule,
+        Some(day) => format!("{rule}, up to {day}"),
+    }
+}
+
+fn counting_rule(board: &BoardView) -> String {
+    match board.rows_by {
+        CountingResult::Latest => "Each team's latest finished evaluation".to_owned(),
+        CountingResult::Best => {
+            "Each team's best finished evaluation; the best of several is partly luck".to_owned()
+        }
+        CountingResult::MeanOfLast(1) => "Each team's last day with a result".to_owned(),
+        CountingResult::MeanOfLast(days) => format!(
+            "Each team's mean over its last {days} days with a result, or over fewer if it has fewer; intervals cover the \
+             episodes of all these days"
+        ),
+        CountingResult::Final => "Each team's evaluation of the final day".to_owned(),
+    }
+}
+
+/// Notice that only the final day counts, while the board shows other results.
+pub(super) fn final_day_notice(board: &BoardView) -> Option<&'static str> {
+    (board.standings == CountingResult::Final && board.rows_by != CountingResult::Final).then_some(
+        "Only the final day counts. The organisers start it after the stage has closed.",
+    )
+}
+
+/// Who sees a blind board; `None` if the board is not blind.
+pub(super) fn blind_notice(board: &BoardView, is_hidden: bool) -> Option<&'static str> {
+    match (board.blind, is_hidden) {
+        (false, _) => None,
+        (true, true) => Some(
+            "This stage is blind: scores, penalty points, tiers and comparisons are hidden from everyone, teams included, until the organisers reveal them. No date is set.",
+        ),
+        (true, false) => Some("This stage is blind: only organisers see this board."),
+    }
+}
+
+pub(super) fn result_status(board: &BoardView) -> String {
+    match &board.finalised {
+        None => "The result is provisional: it may change until the organisers sign it off."
+            .to_owned(),
+        Some(done) => format!(
+            "The result was signed off on {} by {} and is final.",
+            utc_minute(done.at),
+            done.by
+        ),
+    }
+}

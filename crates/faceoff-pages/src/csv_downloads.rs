@@ -1,0 +1,155 @@
+//! Downloads in CSV: episodes and answer times of an evaluation, and ablations.
+
+use super::frame::PageProblem;
+use axum::{extract::State, response::Response};
+use faceoff_api::views::ablation::AblationStatus;
+use faceoff_replay::Group;
+use faceoff_service::{
+    app::App,
+    csv::{Table, escape_formula, or_empty},
+    extract::PathParam,
+    problem::Problem,
+    viewer::Viewer,
+    views::{ablation, clips::Clips, visibility::Visibility},
+};
+use faceoff_types::{EvaluationId, SubmissionId};
+
+type CsvResponse = Result<Response, PageProblem>;
+
+/// `/evaluations/{id}/episodes.csv`: a line per episode.
+pub(super) async fn episodes(
+    viewer: Result<Viewer, Problem>,
+    State(app): State<App>,
+    id: Result<PathParam<EvaluationId>, Problem>,
+) -> CsvResponse {
+    let PathParam(id) = id?;
+    let visibility = Visibility::load(&app, viewer?).await?;
+    let view = Clips::find(&app, &visibility, id).await?.episodes().await?;
+    let mut columns: Vec<String> = [
+        "task",
+        "episode",
+        "steps",
+        "success",
+        "end",
+        "why",
+        "start_x_m",
+        "start_y_m",
+        "start_vx_m_s",
+        "start_vy_m_s",
+        "last_x_m",
+        "last_y_m",
+        "last_vx_m_s",
+        "last_vy_m_s",
+        "longest_s",
+        "late",
+    ]
+    .map(str::to_owned)
+    .into();
+    for group in Group::ALL {
+        let name = group.as_str();
+        for suffix in ["first_step", "steps", "worst", "x_m", "y_m", "joint"] {
+            columns.push(format!("{name}_{suffix}"));
+        }
+    }
+    let names: Vec<&str> = columns.iter().map(String::as_str).collect();
+    let mut table = Table::new(&names);
+    for line in &view.episodes {
+        let mut row = vec![
+            line.task.to_string(),
+            line.episode.to_string(),
+            line.steps.to_string(),
+            line.success.to_string(),
+            line.end.as_str().to_owned(),
+            escape_formula(&line.why),
+        ];
+        row.extend(line.start.iter().chain(&line.last).map(ToString::to_string));
+        row.push(or_empty(line.longest_s));
+        row.push(or_empty(line.longest_s.map(|_| line.late)));
+        for group in Group::ALL {
+            let violation = line.broken.iter().find(|violation| violation.group == group);
+            row.extend([
+                or_empty(violation.map(|violation| violation.from)),
+                or_empty(violation.map(|violation| violation.samples)),
+                or_empty(violation.map(|violation| violation.worst)),
+                or_empty(violation.map(|violation| violation.at[0])),
+                or_empty(violation.map(|violation| violation.at[1])),
+                or_empty(violation.and_then(|violation| violation.joint)),
+            ]);
+        }
+        table.row(row);
+    }
+    Ok(table.into_download("episodes.csv"))
+}
+
+/// `/evaluations/{id}/answer-times.csv`: number of control steps by answer time, for viewers of the dataset.
+pub(super) async fn answer_times(
+    viewer: Result<Viewer, Problem>,
+    State(app): State<App>,
+    id: Result<PathParam<EvaluationId>, Problem>,
+) -> CsvResponse {
+    let PathParam(id) = id?;
+    let viewer = viewer?;
+    let visibility = Visibility::load(&app, viewer).await?;
+    let clips = Clips::find(&app, &visibility, id).await?;
+    if !clips.can_see_observations {
+        let detail = "computation times are visible to the team only until the dataset is public";
+        return Err(Problem::new(viewer.denial_kind(), detail).into());
+    }
+    let mut table = Table::new(&["task", "from_s", "to_s", "steps"]);
+    for (task, bins) in clips.computation_times().await? {
+        for bin in bins {
+            table.row([
+                task.to_string(),
+                bin.from_s.to_string(),
+                bin.to_s.to_string(),
+                bin.steps.to_string(),
+            ]);
+        }
+    }
+    Ok(table.into_download("answer-times.csv"))
+}
+
+/// `/submissions/{id}/ablation.csv`: a line per task and profile.
+pub(super) async fn ablation(
+    State(app): State<App>,
+    id: Result<PathParam<SubmissionId>, Problem>,
+) -> CsvResponse {
+    let PathParam(id) = id?;
+    let view = ablation::newest(&app, id).await?;
+    let Some(AblationStatus::Finished { tasks, .. }) = view.map(|view| view.status) else {
+        return Err(Problem::not_found("finished ablation").into());
+    };
+    let mut table = Table::new(&[
+        "task",
+        "profile",
+        "episodes",
+        "successes",
+        "success_rate",
+        "ci95_low",
+        "ci95_high",
+        "penalty_points",
+        "difference",
+        "lost",
+        "gained",
+        "p_value",
+    ]);
+    for (task, effects) in tasks {
+        for effect in effects {
+            table.row([
+                task.to_string(),
+                effect.profile.to_string(),
+                effect.episodes.to_string(),
+                effect.successes.to_string(),
+                effect.success_rate.to_string(),
+                effect.success_ci95[0].to_string(),
+                effect.success_ci95[1].to_string(),
+                effect.penalty_points.to_string(),
+                effect.difference.to_string(),
+                effect.lost.to_string(),
+                effect.gained.to_string(),
+                effect.p_value.to_string(),
+            ]);
+        }
+    }
+    Ok(table.into_download("ablation.csv"))
+}

@@ -1,0 +1,459 @@
+//! `/desk/access` and `/organiser/access`: users, invitations, tokens and sessions.
+
+use crate::{
+    dashboard_frame::{DoneQuery, DashboardHeader, Notice, redirect_done, render_dashboard},
+    figures::utc_minute,
+    frame::{Frame, PageProblem},
+    page_auth::PageUser,
+};
+use askama::Template;
+use axum::{
+    Router,
+    extract::{Query, State},
+    http::StatusCode,
+    response::{IntoResponse, Response},
+    routing::{get, post},
+};
+use faceoff_api::{
+    requests::{InvitedRole, NewInvitation, NewToken},
+    views::{invitation::InvitationView, token::TokenView},
+};
+use faceoff_service::{
+    services::{invitations, tokens, users},
+    app::App,
+    auth::Caller,
+    extract::{PageForm, PathParam},
+    problem::Problem,
+    views::{event, invitation, user, season::SeasonHead, token},
+};
+use faceoff_types::{InvitationId, UserId, TeamId, TeamName, TokenId};
+use jiff::{SignedDuration, Timestamp};
+use serde::Deserialize;
+use std::collections::BTreeMap;
+
+/// `base`: path of the dashboard.
+pub(crate) fn router(base: &str) -> Router<App> {
+    Router::new()
+        .route(&format!("{base}/access"), get(page))
+        .route(&format!("{base}/access/tokens"), post(create_token))
+        .route(
+            &format!("{base}/access/tokens/{{id}}/revoke"),
+            post(revoke_token),
+        )
+        .route(&format!("{base}/access/invitations"), post(invite))
+        .route(
+            &format!("{base}/access/invitations/{{id}}/revoke"),
+            post(revoke_invitation),
+        )
+        .route(
+            &format!("{base}/access/people/{{id}}/remove"),
+            post(remove_user),
+        )
+}
+
+#[derive(Template)]
+#[template(path = "dashboard_access.html")]
+struct Page {
+    frame: Frame,
+    head: DashboardHeader,
+    /// Path of the page; forms post to paths below it.
+    base: &'static str,
+    is_organiser: bool,
+    /// Title and value of a secret, shown only once.
+    secret: Option<(String, String)>,
+    users: Vec<UserRow>,
+    tokens: Vec<TokenRow>,
+    /// Expired and revoked tokens.
+    inactive_tokens: Vec<TokenRow>,
+    invitations: Vec<InvitationRow>,
+    /// Accepted, revoked and expired invitations.
+    closed_invitations: Vec<InvitationRow>,
+    teams: Vec<(TeamId, TeamName)>,
+    token_name: String,
+    note: String,
+}
+
+struct UserRow {
+    id: UserId,
+    name: String,
+    /// Organiser, or member of a team.
+    role: String,
+    joined_at: String,
+    left_at: Option<String>,
+    is_self: bool,
+    /// May the viewer remove this user?
+    can_remove: bool,
+}
+
+struct TokenRow {
+    id: TokenId,
+    name: String,
+    owner: String,
+    kind: String,
+    created_at: String,
+    last_used: String,
+    state: String,
+    is_current: bool,
+}
+
+struct InvitationRow {
+    id: InvitationId,
+    note: String,
+    role: String,
+    state: String,
+    until: String,
+}
+
+/// Path of this page for the caller.
+fn base_path(caller: &Caller) -> &'static str {
+    match caller.is_organiser() {
+        true => "/organiser/access",
+        false => "/desk/access",
+    }
+}
+
+/// A secret to show, and values of a refused form.
+#[derive(Default)]
+struct PageState {
+    secret: Option<(String, String)>,
+    token_name: String,
+    note: String,
+}
+
+fn token_row(
+    token: TokenView,
+    names: &BTreeMap<String, String>,
+    caller: &Caller,
+    now: Timestamp,
+) -> TokenRow {
+    let name = |key: String| names.get(&key).cloned().unwrap_or(key);
+    let is_own = token.person.is_some() && token.person == caller.user().map(|own| own.id);
+    let owner = match (token.person, token.team) {
+        _ if is_own => "you".to_owned(),
+        (Some(id), _) => name(format!("person:{id}")),
+        (None, Some(id)) => format!("team {}", name(format!("team:{id}"))),
+        (None, None) => "administrator of the host".to_owned(),
+    };
+    let state = match (token.revoked_at, token.expires_at) {
+        (Some(at), _) => format!("revoked {}", utc_minute(at)),
+        (None, Some(at)) if at <= now => format!("expired {}", utc_minute(at)),
+        (None, Some(at)) => format!("valid until {}", utc_minute(at)),
+        (None, None) => "valid, no expiry".to_owned(),
+    };
+    let last = token.last_used_at.map(utc_minute);
+    TokenRow {
+        id: token.id,
+        owner,
+        kind: match token.kind.as_str() {
+            "session" => "browser session".to_owned(),
+            _ => "token".to_owned(),
+        },
+        created_at: utc_minute(token.created_at),
+        last_used: last.unwrap_or_else(|| "never".to_owned()),
+        state,
+        is_current: token.id == caller.token.id,
+        name: token.name,
+    }
+}
+
+fn invitation_row(view: InvitationView, names: &BTreeMap<String, String>) -> InvitationRow {
+    let name = |key: String| names.get(&key).cloned().unwrap_or(key);
+    let role = match (view.role, view.team, view.person) {
+        (InvitedRole::Member, Some(team), _) => {
+            format!("member of {}", name(format!("team:{team}")))
+        }
+        (InvitedRole::Member, None, _) => "member".to_owned(),
+        (InvitedRole::Organiser, ..) => "organiser".to_owned(),
+        (InvitedRole::Founder, ..) => "first member of a new team".to_owned(),
+        (InvitedRole::Return, _, Some(person)) => {
+            format!("password reset of {}", name(format!("person:{person}")))
+        }
+        (InvitedRole::Return, _, None) => "password reset".to_owned(),
+    };
+    InvitationRow {
+        id: view.id,
+        note: view.note,
+        role,
+        state: view.state,
+        until: utc_minute(view.expires_at),
+    }
+}
+
+async fn page_with(
+    app: &App,
+    caller: &Caller,
+    notice: Notice<'_>,
+    state: PageState,
+) -> Result<Response, PageProblem> {
+    let now = app.config.clock.now();
+    let names = event::actor_names(app).await?;
+    let base = base_path(caller);
+    let mut tokens = Vec::new();
+    let mut inactive_tokens = Vec::new();
+    for token in tokens::tokens(app, caller).await? {
+        let is_active = token.revoked_at.is_none() && token.expires_at.is_none_or(|at| at > now);
+        let row = token_row(token::view(token), &names, caller, now);
+        match is_active {
+            true => tokens.push(row),
+            false => inactive_tokens.push(row),
+        }
+    }
+    let listed = invitations::invitations(app, caller).await?;
+    let listed = listed
+        .into_iter()
+        .map(|invitation| invitation_row(invitation::view(invitation, now), &names));
+    let (invitations, closed_invitations) = listed.partition(|one| one.state == "open");
+    let is_organiser = caller.is_organiser();
+    let own = caller.user().map(|person| person.id);
+    let users = users::list_users(app, caller).await?;
+    let users = users.into_iter().map(|person| {
+        let view = user::view(person);
+        let is_self = own == Some(view.id);
+        UserRow {
+            id: view.id,
+            name: view.name.to_string(),
+            role: match view.team {
+                Some(team) => format!(
+                    "member of {}",
+                    names
+                        .get(&format!("team:{team}"))
+                        .cloned()
+                        .unwrap_or_default()
+                ),
+                None => "organiser".to_owned(),
+            },
+            joined_at: utc_minute(view.joined_at),
+            left_at: view.left_at.map(utc_minute),
+            is_self,
+            can_remove: view.left_at.is_none() && (is_organiser || is_self),
+        }
+    });
+    let teams = match is_organiser {
+        true => app.store.teams().await.map_err(Problem::from)?,
+        false => Vec::new(),
+    };
+    let season = SeasonHead::load(app).await?.name;
+    let page = Page {
+        frame: Frame::for_app(app, season, base),
+        head: DashboardHeader::new(caller, base, notice),
+        base,
+        is_organiser,
+        users: users.collect(),
+        tokens,
+        inactive_tokens,
+        invitations,
+        closed_invitations,
+        teams: teams.into_iter().map(|team| (team.id, team.name)).collect(),
+        secret: state.secret,
+        token_name: state.token_name,
+        note: state.note,
+    };
+    render_dashboard(&page, notice)
+}
+
+async fn page(
+    PageUser(caller): PageUser,
+    State(app): State<App>,
+    Query(notice): Query<DoneQuery>,
+) -> Result<Response, PageProblem> {
+    page_with(&app, &caller, Notice::Done(&notice), PageState::default()).await
+}
+
+/// The page with a new secret. There is no redirect, since the secret is shown only once.
+async fn page_with_secret(
+    app: &App,
+    caller: &Caller,
+    secret: (String, String),
+) -> Result<Response, PageProblem> {
+    let state = PageState {
+        secret: Some(secret),
+        ..PageState::default()
+    };
+    let page = page_with(app, caller, Notice::None, state).await?;
+    Ok((StatusCode::CREATED, page).into_response())
+}
+
+#[derive(Deserialize)]
+struct TokenForm {
+    name: String,
+    /// `me` or `team`.
+    #[serde(default)]
+    owner: String,
+    /// Empty: no expiry.
+    #[serde(default)]
+    days: String,
+}
+
+fn token_request(app: &App, caller: &Caller, form: &TokenForm) -> Result<NewToken, Problem> {
+    let now = app.config.clock.now();
+    let days = Some(form.days.trim()).filter(|days| !days.is_empty());
+    let days = days.map(|days| {
+        let days: u16 = days
+            .parse()
+            .map_err(|_| Problem::invalid("days", "expected a number of days"))?;
+        now.saturating_add(SignedDuration::from_hours(24 * i64::from(days)))
+            .map_err(|error| Problem::invalid("days", error))
+    });
+    let team = caller.team().filter(|_| form.owner == "team");
+    Ok(NewToken {
+        name: form.name.clone(),
+        expires_at: days.transpose()?,
+        team: team.map(|team| team.id),
+    })
+}
+
+async fn create_token(
+    PageUser(caller): PageUser,
+    State(app): State<App>,
+    form: Result<PageForm<TokenForm>, Problem>,
+) -> Result<Response, PageProblem> {
+    let PageForm(form) = form?;
+    let created = match token_request(&app, &caller, &form) {
+        Ok(request) => tokens::create_token(&app, &caller, request).await,
+        Err(problem) => Err(problem),
+    };
+    match created {
+        Ok(view) => {
+            let title = format!("Token “{}”", view.token.name);
+            page_with_secret(&app, &caller, (title, view.secret)).await
+        }
+        Err(problem) => {
+            let state = PageState {
+                token_name: form.name,
+                ..PageState::default()
+            };
+            page_with(&app, &caller, Notice::Refused(&problem), state).await
+        }
+    }
+}
+
+#[derive(Deserialize)]
+struct EmptyForm {}
+
+async fn revoke_token(
+    PageUser(caller): PageUser,
+    State(app): State<App>,
+    id: Result<PathParam<TokenId>, Problem>,
+    form: Result<PageForm<EmptyForm>, Problem>,
+) -> Result<Response, PageProblem> {
+    let (PathParam(id), PageForm(EmptyForm {})) = (id?, form?);
+    match tokens::revoke_token(&app, &caller, id).await {
+        Ok(_) => Ok(redirect_done(base_path(&caller), "revoked")),
+        Err(problem) => {
+            let state = PageState::default();
+            page_with(&app, &caller, Notice::Refused(&problem), state).await
+        }
+    }
+}
+
+#[derive(Deserialize)]
+struct InvitationForm {
+    note: String,
+    /// Only in the form of organisers: `organiser`, `founder`, `member`, `return`.
+    #[serde(default)]
+    role: String,
+    #[serde(default)]
+    team: String,
+    /// The user whose password is reset.
+    #[serde(default)]
+    person: String,
+}
+
+fn invitation_request(caller: &Caller, form: &InvitationForm) -> Result<NewInvitation, Problem> {
+    let role = match (caller.is_organiser(), form.role.as_str()) {
+        (false, _) | (true, "member") => InvitedRole::Member,
+        (true, "organiser") => InvitedRole::Organiser,
+        (true, "return") => InvitedRole::Return,
+        (true, "founder") => InvitedRole::Founder,
+        (true, other) => {
+            let detail = format!("expected member, founder, organiser or return, got {other:?}");
+            return Err(Problem::invalid("role", detail));
+        }
+    };
+    let id = |field: &str, text: &str| {
+        let wrong = |_| Problem::invalid(field, "choose an entry of the list");
+        text.parse().map_err(wrong)
+    };
+    let team = match (role, caller.is_organiser()) {
+        (InvitedRole::Member, true) => Some(id("team", &form.team)?),
+        _ => None,
+    };
+    let person = match role {
+        InvitedRole::Return => {
+            let wrong = |_| Problem::invalid("person", "choose an entry of the list");
+            Some(form.person.parse::<UserId>().map_err(wrong)?)
+        }
+        _ => None,
+    };
+    Ok(NewInvitation {
+        role,
+        team,
+        person,
+        note: form.note.clone(),
+        expires_at: None,
+    })
+}
+
+async fn invite(
+    PageUser(caller): PageUser,
+    State(app): State<App>,
+    form: Result<PageForm<InvitationForm>, Problem>,
+) -> Result<Response, PageProblem> {
+    let PageForm(form) = form?;
+    let invitation = match invitation_request(&caller, &form) {
+        Ok(request) => invitations::create_invitation(&app, &caller, request).await,
+        Err(problem) => Err(problem),
+    };
+    match invitation {
+        Ok(view) => {
+            let title = format!("Invitation link “{}”", view.invitation.note);
+            page_with_secret(&app, &caller, (title, view.link)).await
+        }
+        Err(problem) => {
+            let state = PageState {
+                note: form.note,
+                ..PageState::default()
+            };
+            page_with(&app, &caller, Notice::Refused(&problem), state).await
+        }
+    }
+}
+
+async fn revoke_invitation(
+    PageUser(caller): PageUser,
+    State(app): State<App>,
+    id: Result<PathParam<InvitationId>, Problem>,
+    form: Result<PageForm<EmptyForm>, Problem>,
+) -> Result<Response, PageProblem> {
+    let (PathParam(id), PageForm(EmptyForm {})) = (id?, form?);
+    match invitations::revoke_invitation(&app, &caller, id).await {
+        Ok(_) => Ok(redirect_done(base_path(&caller), "uninvited")),
+        Err(problem) => {
+            let state = PageState::default();
+            page_with(&app, &caller, Notice::Refused(&problem), state).await
+        }
+    }
+}
+
+#[derive(Deserialize)]
+struct RemovalForm {
+    /// Name of the user, typed as confirmation.
+    confirm: String,
+}
+
+async fn remove_user(
+    PageUser(caller): PageUser,
+    State(app): State<App>,
+    id: Result<PathParam<UserId>, Problem>,
+    form: Result<PageForm<RemovalForm>, Problem>,
+) -> Result<Response, PageProblem> {
+    let (PathParam(id), PageForm(form)) = (id?, form?);
+    let confirm = Some(form.confirm.trim());
+    match users::remove_user(&app, &caller, id, confirm).await {
+        Ok(_) => Ok(redirect_done(base_path(&caller), "removed")),
+        Err(problem) => {
+            let state = PageState::default();
+            page_with(&app, &caller, Notice::Refused(&problem), state).await
+        }
+    }
+}

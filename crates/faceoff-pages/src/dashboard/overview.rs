@@ -1,0 +1,109 @@
+//! `/desk`: next evaluation, upload, submissions and latest evaluations of a team.
+
+use super::evaluations::{self, EvaluationRow};
+use crate::{
+    dashboard_frame::{self, DoneQuery, DashboardHeader, Notice, redirect_done, render_dashboard},
+    submission_row::SubmissionRow,
+    frame::{Frame, PageProblem},
+    page_auth::{PageMember, PageUser},
+};
+use askama::Template;
+use axum::{
+    extract::{Query, State},
+    response::{IntoResponse, Redirect, Response},
+};
+use faceoff_api::views::me::MeView;
+use faceoff_service::{
+    services::users,
+    app::App,
+    extract::PageForm,
+    problem::Problem,
+    views::{me, season::SeasonHead, submission},
+};
+use faceoff_types::EvaluationId;
+use serde::Deserialize;
+
+/// Number of submissions and evaluations in the lists; older submissions are folded.
+const LISTED: usize = 10;
+
+#[derive(Template)]
+#[template(path = "dashboard_overview.html")]
+struct Page {
+    frame: Frame,
+    head: DashboardHeader,
+    me: MeView,
+    next_cutoff: Option<String>,
+    active: Option<SubmissionRow>,
+    today: Option<(EvaluationId, String)>,
+    newest: Vec<SubmissionRow>,
+    older: Vec<SubmissionRow>,
+    evaluations: Vec<EvaluationRow>,
+    max_bundle_size: String,
+    /// Version of the terms that the user has not accepted yet.
+    terms_to_accept: Option<u32>,
+    is_validating: bool,
+}
+
+/// The team dashboard; redirects organisers to theirs.
+pub(super) async fn page(
+    PageUser(caller): PageUser,
+    State(app): State<App>,
+    Query(notice): Query<DoneQuery>,
+) -> Result<Response, PageProblem> {
+    if caller.is_organiser() {
+        return Ok(Redirect::to("/organiser").into_response());
+    }
+    let team = faceoff_service::auth::TeamCaller::new(caller.clone())?;
+    page_with(&app, &PageMember { caller, team }, Notice::Done(&notice)).await
+}
+
+pub(super) async fn page_with(
+    app: &App,
+    member: &PageMember,
+    notice: Notice<'_>,
+) -> Result<Response, PageProblem> {
+    let team = &member.team.team;
+    let season = SeasonHead::load(app).await?.name;
+    let me = me::build(app, team.clone()).await?;
+    let submissions = submission::team_submissions(app, team.id).await?;
+    let mut newest: Vec<SubmissionRow> = submissions.iter().map(SubmissionRow::from).collect();
+    let older = newest.split_off(newest.len().min(LISTED));
+    let active = submissions.iter().find(|submission| submission.active);
+    let terms = app.store.terms().await.map_err(Problem::from)?;
+    let newest_terms = terms.first().map(|terms| terms.version);
+    let user = member.caller.user();
+    let today = me.turn.evaluation.zip(me.turn.next.clone());
+    let page = Page {
+        frame: Frame::for_app(app, season, "/desk"),
+        head: DashboardHeader::new(&member.caller, "/desk", notice),
+        next_cutoff: me.next_cut.as_ref().map(ToString::to_string),
+        active: active.map(SubmissionRow::from),
+        today,
+        newest,
+        older,
+        evaluations: evaluations::of_team(app, team.id, LISTED).await?,
+        max_bundle_size: dashboard_frame::bytes(me.max_bundle_bytes),
+        terms_to_accept: newest_terms
+            .filter(|newest| user.is_some_and(|user| user.accepted_terms != Some(*newest))),
+        is_validating: !me.validating.is_empty(),
+        me,
+    };
+    render_dashboard(&page, notice)
+}
+
+#[derive(Deserialize)]
+pub(super) struct TermsForm {
+    version: u32,
+}
+
+pub(super) async fn accept_terms(
+    member: PageMember,
+    State(app): State<App>,
+    form: Result<PageForm<TermsForm>, Problem>,
+) -> Result<Response, PageProblem> {
+    let PageForm(TermsForm { version }) = form?;
+    match users::accept_terms(&app, &member.caller, version).await {
+        Ok(_) => Ok(redirect_done("/desk", "terms")),
+        Err(problem) => page_with(&app, &member, Notice::Refused(&problem)).await,
+    }
+}

@@ -1,0 +1,70 @@
+//! `/desk/questions`: questions of the team, and published answers.
+
+use crate::{
+    dashboard_frame::{DoneQuery, DashboardHeader, Notice, redirect_done, render_dashboard},
+    figures::utc_minute,
+    frame::{Frame, PageProblem},
+    page_auth::PageMember,
+};
+use askama::Template;
+use axum::{
+    extract::{Query, State},
+    response::Response,
+};
+use faceoff_api::{requests::NewQuestion, views::announcement::QuestionView};
+use faceoff_service::{
+    services::announcements, app::App, extract::PageForm, problem::Problem, views::season::SeasonHead,
+};
+
+const PATH: &str = "/desk/questions";
+
+#[derive(Template)]
+#[template(path = "dashboard_questions.html")]
+struct Page {
+    frame: Frame,
+    head: DashboardHeader,
+    questions: Vec<QuestionView>,
+    text: String,
+}
+
+impl Page {
+    fn at(&self, at: &jiff::Timestamp) -> String {
+        utc_minute(*at)
+    }
+}
+
+async fn page_with(
+    app: &App,
+    member: &PageMember,
+    notice: Notice<'_>,
+    text: String,
+) -> Result<Response, PageProblem> {
+    let season = SeasonHead::load(app).await?.name;
+    let page = Page {
+        frame: Frame::for_app(app, season, PATH),
+        head: DashboardHeader::new(&member.caller, PATH, notice),
+        questions: announcements::questions(app, Some(&member.caller)).await?,
+        text,
+    };
+    render_dashboard(&page, notice)
+}
+
+pub(super) async fn page(
+    member: PageMember,
+    State(app): State<App>,
+    Query(notice): Query<DoneQuery>,
+) -> Result<Response, PageProblem> {
+    page_with(&app, &member, Notice::Done(&notice), String::new()).await
+}
+
+pub(super) async fn ask(
+    member: PageMember,
+    State(app): State<App>,
+    form: Result<PageForm<NewQuestion>, Problem>,
+) -> Result<Response, PageProblem> {
+    let PageForm(form) = form?;
+    match announcements::ask(&app, &member.team, &form).await {
+        Ok(_) => Ok(redirect_done(PATH, "asked")),
+        Err(problem) => page_with(&app, &member, Notice::Refused(&problem), form.text).await,
+    }
+}

@@ -1,0 +1,168 @@
+//! `/desk/submissions/{id}`: validation result, log and actions of a submission.
+
+use crate::{
+    dashboard_frame::{DoneQuery, DashboardHeader, Notice, redirect_done, render_dashboard},
+    submission_row::SubmissionRow,
+    frame::{Frame, PageProblem},
+    page_auth::PageMember,
+};
+use askama::Template;
+use axum::{
+    extract::{Query, State},
+    response::Response,
+};
+use faceoff_api::{
+    requests::SubmissionChange,
+    views::submission::{SubmissionStatus, SubmissionView},
+};
+use faceoff_service::{
+    services::submissions,
+    app::App,
+    extract::{PageForm, PathParam},
+    problem::Problem,
+    views::{season::SeasonHead, submission},
+};
+use faceoff_types::{ValidationTiming, SubmissionId};
+use serde::Deserialize;
+
+#[derive(Template)]
+#[template(path = "dashboard_submission.html")]
+struct Page {
+    frame: Frame,
+    head: DashboardHeader,
+    submission: SubmissionRow,
+    view: SubmissionView,
+    log: Option<String>,
+    timing: Vec<TimingRow>,
+    label: String,
+    note: String,
+    is_validating: bool,
+}
+
+/// Answer times in a task of the validation run.
+struct TimingRow {
+    task: String,
+    steps: u32,
+    mean_ms: String,
+    p99_ms: String,
+    max_ms: String,
+    points: String,
+}
+
+impl From<&ValidationTiming> for TimingRow {
+    fn from(timing: &ValidationTiming) -> Self {
+        let ms = |seconds: f64| format!("{:.2}", 1000.0 * seconds);
+        Self {
+            task: timing.task.to_string(),
+            steps: timing.steps,
+            mean_ms: ms(timing.mean_s),
+            p99_ms: ms(timing.p99_s),
+            max_ms: ms(timing.max_s),
+            points: format!("{:.1}", timing.points_per_episode),
+        }
+    }
+}
+
+fn path(id: SubmissionId) -> String {
+    format!("/desk/submissions/{id}")
+}
+
+async fn page_with(
+    app: &App,
+    member: &PageMember,
+    id: SubmissionId,
+    notice: Notice<'_>,
+    form: Option<DescriptionForm>,
+) -> Result<Response, PageProblem> {
+    let found = app.store.submission(id).await;
+    let submission = member
+        .caller
+        .visible("submission", found, |submission| submission.team)?;
+    let view = submission::build(app, submission).await?;
+    let season = SeasonHead::load(app).await?.name;
+    let log = match &view.status {
+        SubmissionStatus::Valid { log } | SubmissionStatus::Invalid { log, .. } => log.clone(),
+        SubmissionStatus::Validating | SubmissionStatus::ValidationError { .. } => None,
+    };
+    let form = form.unwrap_or_else(|| DescriptionForm {
+        label: view.label.clone().unwrap_or_default(),
+        note: view.note.clone().unwrap_or_default(),
+    });
+    let page = Page {
+        frame: Frame::for_app(app, season, ""),
+        head: DashboardHeader::new(&member.caller, "", notice),
+        submission: SubmissionRow::from(&view),
+        log: log.filter(|log| !log.trim().is_empty()),
+        timing: view.timing.iter().map(TimingRow::from).collect(),
+        label: form.label,
+        note: form.note,
+        is_validating: view.status == SubmissionStatus::Validating,
+        view,
+    };
+    render_dashboard(&page, notice)
+}
+
+pub(super) async fn page(
+    member: PageMember,
+    State(app): State<App>,
+    id: Result<PathParam<SubmissionId>, Problem>,
+    Query(notice): Query<DoneQuery>,
+) -> Result<Response, PageProblem> {
+    page_with(&app, &member, id?.0, Notice::Done(&notice), None).await
+}
+
+#[derive(Deserialize)]
+pub(super) struct EmptyForm {}
+
+/// Makes it the active submission.
+pub(super) async fn activate(
+    member: PageMember,
+    State(app): State<App>,
+    id: Result<PathParam<SubmissionId>, Problem>,
+    form: Result<PageForm<EmptyForm>, Problem>,
+) -> Result<Response, PageProblem> {
+    let (PathParam(id), PageForm(EmptyForm {})) = (id?, form?);
+    match submissions::activate_submission(&app, &member.team, id).await {
+        Ok(_) => Ok(redirect_done("/desk", "activated")),
+        Err(problem) => page_with(&app, &member, id, Notice::Refused(&problem), None).await,
+    }
+}
+
+pub(super) async fn withdraw(
+    member: PageMember,
+    State(app): State<App>,
+    id: Result<PathParam<SubmissionId>, Problem>,
+    form: Result<PageForm<EmptyForm>, Problem>,
+) -> Result<Response, PageProblem> {
+    let (PathParam(id), PageForm(EmptyForm {})) = (id?, form?);
+    match submissions::withdraw_submission(&app, &member.team, id).await {
+        Ok(_) => Ok(redirect_done("/desk", "withdrawn")),
+        Err(problem) => page_with(&app, &member, id, Notice::Refused(&problem), None).await,
+    }
+}
+
+#[derive(Deserialize)]
+pub(super) struct DescriptionForm {
+    label: String,
+    note: String,
+}
+
+pub(super) async fn describe(
+    member: PageMember,
+    State(app): State<App>,
+    id: Result<PathParam<SubmissionId>, Problem>,
+    form: Result<PageForm<DescriptionForm>, Problem>,
+) -> Result<Response, PageProblem> {
+    let (PathParam(id), PageForm(form)) = (id?, form?);
+    let change_to = |text: &str| Some(Some(text.trim().to_owned()).filter(|text| !text.is_empty()));
+    let change = SubmissionChange {
+        label: change_to(&form.label),
+        note: change_to(&form.note.replace("\r\n", "\n")),
+    };
+    match submissions::describe_submission(&app, &member.team, id, &change).await {
+        Ok(_) => Ok(redirect_done(&path(id), "described")),
+        Err(problem) => {
+            page_with(&app, &member, id, Notice::Refused(&problem), Some(form)).await
+        }
+    }
+}

@@ -1,0 +1,67 @@
+//! Outcomes and violations of episodes as text.
+
+use faceoff_replay::{ViolationSummary, Group};
+use faceoff_types::EpisodeEnd;
+
+pub(super) const fn end_label(end: EpisodeEnd) -> &'static str {
+    match end {
+        EpisodeEnd::Horizon => "time limit reached",
+        EpisodeEnd::LeftTable => "puck left the table",
+        EpisodeEnd::CrossedMiddle => "puck crossed the middle",
+        EpisodeEnd::Stopped => "puck stopped",
+        EpisodeEnd::ReachedAxis => "puck reached the long axis",
+        EpisodeEnd::AgentFault => "agent fault",
+    }
+}
+
+pub(super) const fn group_label(group: Group) -> &'static str {
+    match group {
+        Group::Ee => "end effector",
+        Group::Link => "elbow, wrist",
+        Group::JointPos => "joint position",
+        Group::JointVel => "joint velocity",
+    }
+}
+
+/// A violation with its size and duration.
+pub(super) fn describe_violation(broken: &ViolationSummary) -> String {
+    let excess = match broken.group {
+        Group::Ee | Group::Link => excess_text(1e3 * broken.worst, 1, "mm"),
+        Group::JointPos => excess_text(broken.worst, 4, "rad"),
+        Group::JointVel => excess_text(broken.worst, 3, "rad/s"),
+    };
+    let joint = match broken.joint {
+        Some(joint) => format!(" of joint {joint}"),
+        None => String::new(),
+    };
+    format!(
+        "{}{joint}: by {excess}, from step {}, for {} {}",
+        group_label(broken.group),
+        broken.from,
+        broken.samples,
+        if broken.samples == 1 { "step" } else { "steps" }
+    )
+}
+
+/// The largest excess; small values are never shown as zero.
+fn excess_text(worst: f64, decimals: usize, unit: &str) -> String {
+    let text = format!("{worst:.decimals$}");
+    if text.chars().all(|c| matches!(c, '0' | '.')) {
+        let least = 0.1_f64.powi(i32::try_from(decimals).unwrap_or(1));
+        format!("less than {least:.decimals$} {unit}")
+    } else {
+        format!("up to {text} {unit}")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn small_excess_is_not_shown_as_zero() {
+        assert_eq!(excess_text(0.0004, 3, "rad/s"), "less than 0.001 rad/s");
+        assert_eq!(excess_text(0.0006, 3, "rad/s"), "up to 0.001 rad/s");
+        assert_eq!(excess_text(12.34, 1, "mm"), "up to 12.3 mm");
+    }
+}

@@ -1,0 +1,199 @@
+//! Analysis of a game: possession, shots, speeds and violations.
+
+use super::live::{game_clock, replay_link};
+use crate::{
+    violation_map::ViolationMarks,
+    chart::{Bins, Histogram},
+    episode_text::group_label,
+    figures,
+    table_drawing::{self, Position},
+};
+use faceoff_replay::{LocatedViolation, GameAnalysis, Group, Shot, model::CONTROL_STEP_S};
+
+/// Shares of the playing time in percent, per side.
+pub(super) struct Possession {
+    /// Puck on the half of the side.
+    pub(super) halves: [String; 2],
+    /// The side touched the puck last in the rally.
+    pub(super) touched: [String; 2],
+    pub(super) untouched: String,
+}
+
+pub(super) struct Shots {
+    pub(super) team: String,
+    pub(super) count: usize,
+    pub(super) goals: usize,
+    /// m/s; `None` without shots.
+    pub(super) mean: Option<String>,
+    pub(super) fastest: Option<String>,
+    /// Marks of shots that led to a goal, and of other shots.
+    pub(super) scored: String,
+    pub(super) others: String,
+    pub(super) rows: Vec<ShotRow>,
+}
+
+pub(super) struct ShotRow {
+    pub(super) at: String,
+    /// The replay two seconds earlier.
+    pub(super) link: String,
+    pub(super) position: String,
+    pub(super) speed: String,
+    pub(super) goal: bool,
+}
+
+/// Distribution of the speeds of shots.
+pub(super) struct Speeds {
+    pub(super) charts: [Histogram; 2],
+    /// Range of speeds in m/s, and the number of shots of each side.
+    pub(super) rows: Vec<(String, [usize; 2])>,
+}
+
+/// Violations of a side.
+pub(super) struct Violations {
+    pub(super) team: String,
+    pub(super) count: usize,
+    pub(super) marks: Vec<ViolationMarks>,
+    pub(super) rows: Vec<ViolationRow>,
+}
+
+pub(super) struct ViolationRow {
+    pub(super) at: String,
+    pub(super) link: String,
+    pub(super) limit: &'static str,
+    pub(super) duration_s: String,
+    pub(super) max_excess: String,
+    pub(super) position: String,
+}
+
+/// Width of a column of the histogram, m/s.
+const SPEED_STEP: f64 = 0.5;
+/// Largest number of rows of a table: a robot that oscillates at a limit violates it thousands of times.
+const MAX_ROWS: usize = 500;
+
+impl Possession {
+    pub(super) fn new(analysis: &GameAnalysis) -> Self {
+        let share =
+            |steps: u32| figures::one_decimal(100.0 * f64::from(steps) / f64::from(analysis.steps.max(1)));
+        Self {
+            halves: analysis.halves.map(share),
+            touched: analysis.touched.map(share),
+            untouched: share(analysis.untouched),
+        }
+    }
+}
+
+impl Shots {
+    pub(super) fn new(analysis: &GameAnalysis, side: usize, team: &str) -> Self {
+        let shots = analysis.shots_of(side);
+        let positions = |goal: bool| -> Vec<Position> {
+            let matching = shots.iter().filter(|shot| shot.goal == goal);
+            matching.map(|shot| shot.at).collect()
+        };
+        let speeds = || shots.iter().map(|shot| shot.speed);
+        let fastest = speeds().reduce(f64::max);
+        let count = u32::try_from(shots.len()).unwrap_or(u32::MAX);
+        Self {
+            team: team.to_owned(),
+            count: shots.len(),
+            goals: shots.iter().filter(|shot| shot.goal).count(),
+            mean: fastest.map(|_| figures::one_decimal(speeds().sum::<f64>() / f64::from(count))),
+            fastest: fastest.map(figures::one_decimal),
+            scored: table_drawing::dots(&positions(true)),
+            others: table_drawing::crosses(&positions(false)),
+            rows: shots.iter().take(MAX_ROWS).map(ShotRow::new).collect(),
+        }
+    }
+}
+
+impl Speeds {
+    /// `None` without shots.
+    pub(super) fn new(analysis: &GameAnalysis, teams: &[String; 2]) -> Option<Self> {
+        let speeds = [0, 1].map(|side| -> Vec<f64> {
+            let shots = analysis.shots_of(side).into_iter();
+            shots.map(|shot| shot.speed).collect()
+        });
+        let all = || speeds.iter().flatten().copied();
+        all().next()?;
+        let bins = Bins::for_all(SPEED_STEP, all());
+        let counts = speeds.each_ref().map(|speeds| bins.counts(speeds));
+        let most = counts.iter().flatten().copied().max().unwrap_or_default();
+        let in_column = |column: usize| counts.each_ref().map(|counts| counts[column]);
+        Some(Self {
+            charts: [0, 1].map(|side| {
+                let title = format!("Shots of {}", teams[side]);
+                Histogram::new(&title, "m/s", bins, &counts[side], most)
+            }),
+            rows: (0..bins.count)
+                .map(|column| (bins.label(column), in_column(column)))
+                .collect(),
+        })
+    }
+}
+
+impl ShotRow {
+    fn new(shot: &Shot) -> Self {
+        Self {
+            at: game_clock(step(shot.t)),
+            link: replay_link(step(shot.t)),
+            position: position_text(shot.at),
+            speed: figures::one_decimal(shot.speed),
+            goal: shot.goal,
+        }
+    }
+}
+
+impl Violations {
+    pub(super) fn new(analysis: &GameAnalysis, side: usize, team: &str) -> Self {
+        let own: Vec<&LocatedViolation> = analysis
+            .violations
+            .iter()
+            .filter(|violation| violation.side == side)
+            .collect();
+        let group_positions = |group: Group| {
+            let matching = own.iter().filter(|violation| violation.group == group);
+            matching.map(|violation| violation.at).collect()
+        };
+        Self {
+            team: team.to_owned(),
+            count: own.len(),
+            marks: ViolationMarks::by_group(group_positions),
+            rows: own
+                .iter()
+                .take(MAX_ROWS)
+                .map(|violation| ViolationRow {
+                    at: game_clock(violation.from),
+                    link: replay_link(violation.from),
+                    limit: group_label(violation.group),
+                    duration_s: format!(
+                        "{:.2}",
+                        f64::from(violation.to + 1 - violation.from) * CONTROL_STEP_S
+                    ),
+                    max_excess: max_excess(violation),
+                    position: position_text(violation.at),
+                })
+                .collect(),
+        }
+    }
+}
+
+fn max_excess(violation: &LocatedViolation) -> String {
+    match violation.group {
+        Group::Ee | Group::Link => format!("{} mm", figures::one_decimal(1e3 * violation.worst)),
+        Group::JointPos => format!("{:.3} rad", violation.worst),
+        Group::JointVel => format!("{:.3} rad/s", violation.worst),
+    }
+}
+
+fn position_text([x, y]: Position) -> String {
+    format!("{x:.2}, {y:.2}")
+}
+
+/// The control step at a time in seconds.
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "the time is within a game"
+)]
+fn step(t: f64) -> u32 {
+    (t / CONTROL_STEP_S).round() as u32
+}

@@ -1,0 +1,83 @@
+//! Course of a game: a chart of the score over time, the same as a table, and the paths of the puck into the goals.
+
+use super::live::{game_clock, replay_link};
+use crate::{chart::ScoreChart, table_drawing::path};
+use faceoff_replay::{RallyEndEvent, RallyEndKind, GameAnalysis};
+
+pub(super) struct ScoreTimeline {
+    pub(super) chart: ScoreChart,
+    pub(super) rows: Vec<Row>,
+    /// Number of rallies without goal or foul.
+    pub(super) others: usize,
+    /// Paths of the puck into the goals of each side; SVG paths.
+    pub(super) goal_paths: [String; 2],
+}
+
+/// The end of a rally.
+pub(super) struct Row {
+    pub(super) at: String,
+    /// The replay two seconds earlier.
+    pub(super) link: String,
+    pub(super) event: &'static str,
+    pub(super) team: String,
+    pub(super) score: [u32; 2],
+}
+
+impl ScoreTimeline {
+    pub(super) fn new(analysis: &GameAnalysis, teams: &[String; 2]) -> Self {
+        let GameAnalysis { breaks, steps, .. } = analysis;
+        let goal_paths = [0, 1].map(|side| {
+            let goals = analysis.goals.iter().filter(|goal| goal.side == side);
+            goals.map(|goal| path(&goal.positions)).collect()
+        });
+        let changes_score = |end: &&RallyEndEvent| matches!(end.what, RallyEndKind::Goal | RallyEndKind::Foul);
+        let rows: Vec<Row> = breaks
+            .iter()
+            .filter(|end| end.what != RallyEndKind::GameOver)
+            .map(|end| Row {
+                at: game_clock(end.sample),
+                link: replay_link(end.sample),
+                event: end_label(end.what),
+                team: match end.by {
+                    Some(0) => teams[0].clone(),
+                    Some(_) => teams[1].clone(),
+                    None => "–".to_owned(),
+                },
+                score: end.score,
+            })
+            .collect();
+        Self {
+            chart: ScoreChart::new(
+                *steps,
+                breaks.iter().filter(changes_score).map(|end| {
+                    let foul_by = (end.what == RallyEndKind::Foul)
+                        .then_some(end.by)
+                        .flatten()
+                        .map(|by| usize::from(by == 1));
+                    (end.sample, end.score, foul_by)
+                }),
+                teams,
+            ),
+            others: breaks.iter().filter(|end| !changes_score(end)).count(),
+            goal_paths,
+            rows,
+        }
+    }
+}
+
+impl ScoreTimeline {
+    pub(super) fn has_goals(&self) -> bool {
+        self.goal_paths.iter().any(|paths| !paths.is_empty())
+    }
+}
+
+const fn end_label(what: RallyEndKind) -> &'static str {
+    match what {
+        RallyEndKind::Goal => "goal",
+        RallyEndKind::Foul => "foul",
+        RallyEndKind::Stuck => "stuck in the middle",
+        RallyEndKind::LeftTable => "left the table",
+        RallyEndKind::Diverged => "simulation diverged",
+        RallyEndKind::GameOver => "end of the game",
+    }
+}

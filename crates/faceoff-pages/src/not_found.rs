@@ -1,0 +1,42 @@
+//! Responses for unknown paths and methods: a page for browsers, problem details for API clients.
+
+use super::frame::PageProblem;
+use axum::{
+    extract::Request,
+    http::{HeaderMap, Method, Uri, header},
+    response::{IntoResponse, Response},
+};
+use faceoff_api::paths::API_BASE;
+use faceoff_service::problem::{Problem, ProblemKind};
+
+/// A page if the client accepts HTML and the path is not below `/api`; else problem details.
+pub fn problem_response(path: &str, headers: &HeaderMap, problem: Problem) -> Response {
+    let wants_page = headers
+        .get(header::ACCEPT)
+        .and_then(|accept| accept.to_str().ok())
+        .is_some_and(|accept| accept.contains("text/html"));
+    if wants_page && !path.starts_with("/api") {
+        PageProblem::from(problem).into_response()
+    } else {
+        problem.into_response()
+    }
+}
+
+pub async fn path_not_found(uri: Uri, headers: HeaderMap) -> Response {
+    let path = uri.path();
+    let detail = format!(
+        "there is nothing at {path}; the API is described at {}/openapi.json, the board is at /",
+        API_BASE
+    );
+    problem_response(path, &headers, Problem::new(ProblemKind::NotFound, detail))
+}
+
+pub async fn method_not_allowed(method: Method, request: Request) -> Response {
+    let path = request.uri().path();
+    let detail = format!("{path} does not take {method}; the header Allow lists what it takes");
+    problem_response(
+        path,
+        request.headers(),
+        Problem::new(ProblemKind::MethodNotAllowed, detail),
+    )
+}

@@ -1,0 +1,107 @@
+//! Decisions about an evaluation day.
+
+use super::preview::{PUBLIC_REASON, DecisionPreview, day_page, sentence};
+use faceoff_api::requests;
+use faceoff_service::{
+    services::{rulings, evaluations},
+    app::AppState,
+    problem::Problem,
+    views::capacity,
+};
+use faceoff_store::Actor;
+use faceoff_types::{StageDay, StageId};
+
+#[derive(Debug, Clone, Copy)]
+pub(in crate::organiser) enum DayDecision {
+    Start(StageId),
+    Missed(StageDay),
+    Void(StageDay),
+}
+
+impl DayDecision {
+    pub(super) fn from_path(kind: &str, subject: &str) -> Option<Self> {
+        Some(match kind {
+            "start-day" => Self::Start(subject.parse().ok()?),
+            "missed-day" => Self::Missed(subject.parse().ok()?),
+            "void-day" => Self::Void(subject.parse().ok()?),
+            _ => return None,
+        })
+    }
+
+    pub(super) async fn preview(self, app: &AppState) -> Result<DecisionPreview, Problem> {
+        match self {
+            Self::Void(day) => {
+                let effects = rulings::preview_void_day(app, day, None).await?;
+                Ok(DecisionPreview {
+                    title: format!("Void the evaluation day {}", day.date),
+                    effects: sentence(&effects),
+                    reason_readers: Some(PUBLIC_REASON),
+                    confirm_name: Some(effects.name),
+                    button: "Void the day",
+                    is_grave: true,
+                    return_path: day_page(day),
+                })
+            }
+            Self::Missed(day) => {
+                let stage = app.store.stage(day.stage).await?;
+                Ok(DecisionPreview {
+                    title: format!("Evaluate the missed day {}", day.date),
+                    effects: format!(
+                        "The active submission of each team is evaluated for {} in the stage {}, on the episodes of that date. \
+                         A day has one cutoff: it cannot be started a second time.",
+                        day.date, stage.name
+                    ),
+                    reason_readers: Some(PUBLIC_REASON),
+                    confirm_name: None,
+                    button: "Start the missed day",
+                    is_grave: false,
+                    return_path: day_page(day),
+                })
+            }
+            Self::Start(id) => {
+                let stage = app.store.stage(id).await?;
+                let load = capacity::build(app, id).await?.days;
+                let next = load.into_iter().rfind(|load| !load.is_under_way);
+                let day = stage.day(app.config.clock.now());
+                Ok(DecisionPreview {
+                    title: format!("Start the evaluation day {}", day.date),
+                    effects: format!(
+                        "The active submission of each team is evaluated for {} in the stage {}. A day has one cutoff: it \
+                         cannot be started a second time, and later uploads are evaluated on the next day. {}",
+                        day.date,
+                        stage.name,
+                        next.map_or_else(String::new, |next| next.summary)
+                    ),
+                    reason_readers: None,
+                    confirm_name: None,
+                    button: "Start the day",
+                    is_grave: false,
+                    return_path: day_page(day),
+                })
+            }
+        }
+    }
+
+    pub(super) async fn carry_out(
+        self,
+        app: &AppState,
+        actor: Actor,
+        request: requests::Decision,
+    ) -> Result<&'static str, Problem> {
+        let reason = request.reason.as_str();
+        match self {
+            Self::Start(id) => {
+                evaluations::start_day(app, actor, Some(id)).await?;
+                Ok("started")
+            }
+            Self::Missed(day) => {
+                evaluations::start_missed_day(app, actor, day, reason).await?;
+                Ok("missed")
+            }
+            Self::Void(day) => {
+                rulings::void_day(app, actor, day, &request).await?;
+                Ok("day-voided")
+            }
+        }
+    }
+}

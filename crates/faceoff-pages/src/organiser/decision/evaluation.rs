@@ -1,0 +1,156 @@
+//! Decisions about an evaluation.
+
+use super::preview::{PUBLIC_REASON, DecisionPreview, day_page, sentence};
+use faceoff_api::{
+    requests::{self, NewExtraEvaluation},
+    views::evaluation::EvaluationView,
+};
+use faceoff_service::{
+    services::{rulings, evaluations},
+    app::AppState,
+    problem::Problem,
+    views::{evaluation, visibility::Visibility},
+};
+use faceoff_store::Actor;
+use faceoff_types::{EvaluationId, StageDay, TeamId};
+
+#[derive(Debug, Clone, Copy)]
+pub(in crate::organiser) enum EvaluationDecision {
+    Void(EvaluationId),
+    Cancel(EvaluationId),
+    Rerun(EvaluationId),
+    Extra(StageDay, TeamId),
+}
+
+const TEAM_REASON: &str = "visible to the team";
+
+async fn evaluation(app: &AppState, id: EvaluationId) -> Result<EvaluationView, Problem> {
+    evaluation::find(app, &Visibility::for_organiser(app).await?, id).await
+}
+
+const fn day_of(view: &EvaluationView) -> StageDay {
+    StageDay {
+        stage: view.stage,
+        date: view.day,
+    }
+}
+
+impl EvaluationDecision {
+    pub(super) fn from_path(kind: &str, subject: &str) -> Option<Self> {
+        Some(match kind {
+            "void" => Self::Void(subject.parse().ok()?),
+            "cancel" => Self::Cancel(subject.parse().ok()?),
+            "rerun" => Self::Rerun(subject.parse().ok()?),
+            "extra-turn" => {
+                let (day, team) = subject.rsplit_once('/')?;
+                Self::Extra(day.parse().ok()?, team.parse().ok()?)
+            }
+            _ => return None,
+        })
+    }
+
+    pub(super) async fn preview(self, app: &AppState) -> Result<DecisionPreview, Problem> {
+        match self {
+            Self::Void(id) => {
+                let view = evaluation(app, id).await?;
+                let effects = rulings::preview_void_evaluation(app, id, None).await?;
+                Ok(DecisionPreview {
+                    title: format!("Void the evaluation of {} by {}", view.day, view.team_name),
+                    effects: sentence(&effects),
+                    reason_readers: Some(PUBLIC_REASON),
+                    confirm_name: Some(effects.name),
+                    button: "Void the evaluation",
+                    is_grave: true,
+                    return_path: day_page(day_of(&view)),
+                })
+            }
+            Self::Cancel(id) => {
+                let view = evaluation(app, id).await?;
+                Ok(DecisionPreview {
+                    title: format!(
+                        "Cancel the evaluation of {} by {}",
+                        view.day, view.team_name
+                    ),
+                    effects: format!(
+                        "The evaluation stops after {} of {} episodes, without a score. It can be repeated. If it is the last \
+                         one of the day, the day is released.",
+                        view.progress.episodes_done, view.progress.episodes_total
+                    ),
+                    reason_readers: Some(TEAM_REASON),
+                    confirm_name: None,
+                    button: "Cancel the evaluation",
+                    is_grave: true,
+                    return_path: day_page(day_of(&view)),
+                })
+            }
+            Self::Rerun(id) => {
+                let view = evaluation(app, id).await?;
+                Ok(DecisionPreview {
+                    title: format!("Repeat {}’s evaluation of {}", view.team_name, view.day),
+                    effects: "The submission that was active at the cutoff is evaluated again on the same episodes. The new \
+                              evaluation replaces this one."
+                        .to_owned(),
+                    reason_readers: None,
+                    confirm_name: None,
+                    button: "Repeat the evaluation",
+                    is_grave: false,
+                    return_path: day_page(day_of(&view)),
+                })
+            }
+            Self::Extra(day, team) => {
+                let effects = evaluations::preview_extra_evaluation(app, day, team, None).await?;
+                let name = app.store.team(team).await?.name;
+                let episodes = "Until the day is released it uses the episodes of the day; after that it uses other \
+                                episodes, and the board says so.";
+                Ok(DecisionPreview {
+                    title: format!("Give {name} an extra evaluation for {}", day.date),
+                    effects: match &effects {
+                        Some(effects) => format!("{} {episodes}", sentence(effects)),
+                        None => format!(
+                            "The active submission of {name} is evaluated once more for {}. {episodes}",
+                            day.date
+                        ),
+                    },
+                    reason_readers: Some(PUBLIC_REASON),
+                    is_grave: effects.is_some(),
+                    confirm_name: effects.map(|effects| effects.name),
+                    button: "Give the extra evaluation",
+                    return_path: day_page(day),
+                })
+            }
+        }
+    }
+
+    pub(super) async fn carry_out(
+        self,
+        app: &AppState,
+        actor: Actor,
+        request: requests::Decision,
+    ) -> Result<&'static str, Problem> {
+        let reason = request.reason.as_str();
+        match self {
+            Self::Void(id) => {
+                rulings::void_evaluation(app, actor, id, &request).await?;
+                Ok("voided")
+            }
+            Self::Cancel(id) => {
+                evaluations::cancel_evaluation(app, actor, id, reason).await?;
+                Ok("cancelled")
+            }
+            Self::Rerun(id) => {
+                evaluations::rerun_evaluation(app, actor, id).await?;
+                Ok("rerun")
+            }
+            Self::Extra(day, team) => {
+                let requests::Decision { reason, confirm } = request;
+                let new = NewExtraEvaluation {
+                    team,
+                    reason,
+                    confirm,
+                };
+                evaluations::grant_extra_evaluation(app, actor, day, &new).await?;
+                Ok("extra-turn")
+            }
+        }
+    }
+}

@@ -1,0 +1,37 @@
+//! The preview of a decision.
+
+use faceoff_service::services::decisions::Preview;
+use faceoff_types::StageDay;
+
+/// Content of the page of a decision.
+pub(in crate::organiser) struct DecisionPreview {
+    pub(in crate::organiser) title: String,
+    pub(in crate::organiser) effects: String,
+    /// Who can read the reason; `None` if the decision needs no reason.
+    pub(in crate::organiser) reason_readers: Option<&'static str>,
+    /// The name that confirms the decision, if a confirmation is needed.
+    pub(in crate::organiser) confirm_name: Option<String>,
+    pub(in crate::organiser) button: &'static str,
+    /// The decision is irreversible or affects a team at once.
+    pub(in crate::organiser) is_grave: bool,
+    /// Path of the page to return to.
+    pub(in crate::organiser) return_path: String,
+}
+
+pub(super) const PUBLIC_REASON: &str = "public";
+
+/// Path of the page of an evaluation day.
+pub(super) fn day_page(day: StageDay) -> String {
+    format!("/organiser/day?stage={}&day={}", day.stage, day.date)
+}
+
+/// The effects as a sentence.
+pub(super) fn sentence(effects: &Preview) -> String {
+    let mut chars = effects.effect.chars();
+    let first: String = chars
+        .next()
+        .into_iter()
+        .flat_map(char::to_uppercase)
+        .collect();
+    format!("{first}{}.", chars.as_str())
+}

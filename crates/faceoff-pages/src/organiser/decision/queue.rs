@@ -1,0 +1,79 @@
+//! Decisions about the queue.
+
+use super::preview::{PUBLIC_REASON, DecisionPreview};
+use crate::figures::utc_minute;
+use faceoff_api::requests;
+use faceoff_service::{services::rulings, app::AppState, problem::Problem, views::ruling};
+use faceoff_store::Actor;
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(in crate::organiser) enum QueueDecision {
+    Pause,
+    Resume,
+}
+
+impl QueueDecision {
+    pub(super) fn from_path(kind: &str, subject: &str) -> Option<Self> {
+        Some(match kind {
+            "pause" if subject.is_empty() => Self::Pause,
+            "resume" if subject.is_empty() => Self::Resume,
+            _ => return None,
+        })
+    }
+
+    pub(super) async fn preview(self, app: &AppState) -> Result<DecisionPreview, Problem> {
+        let paused = app.store.season().await?.paused.map(ruling::view);
+        let return_path = "/organiser/day".to_owned();
+        if self == Self::Pause {
+            return Ok(DecisionPreview {
+                title: "Pause the queue".to_owned(),
+                effects: "No new jobs start; running jobs finish. Evaluation days start on time, but their jobs wait. The \
+                          board shows that the queue is paused, with your reason."
+                    .to_owned(),
+                reason_readers: Some(PUBLIC_REASON),
+                confirm_name: None,
+                button: "Pause",
+                is_grave: false,
+                return_path,
+            });
+        }
+        let since = paused.map_or_else(
+            || "The queue is not paused.".to_owned(),
+            |ruling| {
+                format!(
+                    "The queue is paused since {} ({}).",
+                    utc_minute(ruling.at),
+                    ruling.reason
+                )
+            },
+        );
+        Ok(DecisionPreview {
+            title: "Resume the queue".to_owned(),
+            effects: format!("{since} Queued jobs start at once."),
+            reason_readers: None,
+            confirm_name: None,
+            button: "Resume",
+            is_grave: false,
+            return_path,
+        })
+    }
+
+    pub(super) async fn carry_out(
+        self,
+        app: &AppState,
+        actor: Actor,
+        request: requests::Decision,
+    ) -> Result<&'static str, Problem> {
+        let reason = request.reason.as_str();
+        match self {
+            Self::Pause => {
+                rulings::pause_queue(app, actor, reason).await?;
+                Ok("paused")
+            }
+            Self::Resume => {
+                rulings::resume_queue(app, actor).await?;
+                Ok("resumed")
+            }
+        }
+    }
+}

@@ -1,0 +1,104 @@
+//! Decisions about a stage and its result.
+
+use super::preview::{PUBLIC_REASON, DecisionPreview, sentence};
+use faceoff_api::requests;
+use faceoff_service::{services::stage_results, app::AppState, problem::Problem};
+use faceoff_store::Actor;
+use faceoff_types::StageId;
+
+#[derive(Debug, Clone, Copy)]
+pub(in crate::organiser) enum StageDecision {
+    Freeze(StageId),
+    Unfreeze(StageId),
+    FinalDay(StageId),
+    SignOff(StageId),
+}
+
+impl StageDecision {
+    pub(super) fn from_path(kind: &str, subject: &str) -> Option<Self> {
+        Some(match kind {
+            "freeze" => Self::Freeze(subject.parse().ok()?),
+            "unfreeze" => Self::Unfreeze(subject.parse().ok()?),
+            "final-day" => Self::FinalDay(subject.parse().ok()?),
+            "sign-off" => Self::SignOff(subject.parse().ok()?),
+            _ => return None,
+        })
+    }
+
+    pub(super) async fn preview(self, app: &AppState) -> Result<DecisionPreview, Problem> {
+        let (Self::Freeze(id) | Self::Unfreeze(id) | Self::FinalDay(id) | Self::SignOff(id)) = self;
+        let name = app.store.stage(id).await?.name;
+        let preview = DecisionPreview {
+            title: String::new(),
+            effects: String::new(),
+            reason_readers: None,
+            confirm_name: None,
+            button: "",
+            is_grave: false,
+            return_path: format!("/organiser/stages/{id}"),
+        };
+        Ok(match self {
+            Self::Freeze(_) => DecisionPreview {
+                title: format!("Freeze the boards of {name}"),
+                effects: "The boards keep their current results, with a notice, until you unfreeze them. Evaluations go on; \
+                          later results are visible to organisers only."
+                    .to_owned(),
+                reason_readers: Some(PUBLIC_REASON),
+                button: "Freeze the boards",
+                ..preview
+            },
+            Self::Unfreeze(_) => DecisionPreview {
+                title: format!("Unfreeze the boards of {name}"),
+                effects: "The boards show all results to everyone again, at once.".to_owned(),
+                button: "Unfreeze the boards",
+                ..preview
+            },
+            Self::FinalDay(_) => DecisionPreview {
+                title: format!("Start the final day of {name}"),
+                effects: "The active submission of each team is evaluated once more, on new episodes. Only this day counts for the board."
+                    .to_owned(),
+                button: "Start the final day",
+                ..preview
+            },
+            Self::SignOff(_) => {
+                let effects = stage_results::preview_sign_off(app, id).await?;
+                DecisionPreview {
+                    title: format!("Sign off {name}"),
+                    effects: sentence(&effects),
+                    confirm_name: Some(effects.name),
+                    button: "Sign off the stage",
+                    is_grave: true,
+                    ..preview
+                }
+            }
+        })
+    }
+
+    pub(super) async fn carry_out(
+        self,
+        app: &AppState,
+        actor: Actor,
+        request: requests::Decision,
+    ) -> Result<&'static str, Problem> {
+        let reason = request.reason.as_str();
+        match self {
+            Self::Freeze(id) => {
+                stage_results::freeze_boards(app, actor, id, reason).await?;
+                Ok("frozen")
+            }
+            Self::Unfreeze(id) => {
+                stage_results::unfreeze_boards(app, actor, id).await?;
+                Ok("unfrozen")
+            }
+            Self::FinalDay(id) => {
+                stage_results::start_final_day(app, actor, id).await?;
+                Ok("final-day")
+            }
+            Self::SignOff(id) => {
+                let confirm = request.confirm.as_deref();
+                stage_results::finalise_stage(app, actor, id, confirm).await?;
+                Ok("signed-off")
+            }
+        }
+    }
+}

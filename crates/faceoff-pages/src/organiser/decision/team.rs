@@ -1,0 +1,111 @@
+//! Decisions about teams and registrations.
+
+use super::preview::{PUBLIC_REASON, DecisionPreview, sentence};
+use faceoff_api::requests;
+use faceoff_service::{
+    services::{registrations, rulings},
+    app::AppState,
+    problem::Problem,
+};
+use faceoff_store::Actor;
+use faceoff_types::{RegistrationId, TeamId};
+
+#[derive(Debug, Clone, Copy)]
+pub(in crate::organiser) enum TeamDecision {
+    Disqualify(TeamId),
+    Reinstate(TeamId),
+    Approve(RegistrationId),
+    Refuse(RegistrationId),
+}
+
+const TEAMS: &str = "/organiser/teams";
+
+impl TeamDecision {
+    pub(super) fn from_path(kind: &str, subject: &str) -> Option<Self> {
+        Some(match kind {
+            "disqualify" => Self::Disqualify(subject.parse().ok()?),
+            "reinstate" => Self::Reinstate(subject.parse().ok()?),
+            "approve" => Self::Approve(subject.parse().ok()?),
+            "refuse" => Self::Refuse(subject.parse().ok()?),
+            _ => return None,
+        })
+    }
+
+    pub(super) async fn preview(self, app: &AppState) -> Result<DecisionPreview, Problem> {
+        match self {
+            Self::Disqualify(id) => {
+                let effects = rulings::preview_disqualification(app, id, None).await?;
+                Ok(DecisionPreview {
+                    title: format!("Disqualify {}", effects.name),
+                    effects: sentence(&effects),
+                    reason_readers: Some(PUBLIC_REASON),
+                    confirm_name: Some(effects.name),
+                    button: "Disqualify the team",
+                    is_grave: true,
+                    return_path: TEAMS.to_owned(),
+                })
+            }
+            Self::Reinstate(id) => {
+                let team = app.store.team(id).await?;
+                Ok(DecisionPreview {
+                    title: format!("Reinstate {}", team.name),
+                    effects: "The team can upload again and is evaluated and ranked. Cancelled evaluations can be repeated.".to_owned(),
+                    reason_readers: Some(PUBLIC_REASON),
+                    confirm_name: None,
+                    button: "Reinstate the team",
+                    is_grave: false,
+                    return_path: TEAMS.to_owned(),
+                })
+            }
+            Self::Approve(id) | Self::Refuse(id) => {
+                let mut all = app.store.registrations().await?.into_iter();
+                let found = all.find(|registration| registration.id == id);
+                let name = found
+                    .ok_or_else(|| Problem::not_found("registration"))?
+                    .team_name;
+                let approves = matches!(self, Self::Approve(_));
+                Ok(DecisionPreview {
+                    title: format!("{} {name}", if approves { "Approve" } else { "Refuse" }),
+                    effects: if approves {
+                        "The team is created. Its first member joins with the link of the registration within seven days."
+                            .to_owned()
+                    } else {
+                        "The team is not created. The link of the registration shows your reason.".to_owned()
+                    },
+                    reason_readers: (!approves).then_some("visible to the registered contact"),
+                    confirm_name: None,
+                    button: if approves { "Approve" } else { "Refuse" },
+                    is_grave: !approves,
+                    return_path: TEAMS.to_owned(),
+                })
+            }
+        }
+    }
+
+    pub(super) async fn carry_out(
+        self,
+        app: &AppState,
+        actor: Actor,
+        request: requests::Decision,
+    ) -> Result<&'static str, Problem> {
+        let reason = request.reason.as_str();
+        match self {
+            Self::Disqualify(id) => {
+                rulings::disqualify_team(app, actor, id, &request).await?;
+                Ok("disqualified")
+            }
+            Self::Reinstate(id) => {
+                rulings::reinstate_team(app, actor, id, reason).await?;
+                Ok("reinstated")
+            }
+            Self::Approve(id) => {
+                registrations::approve_registration(app, actor, id).await?;
+                Ok("approved")
+            }
+            Self::Refuse(id) => {
+                registrations::refuse_registration(app, actor, id, reason).await?;
+                Ok("refused")
+            }
+        }
+    }
+}

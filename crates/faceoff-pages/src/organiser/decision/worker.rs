@@ -1,0 +1,67 @@
+//! Decisions about remote workers.
+
+use super::preview::DecisionPreview;
+use faceoff_api::requests;
+use faceoff_service::{services::workers, app::AppState, problem::Problem};
+use faceoff_store::{Actor, WorkerName};
+
+#[derive(Debug, Clone)]
+pub(in crate::organiser) enum WorkerDecision {
+    Ban(WorkerName),
+    Readmit(WorkerName),
+}
+
+impl WorkerDecision {
+    pub(super) fn from_path(kind: &str, subject: &str) -> Option<Self> {
+        Some(match kind {
+            "ban" => Self::Ban(subject.parse().ok()?),
+            "readmit" => Self::Readmit(subject.parse().ok()?),
+            _ => return None,
+        })
+    }
+
+    pub(super) fn preview(&self) -> DecisionPreview {
+        let return_path = "/organiser/workers".to_owned();
+        match self {
+            Self::Ban(worker) => DecisionPreview {
+                title: format!("Ban the worker {worker}"),
+                effects: "The worker gets no jobs and its results are rejected. Its running jobs, and its part of open evaluations, are \
+                          repeated on other workers. Finished results stay; the page of workers lists them, so that you can void them."
+                    .to_owned(),
+                reason_readers: Some("visible to organisers and the operator of the worker"),
+                confirm_name: None,
+                button: "Ban the worker",
+                is_grave: true,
+                return_path,
+            },
+            Self::Readmit(worker) => DecisionPreview {
+                title: format!("Readmit the worker {worker}"),
+                effects: "The worker gets jobs again. Check its machine first: a faulty machine fails again."
+                    .to_owned(),
+                reason_readers: None,
+                confirm_name: None,
+                button: "Readmit the worker",
+                is_grave: false,
+                return_path,
+            },
+        }
+    }
+
+    pub(super) async fn carry_out(
+        &self,
+        app: &AppState,
+        actor: Actor,
+        request: requests::Decision,
+    ) -> Result<&'static str, Problem> {
+        match self {
+            Self::Ban(worker) => {
+                workers::ban_worker(app, actor, worker, &request.reason).await?;
+                Ok("worker-banned")
+            }
+            Self::Readmit(worker) => {
+                workers::readmit_worker(app, actor, worker).await?;
+                Ok("worker-readmitted")
+            }
+        }
+    }
+}

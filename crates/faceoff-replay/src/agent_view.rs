@@ -1,0 +1,142 @@
+//! The columns of a side's observations, commands and times.
+
+use crate::{column::Column, header::TrackingGap, motion::joints};
+use faceoff_episode::AnswerTiming;
+use faceoff_sim::{JOINTS, model::CONTROL_STEP_S, table::geometry::TABLE};
+use faceoff_types::Interpolation;
+use std::f64::consts::PI;
+
+const POSITION: f64 = 1e-4;
+/// rad.
+const ANGLE: f64 = 1e-3;
+const COMMAND: f64 = 1e-4;
+const TIME: f64 = 1e-5;
+
+// Indices of the columns.
+const OBSERVED_PUCK: usize = 0;
+const COMMANDED: usize = 3;
+const COMPUTATION_TIME: usize = COMMANDED + JOINTS;
+const HOST_TIME: usize = COMPUTATION_TIME + 1;
+
+/// The samples of one side.
+#[derive(Debug)]
+pub(crate) struct AgentView {
+    side: u32,
+    columns: Vec<Column>,
+    late: Vec<u32>,
+    gaps: Vec<TrackingGap>,
+}
+
+impl AgentView {
+    /// The columns of a side, 0 or 1.
+    pub fn new(side: u32) -> Self {
+        let mut columns = vec![
+            Column::new("seen_x", "m", POSITION, 1),
+            Column::new("seen_y", "m", POSITION, 1),
+            Column::new("seen_yaw", "rad", ANGLE, 1),
+        ];
+        columns.extend(joints("command", "rad", COMMAND, 2).map(|column| column.beginning_at(1)));
+        columns.extend(
+            ["computation_time", "host_time"]
+                .map(|name| Column::new(name, "s", TIME, 0).beginning_at(1)),
+        );
+        Self {
+            side,
+            columns,
+            late: Vec::new(),
+            gaps: Vec::new(),
+        }
+    }
+
+    /// Adds an observation, as sent to the agent.
+    pub fn observe(&mut self, observation: &[f64]) {
+        let [x, y, yaw, ..] = *observation else {
+            return;
+        };
+        // Converts from the robot's base frame to the table frame; the second robot's base is rotated by half a turn.
+        let position = match self.side {
+            0 => [x - TABLE.base_x_m, y, yaw],
+            _ => [
+                TABLE.base_x_m - x,
+                -y,
+                if yaw > 0.0 { yaw - PI } else { yaw + PI },
+            ],
+        };
+        for (column, value) in self.columns[OBSERVED_PUCK..].iter_mut().zip(position) {
+            column.push(value);
+        }
+    }
+
+    /// Number of observations so far.
+    pub fn observations(&self) -> usize {
+        self.columns[OBSERVED_PUCK].counts.len()
+    }
+
+    /// Adds the answer that led to a sample.
+    pub fn answer(&mut self, sample: u32, action: &[f64], timing: &AnswerTiming, puck_lost: bool) {
+        for (column, value) in self.columns[COMMANDED..].iter_mut().zip(commanded(action)) {
+            column.push(*value);
+        }
+        self.columns[COMPUTATION_TIME].push(timing.computation_time_s);
+        self.columns[HOST_TIME].push(timing.host_time_s);
+        if timing.computation_time_s > CONTROL_STEP_S {
+            self.late.push(sample);
+        }
+        if puck_lost {
+            match self.gaps.last_mut() {
+                Some(gap) if gap.to + 1 == sample => gap.to = sample,
+                _ => self.gaps.push(TrackingGap {
+                    from: sample,
+                    to: sample,
+                }),
+            }
+        }
+    }
+
+    /// The columns, the late samples, and the tracking gaps.
+    pub fn take(mut self) -> (Vec<Column>, Vec<u32>, Vec<TrackingGap>) {
+        if self.columns[HOST_TIME].counts.iter().all(|time| *time == 0) {
+            self.columns.truncate(HOST_TIME);
+        }
+        (self.columns, self.late, self.gaps)
+    }
+}
+
+/// The commanded joint positions at the end of the control step, rad.
+fn commanded(action: &[f64]) -> &[f64] {
+    let whole = Interpolation::Trajectory.len();
+    // In a trajectory, those of the last substep; otherwise positions come first (PROTOCOL).
+    let from = if action.len() == whole {
+        whole - 3 * JOINTS
+    } else {
+        0
+    };
+    action.get(from..from + JOINTS).unwrap_or_default()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn commanded_positions_are_those_at_the_end() {
+        let numbers = |n: u32| (0..n).map(f64::from).collect::<Vec<_>>();
+        assert_eq!(commanded(&numbers(7))[6], 6.0);
+        assert_eq!(commanded(&numbers(21))[0], 0.0, "positions come first");
+        assert_eq!(commanded(&numbers(420))[0], 399.0, "of the last substep");
+    }
+
+    #[test]
+    fn observed_puck_is_in_the_table_frame() {
+        let mut sides = [AgentView::new(0), AgentView::new(1)];
+        sides[0].observe(&[1.51 + 0.3, 0.2, 1.0, 0.0]);
+        sides[1].observe(&[1.51 - 0.3, -0.2, 1.0 - PI, 0.0]);
+        let positions = sides.map(|side| {
+            let position: Vec<f64> = side.columns[..3].iter().flat_map(Column::values).collect();
+            position
+        });
+        for (one, other) in positions[0].iter().zip(&positions[1]) {
+            assert!((one - other).abs() < 1e-3, "{positions:?}");
+        }
+    }
+}

@@ -1,0 +1,219 @@
+//! The index of the episodes in a pack of clips.
+
+use crate::{error::ReplayError, group::Group};
+use faceoff_episode::describe_end;
+use faceoff_types::{EpisodeEnd, Task};
+use flate2::{Compression, read::GzDecoder, write::GzEncoder};
+use serde::{Deserialize, Serialize};
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    io::{self, Read},
+};
+
+const INDEX_FORMAT: &str = "faceoff-sheet/1";
+const MAX_BYTES: u64 = 256 << 20;
+
+/// A summary line for each episode, in the order of tasks and episodes, and histograms of computation times.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ClipIndex {
+    format: String,
+    pub episodes: Vec<EpisodeLine>,
+    /// Histogram of computation times of all answered steps, by task.
+    pub times: BTreeMap<Task, TimeBins>,
+}
+
+impl Default for ClipIndex {
+    fn default() -> Self {
+        Self {
+            format: INDEX_FORMAT.to_owned(),
+            episodes: Vec::new(),
+            times: BTreeMap::new(),
+        }
+    }
+}
+
+/// The summary of an episode.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
+pub struct EpisodeLine {
+    /// The task.
+    pub task: Task,
+    /// Index of the episode within the evaluation.
+    pub episode: u32,
+    /// Control steps played.
+    pub steps: u32,
+    /// Was it a success?
+    pub success: bool,
+    /// How it ended.
+    pub end: EpisodeEnd,
+    /// Description of the end.
+    pub why: String,
+    /// True position and velocity of the puck at the start: x, y (m), vx, vy (m/s), table frame.
+    pub start: [f64; 4],
+    /// True position and velocity of the puck at the end, as in `start`.
+    pub last: [f64; 4],
+    /// Violations, one entry per group of constraints.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub broken: Vec<ViolationSummary>,
+    /// Longest computation time, s; only visible to those with access to the dataset.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub longest_s: Option<f64>,
+    /// Number of answers that took longer than a control step; only visible to those with access to the dataset.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub late: u32,
+}
+
+impl EpisodeLine {
+    /// Removes what only those with access to the dataset may see: details of faults, and computation times.
+    pub fn make_public(&mut self) {
+        if self.end == EpisodeEnd::AgentFault {
+            self.why = describe_end(self.task, self.end, &[0.0; 6], self.steps, None);
+        }
+        self.longest_s = None;
+        self.late = 0;
+    }
+}
+
+#[expect(
+    clippy::trivially_copy_pass_by_ref,
+    reason = "serde asks for a reference"
+)]
+const fn is_zero(count: &u32) -> bool {
+    *count == 0
+}
+
+/// The violations of a group of constraints in an episode.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
+pub struct ViolationSummary {
+    /// The group of constraints.
+    pub group: Group,
+    /// The first sample with a violation: the number of control steps before it.
+    pub from: u32,
+    /// Number of samples with a violation.
+    pub samples: u32,
+    /// Largest excess over the limit: rad, rad/s or m.
+    pub worst: f64,
+    /// Position of the end effector at the first sample: x, y (m), table frame.
+    pub at: [f64; 2],
+    /// For joint positions and velocities: the joint that exceeded its limit most at the first sample, from 1.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub joint: Option<u32>,
+}
+
+/// A histogram of computation times, with ten bins per power of ten.
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(transparent)]
+pub struct TimeBins(Vec<u64>);
+
+/// Lower edge of the first bin, s; shorter times are also in it.
+const FIRST_BIN_S: f64 = 1e-5;
+
+impl TimeBins {
+    pub fn add(&mut self, time_s: f64) {
+        let tenths = 10.0 * (time_s / FIRST_BIN_S).log10();
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "clamped to 0 … 99 before"
+        )]
+        let bin = tenths.floor().clamp(0.0, 99.0) as usize;
+        if self.0.len() <= bin {
+            self.0.resize(bin + 1, 0);
+        }
+        self.0[bin] += 1;
+    }
+
+    /// The bins from the shortest time on: lower and upper edge (s), and the number of steps.
+    pub fn bins(&self) -> impl Iterator<Item = (f64, f64, u64)> + '_ {
+        let edge = |bin: usize| {
+            let tenths = u32::try_from(bin).map_or(0.0, f64::from);
+            FIRST_BIN_S * 10_f64.powf(tenths / 10.0)
+        };
+        let counted = self.0.iter().enumerate();
+        counted.map(move |(bin, count)| (edge(bin), edge(bin + 1), *count))
+    }
+
+    fn merge(&mut self, other: &Self) {
+        if self.0.len() < other.0.len() {
+            self.0.resize(other.0.len(), 0);
+        }
+        for (own, others) in self.0.iter_mut().zip(&other.0) {
+            *own += others;
+        }
+    }
+}
+
+impl ClipIndex {
+    #[must_use]
+    pub fn line(&self, task: Task, episode: u32) -> Option<&EpisodeLine> {
+        let found = self
+            .episodes
+            .binary_search_by_key(&(task, episode), |line| (line.task, line.episode));
+        found.ok().map(|index| &self.episodes[index])
+    }
+
+    /// The episodes in both indices that ended differently.
+    #[must_use]
+    pub fn differing_ends(&self, other: &Self) -> BTreeSet<(Task, u32)> {
+        let differing = self.episodes.iter().filter_map(|line| {
+            let others = other.line(line.task, line.episode)?;
+            let is_same = (line.success, line.end) == (others.success, others.end);
+            (!is_same).then_some((line.task, line.episode))
+        });
+        differing.collect()
+    }
+
+    /// Adds the lines of another shard.
+    pub(crate) fn merge(&mut self, other: Self) {
+        self.episodes.extend(other.episodes);
+        self.episodes.sort_by_key(|line| (line.task, line.episode));
+        for (task, times) in &other.times {
+            self.times.entry(*task).or_default().merge(times);
+        }
+    }
+
+    pub(crate) fn compressed(&self) -> Result<Vec<u8>, ReplayError> {
+        let mut gzip = GzEncoder::new(Vec::new(), Compression::new(6));
+        serde_json::to_writer(&mut gzip, self).map_err(io::Error::other)?;
+        Ok(gzip.finish()?)
+    }
+
+    pub(crate) fn read(compressed: &[u8]) -> Result<Self, ReplayError> {
+        let mut bytes = Vec::new();
+        GzDecoder::new(compressed)
+            .take(MAX_BYTES)
+            .read_to_end(&mut bytes)
+            .map_err(|error| ReplayError::unreadable("the index of episodes", error))?;
+        let index: Self = serde_json::from_slice(&bytes)
+            .map_err(|error| ReplayError::unreadable("the index of episodes", error))?;
+        if index.format == INDEX_FORMAT {
+            Ok(index)
+        } else {
+            Err(ReplayError::unreadable(
+                "the index of episodes",
+                format!("its format is {:?}", index.format),
+            ))
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn times_are_counted_in_their_bins() {
+        let mut times = TimeBins::default();
+        for time_s in [0.0, 1e-6, 0.0009, 0.021, 1e9] {
+            times.add(time_s);
+        }
+        let filled: Vec<(f64, f64, u64)> =
+            times.bins().filter(|(_, _, count)| *count > 0).collect();
+        assert_eq!(filled[0].2, 2, "shorter times are in the first bin");
+        for ((from, to, _), time_s) in filled[1..3].iter().zip([0.0009, 0.021]) {
+            assert!(*from <= time_s && time_s < *to, "{from} … {to}");
+        }
+        assert_eq!(times.bins().map(|(_, _, count)| count).sum::<u64>(), 5);
+    }
+}

@@ -1,0 +1,77 @@
+//! Evaluations outside the schedule: missed days, and extra evaluations of one team.
+
+use axum::{
+    Json,
+    extract::State,
+    http::{StatusCode, header},
+    response::{AppendHeaders, IntoResponse},
+};
+use faceoff_api::{
+    paths,
+    requests::{NewExtraEvaluation, MissedDay},
+    views::{day::DayView, evaluation::EvaluationView},
+};
+use faceoff_service::{
+    services::evaluations,
+    app::App,
+    auth::Organiser,
+    extract::{Json as Body, PathParam, PathParams},
+    problem::Problem,
+};
+use faceoff_types::{StageDay, StageId};
+
+/// Starts a missed day: a past date of the stage without a cutoff. Each team's active submission is evaluated on the
+/// episodes of that date.
+#[utoipa::path(
+    post, path = "/stages/{id}/days", tag = "organiser", security(("organiser" = [])),
+    params(("id" = StageId, Path)), request_body = MissedDay,
+    responses(
+        (status = 200, body = DayView),
+        (status = 404, description = "no such stage"),
+        (status = 409, description = "the day has had its cutoff, the date is not in the past or not within the stage, the stage is not open, no team has a valid submission, or the season is closed"),
+        (status = 422),
+    )
+)]
+pub(crate) async fn start_missed_day(
+    organiser: Organiser,
+    State(app): State<App>,
+    PathParam(id): PathParam<StageId>,
+    Body(MissedDay { day, reason }): Body<MissedDay>,
+) -> Result<Json<DayView>, Problem> {
+    let stage_day = StageDay {
+        stage: id,
+        date: day,
+    };
+    let started = evaluations::start_missed_day(&app, organiser.actor(), stage_day, &reason);
+    started.await.map(Json)
+}
+
+/// Grants a team one more evaluation for a day whose cutoff has passed, with its currently active submission.
+///
+/// Before the day's release it runs on the day's episodes. After the release, when these are public, it runs on
+/// episodes of its own; its board row says so, and it cannot be compared episode by episode.
+#[utoipa::path(
+    post, path = "/stages/{id}/days/{day}/extra-turn", tag = "organiser", security(("organiser" = [])),
+    params(("id" = StageId, Path), ("day" = Date, Path, example = "2026-03-01")), request_body = NewExtraEvaluation,
+    responses(
+        (status = 201, body = EvaluationView, headers(("Location" = String, description = "path of the new evaluation"))),
+        (status = 403, description = "the team is disqualified"),
+        (status = 404),
+        (status = 409, description = "a result that counts would be replaced, and this is not confirmed with the team's name (nothing is done); an evaluation is running; the team has no active submission; the stage is not open; or the season is closed"),
+        (status = 422),
+    )
+)]
+pub(crate) async fn extra_turn(
+    organiser: Organiser,
+    State(app): State<App>,
+    day: PathParams<String, 2>,
+    Body(wanted): Body<NewExtraEvaluation>,
+) -> Result<impl IntoResponse, Problem> {
+    let PathParams([stage, day]) = day;
+    let stage_day: StageDay = format!("{stage}/{day}")
+        .parse()
+        .map_err(|_| Problem::not_found("day"))?;
+    let view = evaluations::grant_extra_evaluation(&app, organiser.actor(), stage_day, &wanted).await?;
+    let location = [(header::LOCATION, paths::evaluation(view.id))];
+    Ok((StatusCode::CREATED, AppendHeaders(location), Json(view)))
+}

@@ -1,0 +1,101 @@
+//! Users: listing them, setting passwords, and closing accounts.
+
+use crate::paging::{Page, PageQuery, Paged};
+use axum::{Json, extract::State};
+use faceoff_api::{
+    requests::{Confirmation, NewPassword},
+    views::user::UserView,
+};
+use faceoff_service::{
+    services::users,
+    app::App,
+    auth::Caller,
+    extract::{Json as Body, PathParam},
+    problem::{Problem, ProblemKind},
+    views::user,
+};
+use faceoff_types::UserId;
+
+/// Lists the users whom the caller may see: organisers all, a team its members.
+#[utoipa::path(
+    get, path = "/people", tag = "people", security(("team" = []), ("organiser" = [])),
+    params(PageQuery),
+    responses((status = 200, body = Vec<UserView>))
+)]
+pub(crate) async fn list_people(
+    caller: Caller,
+    page: Page<UserId>,
+    State(app): State<App>,
+) -> Result<Paged<UserView>, Problem> {
+    let users = users::list_users(&app, &caller).await?;
+    let page = page.select(users, |user| user.id)?;
+    Ok(page.map(user::view))
+}
+
+/// Closes a user's account at once: all tokens and sessions are revoked. For organisers and the user.
+#[utoipa::path(
+    post, path = "/people/{id}/remove", tag = "people", security(("team" = []), ("organiser" = [])),
+    params(("id" = UserId, Path)), request_body = Confirmation,
+    responses(
+        (status = 200, body = UserView),
+        (status = 403), (status = 404),
+        (status = 409, description = "not confirmed with the user's name (nothing is done), the account is closed, or it is the last organiser's"),
+    )
+)]
+pub(crate) async fn remove_person(
+    caller: Caller,
+    State(app): State<App>,
+    PathParam(id): PathParam<UserId>,
+    Body(Confirmation { confirm }): Body<Confirmation>,
+) -> Result<Json<UserView>, Problem> {
+    let removed = users::remove_user(&app, &caller, id, confirm.as_deref()).await?;
+    Ok(Json(user::view(removed)))
+}
+
+/// Sets the caller's password. All other tokens and sessions of the user are revoked.
+#[utoipa::path(
+    put, path = "/people/{id}/password", tag = "people", security(("team" = []), ("organiser" = [])),
+    params(("id" = UserId, Path)), request_body = NewPassword,
+    responses(
+        (status = 200, body = UserView),
+        (status = 403, description = "another user's password, or the old password is wrong"),
+        (status = 404), (status = 422), (status = 429, description = "too many wrong passwords"),
+    )
+)]
+pub(crate) async fn set_password(
+    caller: Caller,
+    State(app): State<App>,
+    PathParam(id): PathParam<UserId>,
+    Body(new): Body<NewPassword>,
+) -> Result<Json<UserView>, Problem> {
+    let user = users::find(&app, &caller, id).await?;
+    if caller.user().is_none_or(|own| own.id != id) {
+        return Err(Problem::new(
+            ProblemKind::Forbidden,
+            format!(
+                "only the user can set their password; create a link for “{}” instead (POST /api/v1/invitations with the \
+                 role “return”)",
+                user.name
+            ),
+        ));
+    }
+    let now = app.config.clock.now();
+    let known = app.store.password_hash_of(user.name.as_str()).await?;
+    if known.is_some() {
+        let old = new.old.unwrap_or_default();
+        let matches = app.passwords.verify(known, old, now).await?;
+        if matches != Some(id) {
+            return Err(Problem::new(
+                ProblemKind::Forbidden,
+                "old: expected the current password, got another one; nothing was changed",
+            ));
+        }
+    }
+    let hash = app.passwords.hash(new.password).await?;
+    let user = app
+        .store
+        .set_password(caller.actor(), id, &hash, caller.token.id, now)
+        .await?;
+    tracing::info!(user = %id, "password set");
+    Ok(Json(user::view(user)))
+}

@@ -1,0 +1,167 @@
+//! Live feed of a game for viewers: all events, and positions at intervals.
+
+use super::report::{GameObserver, GameReport};
+use faceoff_episode::{RallyEntry, GameStepRow, RallyEnding, RallyRow, RallyStart};
+use faceoff_sim::{GameState, RallyEnd, table::frames::table_from_robot};
+use faceoff_types::{GameEvent, LiveEvent, LivePosition, Side};
+use std::time::{Duration, Instant};
+
+/// Interval of positions: short enough to look like motion, long enough to cost little time.
+pub const POSITION_INTERVAL: Duration = Duration::from_millis(100);
+
+/// Receives the live feed of a running game, and can stop the game.
+pub trait LiveFeedSink {
+    /// Receives the events since the last call, immediately, and the current positions. Without events it is called
+    /// at the interval [`POSITION_INTERVAL`]. The game waits for the call.
+    fn receive(&mut self, events: Vec<LiveEvent>, position: LivePosition);
+    /// As [`GameObserver::cancelled`].
+    fn cancelled(&self) -> bool;
+}
+
+/// Sends the events of a game to a sink.
+pub struct LiveFeed<'a> {
+    sink: &'a mut dyn LiveFeedSink,
+    position_interval: Duration,
+    sent_at: Option<Instant>,
+    /// Control step of the game at which the rally began.
+    rally_begun_at: u32,
+    faults: [u32; 2],
+    last: LivePosition,
+}
+
+impl<'a> LiveFeed<'a> {
+    /// Starts before the game; `position_interval` is [`POSITION_INTERVAL`] except in tests.
+    pub fn new(sink: &'a mut dyn LiveFeedSink, position_interval: Duration) -> Self {
+        Self {
+            sink,
+            position_interval,
+            sent_at: None,
+            rally_begun_at: 0,
+            faults: [0; 2],
+            last: LivePosition {
+                step: 0,
+                puck: [0.0; 3],
+                mallets: [[0.0; 2]; 2],
+            },
+        }
+    }
+
+    /// Sends the result of the game.
+    pub fn end(mut self, report: &GameReport) {
+        let score = &report.archives.score;
+        let [first, second] = &score.sides;
+        let ended = GameEvent::Ended {
+            score: [first.score, second.score],
+            winner: score.winner.map(|side| Side::BOTH[side as usize]),
+            forfeits: [first.forfeit, second.forfeit],
+        };
+        self.send(vec![LiveEvent {
+            step: score.steps,
+            event: ended,
+        }]);
+    }
+
+    fn send(&mut self, events: Vec<LiveEvent>) {
+        self.sink.receive(events, self.last);
+        self.sent_at = Some(Instant::now());
+    }
+}
+
+impl GameObserver for LiveFeed<'_> {
+    fn on_rally_start(&mut self, start: &RallyStart<'_>) {
+        self.rally_begun_at = start.game_step;
+        self.last = position(start.game_step, start.state);
+        let restarted = Side::BOTH
+            .into_iter()
+            .zip(start.entries)
+            .filter(|(_, entry)| start.rally > 0 && has_started(entry))
+            .map(|(side, _)| GameEvent::Restarted { side });
+        let begun = GameEvent::RallyBegun {
+            rally: start.rally,
+            serves: start.serves,
+        };
+        let step = start.game_step;
+        let all = restarted.chain([begun]);
+        self.send(all.map(|event| LiveEvent { step, event }).collect());
+    }
+
+    fn on_step(&mut self, row: &GameStepRow<'_>) {
+        self.last = position(row.game_step + 1, row.state);
+        let is_due = self
+            .sent_at
+            .is_none_or(|sent_at| sent_at.elapsed() >= self.position_interval);
+        if is_due {
+            self.send(Vec::new());
+        }
+    }
+
+    fn on_rally_end(&mut self, row: &RallyRow<'_>) {
+        let step = self.rally_begun_at + row.steps;
+        let mut all = Vec::new();
+        for (side, fault) in Side::BOTH.into_iter().zip(row.faults) {
+            if let Some(fault) = fault {
+                let count = &mut self.faults[side.index()];
+                *count += 1;
+                all.push(LiveEvent {
+                    step: self.rally_begun_at + fault.step.unwrap_or(0),
+                    event: GameEvent::Fault {
+                        side,
+                        count: *count,
+                    },
+                });
+            }
+        }
+        let event = ending_event(row);
+        all.extend(event.map(|event| LiveEvent { step, event }));
+        self.send(all);
+    }
+
+    fn cancelled(&self) -> bool {
+        self.sink.cancelled()
+    }
+}
+
+/// Was the agent's process started for this rally?
+const fn has_started(entry: &RallyEntry) -> bool {
+    matches!(
+        entry,
+        RallyEntry::Ready {
+            startup_s: Some(_),
+            ..
+        } | RallyEntry::ResetFailed {
+            startup_s: Some(_),
+            ..
+        }
+    )
+}
+
+/// The event of a rally's end; `None` if the end of the game ended it, which has its own event.
+fn ending_event(row: &RallyRow<'_>) -> Option<GameEvent> {
+    let score = row.score;
+    Some(match row.ending {
+        RallyEnding::Table(RallyEnd::Goal { by }) => GameEvent::Goal {
+            by: Side::BOTH[by],
+            score,
+        },
+        RallyEnding::Table(RallyEnd::Foul { by }) => GameEvent::Foul {
+            by: Side::BOTH[by],
+            score,
+        },
+        RallyEnding::Table(RallyEnd::Stuck) => GameEvent::Stuck,
+        RallyEnding::Table(RallyEnd::LeftTable) => GameEvent::LeftTable,
+        RallyEnding::Table(RallyEnd::Diverged { .. }) => GameEvent::Diverged,
+        RallyEnding::GameOver => return None,
+    })
+}
+
+fn position(step: u32, state: &GameState) -> LivePosition {
+    let [x, y, yaw, ..] = state.puck;
+    LivePosition {
+        step,
+        puck: [x, y, yaw],
+        mallets: [0, 1].map(|robot| {
+            let [x, y, _] = table_from_robot(robot, state.ee[robot]);
+            [x, y]
+        }),
+    }
+}

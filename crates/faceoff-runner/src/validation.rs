@@ -1,0 +1,259 @@
+use crate::{
+    bundle::Bundle,
+    config::AgentEnvironment,
+    fault::PlatformFault,
+    host_interference::{KernelCounters, InterferenceMonitor},
+    log::Log,
+    player::{OnHostInterference, Player},
+    wait_breakdown::WaitBreakdown,
+};
+use faceoff_episode::{AnswerTiming, Arena, EpisodeStart, RecordError, StepRow, StepSink};
+use faceoff_sandbox::affinity::AffinityGuard;
+use faceoff_scoring::computation_time_penalty;
+use faceoff_sim::EPISODE_STEPS;
+use faceoff_types::{AgentFault, EpisodeOutcome, Profile, ValidationTiming, Task};
+use faceoff_wire::job::ValidationSpec;
+use std::fmt;
+
+/// Minimum number of control steps per task in a validation run (RULES).
+pub const VALIDATION_STEPS: u32 = 250;
+
+/// Result of a validation run.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ValidationReport {
+    /// Why the submission is invalid; `None` if it is valid.
+    pub failure: Option<ValidationFailure>,
+    /// Answer times of the evaluated tasks.
+    pub timing: Vec<ValidationTiming>,
+    /// The end of the agent's standard error.
+    pub log: String,
+}
+
+/// Why a submission is invalid.
+#[derive(Debug, Clone, PartialEq)]
+pub enum ValidationFailure {
+    /// The agent broke the protocol or a limit.
+    Fault {
+        fault: AgentFault,
+        /// The wait for the missing answer, if that was the fault.
+        wait: Option<WaitBreakdown>,
+    },
+    /// It answers, but not in real time.
+    TooSlow {
+        timing: ValidationTiming,
+        /// Limit of the mean, in seconds.
+        limit_s: f64,
+        /// Mean host interference per answer, in seconds; not included in `timing`.
+        host_mean_s: f64,
+        /// Mean CPU time of the agent's processes per answer, in seconds; `None` if the host does not report it.
+        cpu_mean_s: Option<f64>,
+    },
+}
+
+impl fmt::Display for ValidationFailure {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Fault {
+                fault,
+                wait: None,
+            } => fault.fmt(f),
+            Self::Fault {
+                fault,
+                wait: Some(wait),
+            } => write!(f, "{fault} ({wait})"),
+            Self::TooSlow {
+                timing,
+                limit_s,
+                host_mean_s,
+                cpu_mean_s,
+            } => {
+                write!(
+                    f,
+                    "{}: too slow: {} answers took {:.1} ms on average, and {:.0} ms are allowed: the \
+                     robot asks in real time (not counted: {:.1} ms of host interference on average",
+                    timing.task,
+                    timing.steps,
+                    1e3 * timing.mean_s,
+                    1e3 * limit_s,
+                    1e3 * host_mean_s,
+                )?;
+                if let Some(cpu_s) = cpu_mean_s {
+                    write!(f, "; the agent's processes ran {:.1} ms", 1e3 * cpu_s)?;
+                }
+                f.write_str(")")
+            }
+        }
+    }
+}
+
+/// Runs a validation: checks that the agent starts, answers and keeps real time.
+///
+/// Runs episodes of each task as in an evaluation, in the same sandbox and with the same limits, until at least
+/// [`VALIDATION_STEPS`] control steps of the task are played. Ends with the first failure. The spec's seed determines
+/// the episodes and their number, so that an agent cannot distinguish this run from an evaluation.
+///
+/// # Errors Platform faults only; an agent fault is in the report. [`PlatformFault::Cancelled`] if `cancelled`, which
+/// is called before each step, returned `true`. [`PlatformFault::HostBusy`] if host interference ended an episode in
+/// all allowed tries: that is no verdict.
+pub fn validate(
+    spec: &ValidationSpec,
+    bundle: &Bundle,
+    env: &AgentEnvironment,
+    cancelled: &dyn Fn() -> bool,
+) -> Result<ValidationReport, PlatformFault> {
+    validate_monitored(spec, bundle, env, cancelled, &KernelCounters)
+}
+
+/// [`validate`] with another monitor of host interference.
+///
+/// # Errors
+/// As [`validate`].
+pub fn validate_monitored(
+    spec: &ValidationSpec,
+    bundle: &Bundle,
+    env: &AgentEnvironment,
+    cancelled: &dyn Fn() -> bool,
+    monitor: &dyn InterferenceMonitor,
+) -> Result<ValidationReport, PlatformFault> {
+    let _pinned = AffinityGuard::avoid(&env.agent_cpus);
+    let arena = Arena::new(Profile::Evaluation, spec.seed, spec.mismatch_seed);
+    let mut timing = Vec::with_capacity(Task::ALL.len());
+    let mut log = Log::new(env.limits.stderr_tail_bytes);
+    for task in Task::ALL {
+        let plan = TaskPlan::new(spec, task);
+        let mut player = Player::new(
+            bundle,
+            env,
+            task,
+            plan.episodes,
+            arena.clone(),
+            monitor,
+            OnHostInterference::PlatformFault,
+        );
+        let mut answers = Answers::default();
+        let mut outcomes = Vec::new();
+        while answers.answered.len() < plan.steps as usize {
+            let episode = plan.first_episode + outcomes.len() as u32;
+            let outcome = player.play(episode, EPISODE_STEPS, &mut answers, cancelled)?;
+            let has_fault = outcome.fault.is_some();
+            outcomes.push(outcome);
+            if has_fault {
+                break;
+            }
+        }
+        let wait = player.last_wait();
+        log.add(&player.close()?, None);
+        let (host_mean_s, cpu_mean_s) = answers.mean_host_and_cpu_s();
+        let summary = answers.summary(task, &outcomes);
+        let fault = outcomes.into_iter().find_map(|outcome| outcome.fault);
+        let failure = match fault {
+            Some(fault) => Some(ValidationFailure::Fault { fault, wait }),
+            None if summary.mean_s > env.time.mean_s => Some(ValidationFailure::TooSlow {
+                timing: summary.clone(),
+                limit_s: env.time.mean_s,
+                host_mean_s,
+                cpu_mean_s,
+            }),
+            None => None,
+        };
+        timing.push(summary);
+        if failure.is_some() {
+            return Ok(ValidationReport {
+                failure,
+                timing,
+                log: log.into_text(),
+            });
+        }
+    }
+    Ok(ValidationReport {
+        failure: None,
+        timing,
+        log: log.into_text(),
+    })
+}
+
+/// The episodes of one task in a validation run.
+struct TaskPlan {
+    /// An episode number at which a shard of an evaluation would begin.
+    first_episode: u32,
+    /// Approximate number of episodes that the steps need.
+    episodes: u32,
+    /// Episodes are started until this many control steps are played.
+    steps: u32,
+}
+
+impl TaskPlan {
+    /// Episodes begin at a multiple of this, as in a shard, because the protocol sends the episode number to the agent.
+    const SHARD_EPISODES: u32 = 50;
+    const SHARDS: u32 = 20;
+
+    fn new(spec: &ValidationSpec, task: Task) -> Self {
+        let derived = spec.seed.derive("smoke", task.as_str().as_bytes());
+        let [a, b, c, d, e, f, g, h, ..] = *derived.as_bytes();
+        let shard = u32::from_le_bytes([a, b, c, d]) % Self::SHARDS;
+        let more = u32::from_le_bytes([e, f, g, h]) % VALIDATION_STEPS;
+        Self {
+            first_episode: shard * Self::SHARD_EPISODES,
+            episodes: Self::SHARD_EPISODES,
+            steps: VALIDATION_STEPS + more,
+        }
+    }
+}
+
+/// The answers of all episodes; if an episode is run again, only its last try counts.
+#[derive(Default)]
+struct Answers {
+    answered: Vec<AnswerTiming>,
+    /// Number of answers in completed episodes.
+    ended: usize,
+}
+
+impl Answers {
+    fn mean_s(&self, of: impl Fn(&AnswerTiming) -> f64) -> f64 {
+        self.answered.iter().map(of).sum::<f64>() / self.answered.len().max(1) as f64
+    }
+
+    /// Mean host interference and mean CPU time of the agent per answer, in seconds; the latter is `None` if the host
+    /// does not report it.
+    fn mean_host_and_cpu_s(&self) -> (f64, Option<f64>) {
+        let has_cpu_times = self.answered.iter().all(|one| one.cpu_time_s.is_some());
+        let cpu_s = has_cpu_times.then(|| self.mean_s(|one| one.cpu_time_s.unwrap_or_default()));
+        (self.mean_s(|one| one.host_time_s), cpu_s)
+    }
+
+    fn summary(&self, task: Task, outcomes: &[EpisodeOutcome]) -> ValidationTiming {
+        let times = self.answered.iter().map(|one| one.computation_time_s);
+        let mut times_s: Vec<f64> = times.collect();
+        times_s.sort_unstable_by(f64::total_cmp);
+        let rank = (times_s.len() * 99).div_ceil(100);
+        let points: f64 = outcomes
+            .iter()
+            .map(|outcome| computation_time_penalty(&outcome.computation_time))
+            .sum();
+        ValidationTiming {
+            task,
+            steps: times_s.len() as u32,
+            mean_s: self.mean_s(|one| one.computation_time_s),
+            p99_s: rank.checked_sub(1).map_or(0.0, |at| times_s[at]),
+            max_s: times_s.last().copied().unwrap_or_default(),
+            points_per_episode: points / outcomes.len().max(1) as f64,
+        }
+    }
+}
+
+impl StepSink for Answers {
+    fn begin(&mut self, _: EpisodeStart<'_>) {
+        self.answered.truncate(self.ended);
+    }
+
+    fn observe(&mut self, _: &[f64]) {}
+
+    fn step(&mut self, row: &StepRow<'_>) {
+        self.answered.push(row.timing);
+    }
+
+    fn end(&mut self, _: &EpisodeOutcome, _: u32) -> Result<(), RecordError> {
+        self.ended = self.answered.len();
+        Ok(())
+    }
+}

@@ -1,0 +1,88 @@
+//! CPU time that an agent uses without a pending question counts as its time, or is prevented by freezing.
+
+use crate::{
+    agents::{Agent, sandboxed},
+    game,
+    recording::{read, seconds},
+    shard::{run, spec},
+};
+use faceoff_runner::{AgentEnvironment, GameObserver, run_game};
+use faceoff_sandbox::affinity;
+use faceoff_types::Task;
+
+/// The agent and the evaluator share one CPU.
+fn on_last_cpu() -> AgentEnvironment {
+    let mut env = sandboxed();
+    env.agent_cpus = vec![*affinity::allowed().unwrap().last().unwrap()];
+    env
+}
+
+/// Computes all the time, also without a question.
+const SPINS: &str = "import threading\n\
+    def spin():\n    \
+    while True: pass\n\
+    def on_hello(hello): sys.setswitchinterval(1e-4); threading.Thread(target=spin, daemon=True).start()";
+
+#[test]
+fn cpu_time_between_answer_and_question_counts() {
+    let out = tempfile::tempdir().unwrap();
+    let report = run(
+        &spec(Task::Hit, 0..1),
+        &Agent::with(SPINS),
+        &on_last_cpu(),
+        out.path(),
+    );
+    assert_eq!(report.unwrap().outcomes[0].fault, None);
+    let steps = read(&out.path().join("steps.parquet"));
+    let sum = |name| seconds(&steps, name).iter().sum::<f64>();
+    let (counted, host) = (sum("computation_time_ns"), sum("host_time_ns"));
+    let used = sum("cpu_time_ns");
+    // Gaps that are too short to be measured are left out.
+    assert!(
+        counted + host >= 0.8 * used,
+        "{used} s were used, {counted} s counted, and {host} s attributed to the host"
+    );
+}
+
+struct NullObserver;
+
+impl GameObserver for NullObserver {
+    fn cancelled(&self) -> bool {
+        false
+    }
+}
+
+/// One side answers at once and continues computing; the other side sleeps at each step. A delayed evaluator freezes
+/// late, so the minimum over many steps is checked.
+#[test]
+fn answered_side_is_frozen_on_shared_cpus() {
+    let hog = Agent::with(&format!(
+        "import atexit\n{SPINS}\n\
+         answered, computed = None, []\n\
+         def on_step(step, answer):\n    \
+         global answered\n    \
+         now = time.process_time()\n    \
+         if answered: computed.append(now - answered)\n    \
+         answered = now\n    \
+         return json.dumps(answer)\n\
+         atexit.register(lambda: print('least', min(computed), file=sys.stderr))"
+    ));
+    let sleeper =
+        Agent::with("def on_step(step, answer): time.sleep(0.1); return json.dumps(answer)");
+    let out = tempfile::tempdir().unwrap();
+    let env = on_last_cpu();
+    let played = run_game(
+        &game::spec(40),
+        [&hog.bundle, &sleeper.bundle],
+        [&env; 2],
+        out.path(),
+        &mut NullObserver,
+    );
+    let logs = played.unwrap().logs;
+    let least = logs[0].lines().find_map(|line| line.strip_prefix("least "));
+    let least_s: f64 = least.unwrap_or_else(|| panic!("{logs:?}")).parse().unwrap();
+    assert!(
+        least_s < 0.05,
+        "it computed for {least_s} s and more while the other slept for 0.1 s"
+    );
+}

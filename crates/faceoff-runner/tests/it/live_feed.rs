@@ -1,0 +1,116 @@
+//! The live feed of a game.
+
+use crate::{
+    agents::{Agent, sandboxed},
+    game::spec,
+};
+use faceoff_runner::{LiveFeed, LiveFeedSink, GameReport, run_game};
+use faceoff_types::{GameEvent, LiveEvent, LivePosition, Side};
+use std::time::Duration;
+
+#[derive(Default)]
+struct RecordingSink {
+    events: Vec<LiveEvent>,
+    positions: Vec<LivePosition>,
+}
+
+impl LiveFeedSink for RecordingSink {
+    fn receive(&mut self, events: Vec<LiveEvent>, position: LivePosition) {
+        self.events.extend(events);
+        self.positions.push(position);
+    }
+
+    fn cancelled(&self) -> bool {
+        false
+    }
+}
+
+fn run_with_feed(steps: u32, position_interval: Duration) -> (RecordingSink, GameReport) {
+    let crashes = Agent::with(
+        "def on_step(step, answer):\n    \
+         if step == 3: os._exit(3)\n    \
+         return json.dumps(answer)",
+    );
+    let hold = Agent::behaving();
+    let out = tempfile::tempdir().unwrap();
+    let env = sandboxed();
+    let mut sink = RecordingSink::default();
+    let mut feed = LiveFeed::new(&mut sink, position_interval);
+    let bundles = [&hold.bundle, &crashes.bundle];
+    let report = run_game(
+        &spec(steps),
+        bundles,
+        [&env; 2],
+        out.path(),
+        &mut feed,
+    )
+    .unwrap();
+    feed.end(&report);
+    (sink, report)
+}
+
+#[test]
+fn live_feed_has_all_events_in_order_and_all_positions() {
+    let (sink, report) = run_with_feed(800, Duration::ZERO);
+    let outcome = &report.archives.outcome;
+    let fouls = outcome.sides.each_ref().map(|side| side.fouls);
+    assert_eq!((fouls[0] + fouls[1], outcome.rallies), (1, 2));
+    let by = Side::BOTH[usize::from(fouls[1] == 1)];
+    let serves = |at: usize| match sink.events[at].event {
+        GameEvent::RallyBegun { serves, .. } => serves,
+        ref other => panic!("{other:?}"),
+    };
+    let side = Side::Second;
+    let expected = [
+        GameEvent::RallyBegun {
+            rally: 0,
+            serves: by,
+        },
+        GameEvent::Fault { side, count: 1 },
+        GameEvent::Foul { by, score: [0, 0] },
+        GameEvent::Restarted { side },
+        GameEvent::RallyBegun {
+            rally: 1,
+            serves: by.other(),
+        },
+        GameEvent::Fault { side, count: 2 },
+        GameEvent::Ended {
+            score: [0, 0],
+            winner: report
+                .archives
+                .score
+                .winner
+                .map(|side| Side::BOTH[side as usize]),
+            forfeits: [None; 2],
+        },
+    ];
+    assert_eq!((serves(0), serves(4)), (by, by.other()));
+    let kinds: Vec<_> = sink.events.iter().map(|event| &event.event).collect();
+    assert_eq!(kinds, expected.iter().collect::<Vec<_>>());
+    let restart_step = sink.events[2].step;
+    let steps: Vec<u32> = sink.events.iter().map(|event| event.step).collect();
+    assert_eq!(steps, [0, 3, restart_step, restart_step, restart_step, restart_step + 3, 800]);
+
+    let mut seen: Vec<u32> = sink.positions.iter().map(|at| at.step).collect();
+    assert!(seen.is_sorted());
+    seen.dedup();
+    assert!(seen.into_iter().eq(0..=800), "each step has a position");
+    for LivePosition { puck, mallets, .. } in &sink.positions {
+        assert!(puck[0].abs() < 0.75 && puck[1].abs() < 0.45, "{puck:?}");
+        // Both arms hold their initial pose: 0.65 m from their bases, which are 1.51 m from the centre.
+        for ([x, y], begun) in mallets.iter().zip([-0.86, 0.86]) {
+            assert!((x - begun).abs() < 0.02 && y.abs() < 0.02, "{mallets:?}");
+        }
+    }
+}
+
+#[test]
+fn rare_positions_do_not_delay_events() {
+    let (sink, report) = run_with_feed(40, Duration::MAX);
+    assert_eq!(report.archives.outcome.steps, 40);
+    // The start of the first rally, its fault, and the end: each with the current position.
+    let steps: Vec<u32> = sink.positions.iter().map(|at| at.step).collect();
+    assert_eq!(steps, [0, 40, 40]);
+    let last = sink.events.last().map(|event| &event.event);
+    assert!(matches!(last, Some(GameEvent::Ended { .. })));
+}

@@ -1,0 +1,222 @@
+//! Accounting of other run time on an agent's CPUs, by the kernel's own counters, which no agent can manipulate.
+//! The interrupts of an agent's timers, its threads and its page faults are never included: the kernel counts them
+//! as the agent's own time, or not at all.
+//!
+//! Cgroup version 1 counts per CPU and in nanoseconds, both for all processes and for the agent. Version 2 counts
+//! only the agent's own time. The total then comes from `/proc/stat`, in ticks of 10 ms. Rounding of ticks is always
+//! resolved to the smallest possible interference.
+
+mod estimator;
+mod reading;
+
+use crate::{
+    CallerCounters, cpu_clock,
+    cpu_counters::{sum_of_cpus, read_text, parse_throttled, parse_ticks, parse_usage},
+    thread_waits::{AnswerState, TrackedThreads, WaitLedger},
+};
+use estimator::{InterferenceEstimator, upper_bound, stolen_time};
+pub use reading::CpuReading;
+use std::{
+    fs::{self, File},
+    time::{Duration, Instant},
+};
+
+/// Maximum lag of the counters: the kernel charges a running thread at its next tick, at least 100 times a second.
+const LAG: Duration = Duration::from_millis(10);
+
+/// Counters read right before a question. Reading them takes a few microseconds.
+#[derive(Debug, Clone)]
+pub struct Baseline {
+    pub at: Instant,
+    /// Counters of the agent's CPUs, without the states of its threads. `None` without a cgroup, or if the kernel
+    /// counts in ticks only.
+    pub cpus: Option<CpuReading>,
+    /// Counters of the calling thread, if requested.
+    pub caller: Option<CallerCounters>,
+}
+
+/// The open counter files of one agent.
+#[derive(Debug)]
+pub(crate) struct CpuAccounting {
+    /// The CPUs that the agent may use.
+    pub cpus: Vec<usize>,
+    pub run_time: RunTime,
+    /// The agent's `cpu.stat`, for the time in which its own quota throttled it.
+    pub throttled: Option<File>,
+}
+
+#[derive(Debug)]
+pub(crate) enum RunTime {
+    /// `cpuacct.usage_percpu` of all processes and of the agent.
+    PerCpu { all: File, agent: File },
+    /// The agent's `cpu.stat`.
+    Whole { agent: File },
+}
+
+/// Host interference during a span of time.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct HostInterference {
+    /// Time in which the agent was runnable and could not run.
+    pub run_delay: Duration,
+    /// Steal time: the hypervisor had stopped the CPUs. Kernels differ in whether they also count it as run time of
+    /// the current thread.
+    pub stolen: Duration,
+}
+
+/// Order in which the counters are read. It must make the run time of other processes seem shorter, never longer.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum ReadOrder {
+    AgentFirst,
+    OthersFirst,
+}
+
+/// Samples of the counters while an answer is late. Only samples show the wait of a thread that was woken on a CPU
+/// stopped by the hypervisor: the kernel's own counter starts when that CPU runs again.
+#[derive(Debug, Clone)]
+pub struct CpuSamples {
+    first: CpuReading,
+    /// `None` if there is only one sample.
+    last: Option<CpuReading>,
+    ledger: WaitLedger,
+}
+
+impl CpuSamples {
+    /// Starts with the first sample. `asked`: time of the question, after the `baseline` was read.
+    #[must_use]
+    pub fn begin(first: CpuReading, baseline: Option<&CpuReading>, asked: Instant) -> Self {
+        let mut ledger = WaitLedger::default();
+        if let (Some(now), Some(baseline)) = (&first.waits, baseline)
+            && let Some(earlier) = &baseline.waits
+        {
+            let stolen = stolen_time(baseline, &first).min(first.at.saturating_duration_since(asked));
+            ledger.begin(earlier, now, stolen);
+        }
+        Self {
+            first,
+            last: None,
+            ledger,
+        }
+    }
+
+    /// Adds another sample, taken while the answer is still pending.
+    pub fn add(&mut self, now: CpuReading) {
+        let before = self.last.as_ref().unwrap_or(&self.first);
+        if let (Some(earlier), Some(waits)) = (&before.waits, &now.waits) {
+            self.ledger.add(earlier, waits, now.idle_since(before));
+        }
+        self.last = Some(now);
+    }
+}
+
+impl CpuAccounting {
+    /// Reads the counters as the start of a span; `None` if the host has none.
+    pub(crate) fn read_start(&self, threads: &TrackedThreads) -> Option<CpuReading> {
+        self.read(ReadOrder::AgentFirst, threads)
+    }
+
+    /// Reads the counters that take only a few microseconds, as the start of a span: of tracked threads only. `None` if
+    /// the host has none, or counts in ticks only.
+    pub(crate) fn read_baseline(&self, threads: &TrackedThreads, stat: &str) -> Option<CpuReading> {
+        let RunTime::PerCpu { all, .. } = &self.run_time else {
+            return None;
+        };
+        Some(CpuReading {
+            agent: self.agent_run_time()?,
+            clocks: Duration::ZERO,
+            all: sum_of_cpus(&read_text(all)?, &self.cpus)?,
+            throttled: self.throttled(),
+            ticks: parse_ticks(stat, &self.cpus)?,
+            waits: Some(threads.read_counters()?),
+            at: Instant::now(),
+        })
+    }
+
+    /// Host interference since the question (`asked`): the longest run delay that the samples or the baseline prove,
+    /// and the steal time since the earlier of them.
+    pub(crate) fn interference_since(
+        &self,
+        asked: Instant,
+        samples: Option<&CpuSamples>,
+        baseline: Option<&CpuReading>,
+        threads: &TrackedThreads,
+        answer: AnswerState,
+    ) -> Option<HostInterference> {
+        let now = self.read(ReadOrder::OthersFirst, threads)?;
+        let none = WaitLedger::default();
+        let estimator = InterferenceEstimator {
+            precise: matches!(self.run_time, RunTime::PerCpu { .. }),
+            ledger: samples.map_or(&none, |samples| &samples.ledger),
+            answer,
+        };
+        let first = samples.map(|samples| &samples.first);
+        let since_samples = first.map(|first| {
+            estimator
+                .others_time(first, &now)
+                .max(estimator.run_delay(first, &now))
+        });
+        // The kernel may charge other processes after the baseline for time that they ran before it, and their time
+        // between the baseline and the question did not delay the answer. Both are subtracted.
+        let since_baseline = baseline.map(|baseline| {
+            let age = asked.saturating_duration_since(baseline.at);
+            let ran = estimator.others_time(baseline, &now).saturating_sub(LAG + age);
+            ran.max(estimator.run_delay(baseline, &now).saturating_sub(age))
+        });
+        // The baseline is the earlier reading, so it covers the longer span.
+        let from = baseline.or(first);
+        let max_interference = from
+            .map(|from| upper_bound(from, &now, estimator.precise))
+            .unwrap_or_default();
+        let observed_wait = match &now.waits {
+            Some(now) => estimator.ledger.longest_observed_wait(now, answer).min(max_interference),
+            None => Duration::ZERO,
+        };
+        Some(HostInterference {
+            run_delay: since_samples
+                .max(since_baseline)
+                .unwrap_or_default()
+                .max(observed_wait),
+            stolen: from.map(|from| stolen_time(from, &now)).unwrap_or_default(),
+        })
+    }
+
+    fn read(&self, order: ReadOrder, threads: &TrackedThreads) -> Option<CpuReading> {
+        let mut at = Instant::now();
+        let mut agent = Duration::ZERO;
+        if order == ReadOrder::AgentFirst {
+            agent = self.agent_run_time()?;
+        }
+        let all = match &self.run_time {
+            RunTime::PerCpu { all, .. } => sum_of_cpus(&read_text(all)?, &self.cpus)?,
+            RunTime::Whole { .. } => Duration::ZERO,
+        };
+        let ticks = parse_ticks(&fs::read_to_string("/proc/stat").ok()?, &self.cpus)?;
+        if order == ReadOrder::OthersFirst {
+            agent = self.agent_run_time()?;
+        } else {
+            at = Instant::now();
+        }
+        Some(CpuReading {
+            at,
+            agent,
+            clocks: cpu_clock::total_run_time(threads.processes()),
+            all,
+            throttled: self.throttled(),
+            ticks,
+            waits: threads.sample(),
+        })
+    }
+
+    fn throttled(&self) -> Duration {
+        let file = self.throttled.as_ref();
+        let throttled = file.and_then(|file| parse_throttled(&read_text(file)?));
+        throttled.unwrap_or_default()
+    }
+
+    /// Run time of the agent on its CPUs.
+    fn agent_run_time(&self) -> Option<Duration> {
+        match &self.run_time {
+            RunTime::PerCpu { agent, .. } => sum_of_cpus(&read_text(agent)?, &self.cpus),
+            RunTime::Whole { agent } => parse_usage(&read_text(agent)?),
+        }
+    }
+}

@@ -1,0 +1,270 @@
+//! Launch of an agent: from a [`SpawnSpec`] to a running process tree.
+
+use crate::{
+    Isolation, Layer, SandboxError, SpawnError, SpawnSpec,
+    affinity::cpu_set,
+    agent_user::AgentUser,
+    bubblewrap::{Bubblewrap, environment},
+    cgroup::AgentCgroup,
+    channel::Channel,
+    child_setup::{ChildSetup, StepReport, rlimits},
+    error::IoContext,
+    line_socket::LineSocket,
+    owner::Owner,
+    process_tree::ProcessTree,
+    seccomp::Filters,
+    spawner,
+    status_pipe::StatusPipe,
+    stderr_tail::StderrTail,
+    sweep::SCRATCH_PREFIX,
+};
+use faceoff_types::AgentFaultKind;
+use std::{
+    fs, io,
+    os::unix::{fs::PermissionsExt, process::CommandExt},
+    path::{Path, PathBuf},
+    process::Command,
+    time::{Duration, Instant},
+};
+
+/// Limit for bubblewrap's set-up of a sandbox; beyond it, the host has failed.
+const SET_UP_TIMEOUT: Duration = Duration::from_secs(120);
+
+/// A running process tree, and the service's ends of its channel.
+pub(crate) struct LaunchedAgent {
+    pub lines: LineSocket,
+    /// Name of the agent's output in `/proc/*/fd`.
+    pub output_name: String,
+    pub stderr: StderrTail,
+    pub tree: ProcessTree,
+}
+
+/// Everything that is created before the fork.
+pub(crate) struct Launch {
+    command: Command,
+    setup: ChildSetup,
+    channel: Channel,
+    status: Option<StatusPipe>,
+    cgroup: Option<AgentCgroup>,
+    scratch: Option<tempfile::TempDir>,
+}
+
+impl Launch {
+    /// Creates the cgroup, the filters and the command line.
+    pub(crate) fn new(spec: &SpawnSpec) -> Result<Self, SandboxError> {
+        if spec.runtime.root().is_some() && !spec.isolation.enforces(Layer::Namespaces) {
+            return Err(SandboxError::Unavailable {
+                layer: Layer::Namespaces,
+                reason: "it is given up, and the agent is a container image, whose files are a root of their own, \
+                      which this layer alone can give; keep the layer"
+                    .to_owned(),
+            });
+        }
+        if spec.isolation == Isolation::None {
+            return Self::unsandboxed(spec);
+        }
+        let enforces = |layer| spec.isolation.enforces(layer);
+        let user = AgentUser::for_next_agent()?;
+        let channel = Channel::new()?;
+        let cgroup = AgentCgroup::create(&spec.limits, &spec.isolation, &spec.cpus)?;
+        let is_confined = cgroup.as_ref().is_some_and(|cgroup| cgroup.confines_cpus);
+        let filters = if enforces(Layer::Seccomp) {
+            Some(Filters::build(!spec.cpus.is_empty() && !is_confined)?)
+        } else {
+            None
+        };
+        let mut setup = ChildSetup {
+            cgroup_procs: cgroup
+                .as_ref()
+                .map(AgentCgroup::procs_files)
+                .transpose()?
+                .unwrap_or_default(),
+            cpus: (!spec.cpus.is_empty()).then(|| cpu_set(&spec.cpus)),
+            rlimits: if enforces(Layer::Rlimits) {
+                rlimits(&spec.limits, user.is_some())
+            } else {
+                Vec::new()
+            },
+            user,
+            raise_oom_score: true,
+            ..ChildSetup::default()
+        };
+        if enforces(Layer::Namespaces) {
+            let (status, writer) = StatusPipe::new().context("cannot make a pipe")?;
+            let invocation =
+                Bubblewrap::find()?.command(spec, writer, filters.as_ref(), user.is_some())?;
+            setup.inherit = invocation.inherit;
+            setup.mounts = invocation.mounts;
+            let command = invocation.command;
+            return Ok(Self {
+                command,
+                setup,
+                channel,
+                status: Some(status),
+                cgroup,
+                scratch: None,
+            });
+        }
+        if user.is_some() {
+            check_reachable(&spec.bundle_dir)?;
+        }
+        setup.filters = filters;
+        let scratch = scratch_folder(user)?;
+        let mut command = direct_command(spec);
+        command
+            .env_clear()
+            .envs(environment(spec, &scratch.path().display().to_string()));
+        Ok(Self {
+            command,
+            setup,
+            channel,
+            status: None,
+            cgroup,
+            scratch: Some(scratch),
+        })
+    }
+
+    fn unsandboxed(spec: &SpawnSpec) -> Result<Self, SandboxError> {
+        let mut command = direct_command(spec);
+        command.envs(&spec.env);
+        let cpus = (!spec.cpus.is_empty()).then(|| cpu_set(&spec.cpus));
+        let setup = ChildSetup {
+            cpus,
+            ..ChildSetup::default()
+        };
+        Ok(Self {
+            command,
+            setup,
+            channel: Channel::new()?,
+            status: None,
+            cgroup: None,
+            scratch: None,
+        })
+    }
+
+    /// Forks, and returns when the sandbox exists.
+    pub(crate) fn start(self, spec: &SpawnSpec) -> Result<LaunchedAgent, SpawnError> {
+        let Self {
+            mut command,
+            setup,
+            channel,
+            status,
+            cgroup,
+            scratch,
+        } = self;
+        let Channel {
+            lines,
+            log,
+            agent_fds: [stdin, stdout, stderr],
+            output_name,
+        } = channel;
+        command
+            .stdin(stdin)
+            .stdout(stdout)
+            .stderr(stderr)
+            .process_group(0);
+        let is_sandboxed = status.is_some();
+        let report = setup.install(&mut command).context("cannot make a pipe")?;
+        let child = match spawner::spawn(command) {
+            Ok(child) => child,
+            Err(source) => return Err(start_failure(report, source, is_sandboxed, spec)),
+        };
+        const WATCH: &str = "cannot watch the agent";
+        let mut tree = ProcessTree::new(child, status, cgroup, scratch).context(WATCH)?;
+        let mut stderr = StderrTail::drain(log, spec.limits.stderr_tail_bytes).context(WATCH)?;
+        if let Some(status) = &mut tree.status {
+            match status.wait_for_child(Instant::now() + SET_UP_TIMEOUT)? {
+                Some(init) => tree.watch_init(init),
+                None => {
+                    tree.kill();
+                    stderr.close();
+                    let reason = stderr.text().trim().to_owned();
+                    return Err(SandboxError::Unavailable {
+                        layer: Layer::Namespaces,
+                        reason,
+                    }
+                    .into());
+                }
+            }
+        }
+        Ok(LaunchedAgent {
+            lines,
+            output_name,
+            stderr,
+            tree,
+        })
+    }
+}
+
+/// The agent's own command, for the modes without bubblewrap.
+fn direct_command(spec: &SpawnSpec) -> Command {
+    let program = spec.command.first().map(String::as_str).unwrap_or_default();
+    let program = match program.strip_prefix("/agent/") {
+        // Relative to the working folder, which is entered first: the agent's user may be unable to reach the program
+        // by its absolute path.
+        Some(rest) => Path::new("./").join(rest),
+        None if program.contains('/') => Path::new("./").join(program),
+        None => PathBuf::from(program),
+    };
+    let mut command = Command::new(program);
+    command
+        .args(spec.command.iter().skip(1))
+        .current_dir(&spec.bundle_dir);
+    command
+}
+
+/// Without a mount namespace the agent's user must be able to reach the bundle by its path. If it cannot, this must
+/// not look like an agent fault.
+fn check_reachable(bundle_dir: &Path) -> Result<(), SandboxError> {
+    for folder in bundle_dir.ancestors() {
+        let meta = fs::metadata(folder).context("cannot look at the bundle")?;
+        if meta.permissions().mode() & 0o001 == 0 {
+            return Err(SandboxError::Unavailable {
+                layer: Layer::Namespaces,
+                reason: format!(
+                    "it is given up, so an agent of this root service, which is another user, would have to \
+                     reach its bundle through {}, which is closed to others; run the service as an ordinary \
+                     user, or keep the layer",
+                    folder.display()
+                ),
+            });
+        }
+    }
+    Ok(())
+}
+
+fn scratch_folder(user: Option<AgentUser>) -> Result<tempfile::TempDir, SandboxError> {
+    const MAKE: &str = "cannot make a scratch folder";
+    let folder = tempfile::Builder::new()
+        .prefix(&Owner::this_process().name_prefix(SCRATCH_PREFIX))
+        .tempdir()
+        .context(MAKE)?;
+    if let Some(user) = user {
+        std::os::unix::fs::chown(folder.path(), Some(user.id), Some(user.id)).context(MAKE)?;
+    }
+    Ok(folder)
+}
+
+/// Classifies a failed spawn. Without bubblewrap, a failed exec is the exec of the agent's program.
+fn start_failure(
+    report: StepReport,
+    source: io::Error,
+    is_sandboxed: bool,
+    spec: &SpawnSpec,
+) -> SpawnError {
+    match report.failed_step() {
+        Some(step) => SandboxError::io(step, source).into(),
+        None if is_sandboxed => SandboxError::io("cannot start bubblewrap", source).into(),
+        None if matches!(
+            source.raw_os_error(),
+            Some(libc::ENOENT | libc::EACCES | libc::ENOEXEC)
+        ) =>
+        {
+            let program = spec.command.first().map(String::as_str).unwrap_or_default();
+            SpawnError::Agent(AgentFaultKind::CannotStart {
+                detail: format!("`{program}`: {source}"),
+            })
+        }
+        None => SandboxError::io("cannot start the agent", source).into(),
+    }
+}

@@ -1,0 +1,51 @@
+use crate::harness::Subject;
+use faceoff_sandbox::affinity;
+use serde_json::json;
+
+/// Report of an agent on these CPUs with this CPU quota.
+fn report(cpus: &[usize], quota: f64) -> serde_json::Value {
+    let mut subject = Subject::new("counts_cpus", &[]).limits(|limits| limits.cpus = quota);
+    subject.spec.cpus = cpus.to_vec();
+    subject.report()
+}
+
+#[test]
+fn agent_finds_its_cpus_by_every_interface() {
+    let all = affinity::allowed().unwrap();
+    let last = &all[all.len() - 1..];
+    // The last CPU: counting CPUs from 0 would give a wrong number.
+    for (cpus, quota, threads) in [
+        (last, 1.0, 1),
+        (last, 64.0, 1),
+        (&all[..], 64.0, all.len()),
+        (&all[..], 1.0, 1),
+    ] {
+        let report = report(cpus, quota);
+        assert_eq!(report["count"], cpus.len(), "{report}");
+        assert_eq!(report["configured"], cpus.len(), "{report}");
+        for way in [
+            "affinity", "online", "possible", "present", "cpuinfo", "stat",
+        ] {
+            assert_eq!(report[way], json!(cpus), "{way}: {report}");
+        }
+        assert_eq!(report["threads"], json!([threads.to_string()]), "{report}");
+        assert_eq!(report["system"], json!(["online", "possible", "present"]));
+    }
+    assert_eq!(report(&[], 64.0), report(&all, 64.0), "bound to none");
+}
+
+#[test]
+fn bundle_may_set_its_number_of_threads() {
+    let mut subject = Subject::new("counts_cpus", &[]);
+    for name in [
+        "OMP_NUM_THREADS",
+        "OPENBLAS_NUM_THREADS",
+        "MKL_NUM_THREADS",
+        "BLIS_NUM_THREADS",
+        "NUMEXPR_NUM_THREADS",
+        "RAYON_NUM_THREADS",
+    ] {
+        subject.spec.env.insert(name.to_owned(), "7".to_owned());
+    }
+    assert_eq!(subject.report()["threads"], json!(["7"]));
+}

@@ -1,0 +1,64 @@
+use crate::harness::{TIMEOUT, Subject, expect_line, processes_marked};
+use faceoff_types::AgentFaultKind;
+use std::time::Duration;
+
+fn assert_is_killed(kind: &str) {
+    let subject = Subject::new("resists_kill", &[kind]);
+    let mut agent = subject.spawn();
+    assert_eq!(expect_line(&mut agent), "ready");
+    assert!(
+        !processes_marked(&subject.mark).is_empty(),
+        "the check finds no process"
+    );
+    let usage = agent.finish(Duration::from_millis(20)).unwrap();
+    assert_eq!(usage.exit, None);
+    subject.assert_nothing_left();
+}
+
+#[test]
+fn agent_that_ignores_every_signal_is_killed() {
+    assert_is_killed("ignores");
+}
+
+#[test]
+fn daemon_in_its_own_session_is_killed() {
+    assert_is_killed("daemon-stays");
+}
+
+#[test]
+fn many_children_are_killed() {
+    assert_is_killed("group");
+}
+
+#[test]
+fn daemon_does_not_outlive_its_agent() {
+    let subject = Subject::new("resists_kill", &["daemon"]);
+    let mut agent = subject.spawn();
+    assert_eq!(expect_line(&mut agent), "ready");
+    assert_eq!(
+        agent.diagnose_end(TIMEOUT).unwrap(),
+        Some(AgentFaultKind::Exited { code: 0 })
+    );
+    // The agent was its namespace's first process, so its end has killed all others.
+    assert_eq!(processes_marked(&subject.mark), [] as [i32; 0]);
+    subject.finish(agent);
+}
+
+#[test]
+fn process_tree_is_killed_without_namespaces() {
+    use faceoff_sandbox::{Isolation, Layer};
+    for kind in ["ignores", "group", "daemon-stays"] {
+        let mut subject = Subject::new("resists_kill", &[kind]);
+        let Isolation::Sandboxed { given_up } = &mut subject.spec.isolation else {
+            unreachable!()
+        };
+        if kind == "daemon-stays" && given_up.contains(&Layer::CgroupPids) {
+            println!("a daemon can be found only by its cgroup, which this host does not offer");
+            continue;
+        }
+        given_up.push(Layer::Namespaces);
+        let mut agent = subject.spawn();
+        assert_eq!(expect_line(&mut agent), "ready");
+        subject.finish(agent);
+    }
+}

@@ -1,0 +1,198 @@
+//! Cache of public responses, valid until the season changes and for one second at most. The number of visitors of a
+//! board must not affect running agents.
+
+use crate::problem::Problem;
+use axum::{
+    body::{self, Body, Bytes},
+    extract::Request,
+    http::{HeaderMap, HeaderName, Method, StatusCode, header},
+    response::{IntoResponse, Response},
+};
+use faceoff_api::paths::API_BASE;
+use faceoff_store::Store;
+use moka::future::Cache;
+use std::time::Duration;
+
+/// Size of the cache in bytes; a board of a hundred teams has some ten kilobytes.
+const MAX_BYTES: u64 = 32 << 20;
+/// Longer keys are not cached: visitors could fill the memory with them.
+const MAX_KEY_BYTES: usize = 1024;
+/// Lifetime of an entry. The key contains the second, so an entry is used for less.
+const TIME_TO_LIVE: Duration = Duration::from_secs(2);
+/// Largest response; every page and board is smaller.
+const MAX_RESPONSE_BYTES: usize = 64 << 20;
+
+/// Paths of public pages.
+const PAGES: [&str; 5] = [
+    "/",
+    "/season",
+    "/announcements",
+    "/feed.atom",
+    "/tournaments",
+];
+const PAGE_PREFIXES: [&str; 3] = ["/tasks/", "/teams/", "/tournaments/"];
+/// Paths of public API resources.
+const RESOURCES: [&str; 4] = ["/board", "/season", "/stages", "/announcements"];
+const RESOURCE_PREFIXES: [&str; 2] = ["/board/", "/stages/"];
+
+/// Request headers that may change the response.
+const PERSONAL_HEADERS: [HeaderName; 7] = [
+    header::AUTHORIZATION,
+    header::COOKIE,
+    header::IF_NONE_MATCH,
+    header::IF_MODIFIED_SINCE,
+    header::IF_MATCH,
+    header::IF_UNMODIFIED_SINCE,
+    header::RANGE,
+];
+
+/// Everything that a public response depends on.
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+pub struct AnswerKey {
+    uri: String,
+    accept: Option<Vec<u8>>,
+    accept_encoding: Option<Vec<u8>>,
+    /// Number of changes of the season so far.
+    changes: u64,
+    /// Some responses depend on the time.
+    second: i64,
+}
+
+impl AnswerKey {
+    fn length(&self) -> usize {
+        let length = |value: &Option<Vec<u8>>| value.as_ref().map_or(0, Vec::len);
+        self.uri.len() + length(&self.accept) + length(&self.accept_encoding)
+    }
+}
+
+/// A response in memory.
+#[derive(Debug, Clone)]
+struct CachedResponse {
+    status: StatusCode,
+    headers: HeaderMap,
+    body: Bytes,
+}
+
+impl CachedResponse {
+    async fn read(response: Response) -> Self {
+        let (parts, body) = response.into_parts();
+        match body::to_bytes(body, MAX_RESPONSE_BYTES).await {
+            Ok(body) => Self {
+                status: parts.status,
+                headers: parts.headers,
+                body,
+            },
+            Err(error) => {
+                let problem = Problem::internal(format_args!("reading a response: {error}"));
+                let (parts, _) = problem.into_response().into_parts();
+                Self {
+                    status: parts.status,
+                    headers: parts.headers,
+                    body: Bytes::new(),
+                }
+            }
+        }
+    }
+
+    fn bytes(&self) -> u32 {
+        // The rest is an allowance for headers and key, whose length is bounded.
+        u32::try_from(self.body.len() + 4 * MAX_KEY_BYTES).unwrap_or(u32::MAX)
+    }
+}
+
+impl IntoResponse for CachedResponse {
+    fn into_response(self) -> Response {
+        let mut response = Response::new(Body::from(self.body));
+        *response.status_mut() = self.status;
+        *response.headers_mut() = self.headers;
+        response
+    }
+}
+
+/// Cache of public responses.
+#[derive(Debug)]
+pub struct AnswerCache(Cache<AnswerKey, CachedResponse>);
+
+impl AnswerCache {
+    /// The cached response, or the one that `make` computes. Concurrent requests share one computation. Only responses
+    /// with status 200 are cached.
+    pub async fn get(&self, key: AnswerKey, make: impl Future<Output = Response>) -> Response {
+        let made = self.0.try_get_with(key, async {
+            let response = CachedResponse::read(make.await).await;
+            match response.status {
+                StatusCode::OK => Ok(response),
+                _ => Err(response),
+            }
+        });
+        match made.await {
+            Ok(response) => response.into_response(),
+            Err(uncached) => CachedResponse::clone(&uncached).into_response(),
+        }
+    }
+}
+
+impl Default for AnswerCache {
+    fn default() -> Self {
+        let cache = Cache::builder()
+            .max_capacity(MAX_BYTES)
+            .time_to_live(TIME_TO_LIVE)
+            .weigher(|_, response: &CachedResponse| response.bytes());
+        Self(cache.build())
+    }
+}
+
+/// The key of a request's response, if the response is the same for everyone.
+pub fn cache_key(request: &Request, store: &Store, second: i64) -> Option<AnswerKey> {
+    let headers = request.headers();
+    let is_public = request.method() == Method::GET
+        && is_public_path(request.uri().path())
+        && !PERSONAL_HEADERS.iter().any(|name| headers.contains_key(name));
+    let value = |name| headers.get(name).map(|value| value.as_bytes().to_vec());
+    if !is_public {
+        return None;
+    }
+    let key = AnswerKey {
+        uri: request.uri().to_string(),
+        accept: value(header::ACCEPT),
+        accept_encoding: value(header::ACCEPT_ENCODING),
+        changes: store.change_count(),
+        second,
+    };
+    (key.length() <= MAX_KEY_BYTES).then_some(key)
+}
+
+/// Whether a path is a board's page, for which `If-None-Match` is checked before this cache.
+pub fn is_board_page(path: &str) -> bool {
+    path == "/" || path.starts_with("/tasks/")
+}
+
+fn is_public_path(path: &str) -> bool {
+    let is_one_of = |path: &str, exact: &[&str], prefixes: &[&str]| {
+        exact.contains(&path) || prefixes.iter().any(|prefix| path.starts_with(prefix))
+    };
+    match path.strip_prefix(API_BASE) {
+        Some(resource) => is_one_of(resource, &RESOURCES, &RESOURCE_PREFIXES),
+        None => is_one_of(path, &PAGES, &PAGE_PREFIXES),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn personal_paths_are_not_cached() {
+        for path in ["/", "/tasks/hit", "/api/v1/board", "/api/v1/board/hit"] {
+            assert!(is_public_path(path), "{path}");
+        }
+        for path in [
+            "/account",
+            "/metrics",
+            "/api/v1/me",
+            "/api/v1/boards",
+            "/tasks",
+        ] {
+            assert!(!is_public_path(path), "{path}");
+        }
+    }
+}

@@ -1,0 +1,80 @@
+//! Accounts of users who accept an invitation.
+
+use crate::{app::AppState, boxed, problem::Problem, text};
+use faceoff_api::{
+    requests::{self, FoundedTeam},
+    token::{Secret, SecretKind, hash_token},
+};
+use faceoff_store::{JoinOutcome, JoinRequest, TeamProfile, TokenKind};
+use faceoff_types::TeamName;
+use jiff::{SignedDuration, Timestamp};
+
+/// Default validity of an invitation.
+const DEFAULT_VALIDITY: SignedDuration = SignedDuration::from_hours(7 * 24);
+const AFFILIATION_CHARS: usize = 120;
+
+/// When an invitation that is created now expires by default.
+pub(crate) fn default_expiry(now: Timestamp) -> Timestamp {
+    now.saturating_add(DEFAULT_VALIDITY).unwrap_or(Timestamp::MAX)
+}
+
+/// The page of an invitation code: a URL, or a path if the server's public URL is not configured.
+pub fn join_link(app: &AppState, code: &str) -> String {
+    let base = app.config.public_url.as_deref().unwrap_or_default();
+    format!("{base}/join/{code}")
+}
+
+/// A team's name and validated profile.
+pub fn checked_profile(team: FoundedTeam) -> Result<(TeamName, TeamProfile), Problem> {
+    let FoundedTeam {
+        name,
+        affiliation,
+        link,
+        division,
+    } = team;
+    let affiliation = affiliation.map(|line| text::single_line("affiliation", &line, AFFILIATION_CHARS));
+    let profile = TeamProfile {
+        affiliation: affiliation.transpose()?,
+        link: link.map(|link| text::link("link", &link)).transpose()?,
+        division,
+    };
+    Ok((name, profile))
+}
+
+/// Accepts an invitation, and creates a token or a session for the user.
+#[boxed]
+pub async fn join(
+    app: &AppState,
+    join: requests::JoinRequest,
+    kind: TokenKind,
+    expires_at: Option<Timestamp>,
+) -> Result<(JoinOutcome, Secret), Problem> {
+    let now = app.config.clock.now();
+    let code_hash = hash_token(join.code.trim());
+    // Checked before the password is hashed, which is expensive.
+    app.store.code_status(code_hash, now).await?;
+    let team = join.team.map(checked_profile).transpose()?;
+    let password = match join.password {
+        Some(password) => Some(app.passwords.hash(password).await?),
+        None => None,
+    };
+    let (secret_kind, token_name) = match kind {
+        TokenKind::ApiToken => (SecretKind::User, "first"),
+        TokenKind::Session => (SecretKind::Session, "browser"),
+    };
+    let secret = Secret::generate(secret_kind).map_err(Problem::internal)?;
+    let join_request = JoinRequest {
+        code_hash,
+        name: join.name,
+        password,
+        team,
+        accepted_terms: join.accepted_terms,
+        token_hash: secret.hash(),
+        token_kind: kind,
+        token_name: token_name.to_owned(),
+        token_expires_at: expires_at,
+    };
+    let joined = app.store.join(join_request, now).await?;
+    tracing::info!(user = %joined.user.id, name = %joined.user.name, "joined");
+    Ok((joined, secret))
+}

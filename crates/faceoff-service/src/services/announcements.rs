@@ -1,0 +1,99 @@
+//! Announcements, questions with their answers, and the terms.
+
+use crate::{
+    app::AppState,
+    auth::{Caller, TeamCaller},
+    boxed,
+    problem::Problem,
+    text,
+    views::announcement,
+};
+use faceoff_api::{
+    requests::{NewAnnouncement, NewAnswer, NewQuestion, NewTerms},
+    views::announcement::{AnnouncementView, QuestionView, TermsView},
+};
+use faceoff_store::Actor;
+use faceoff_types::QuestionId;
+
+const TITLE_CHARS: usize = 120;
+const TEXT_CHARS: usize = 5_000;
+const QUESTION_CHARS: usize = 2_000;
+const TERMS_CHARS: usize = 20_000;
+
+/// Publishes an announcement. It cannot be changed.
+#[boxed]
+pub async fn announce(
+    app: &AppState,
+    actor: Actor,
+    new: &NewAnnouncement,
+) -> Result<AnnouncementView, Problem> {
+    let title = text::single_line("title", &new.title, TITLE_CHARS)?;
+    let body = text::multi_line("text", &new.text, TEXT_CHARS)?;
+    let now = app.config.clock.now();
+    let announcement = app.store.announce(actor, &title, &body, now).await?;
+    tracing::info!(announcement = %announcement.id, "announcement published");
+    Ok(announcement::view(announcement))
+}
+
+/// Questions, newest first. Visitors see those with a public answer, teams also their own, organisers all.
+#[boxed]
+pub async fn questions(
+    app: &AppState,
+    caller: Option<&Caller>,
+) -> Result<Vec<QuestionView>, Problem> {
+    let questions = app.store.questions().await?.into_iter();
+    let shown = questions.filter_map(|question| {
+        let may_see_team = caller
+            .zip(question.team)
+            .is_some_and(|(caller, team)| caller.may_see(team));
+        let is_public = question
+            .answer
+            .as_ref()
+            .is_some_and(|answer| answer.is_public);
+        (may_see_team || is_public).then(|| announcement::question(question, may_see_team))
+    });
+    Ok(shown.collect())
+}
+
+#[boxed]
+pub async fn ask(
+    app: &AppState,
+    caller: &TeamCaller,
+    new: &NewQuestion,
+) -> Result<QuestionView, Problem> {
+    let text = text::multi_line("text", &new.text, QUESTION_CHARS)?;
+    let now = app.config.clock.now();
+    let team = &caller.team;
+    let question = app.store.ask(caller.actor(), team.id, &text, now).await?;
+    tracing::info!(question = %question.id, team = %team.name, "asked");
+    Ok(announcement::question(question, true))
+}
+
+/// Answers a question, or replaces its answer.
+#[boxed]
+pub async fn answer(
+    app: &AppState,
+    actor: Actor,
+    id: QuestionId,
+    new: &NewAnswer,
+) -> Result<QuestionView, Problem> {
+    let text = text::multi_line("text", &new.text, TEXT_CHARS)?;
+    let now = app.config.clock.now();
+    let question = app.store.answer(actor, id, &text, new.public, now).await?;
+    tracing::info!(question = %id, public = new.public, "answered");
+    Ok(announcement::question(question, true))
+}
+
+/// Publishes a new version of the terms. Teams can upload and activate submissions again once a member has accepted it.
+#[boxed]
+pub async fn publish_terms(
+    app: &AppState,
+    actor: Actor,
+    new: &NewTerms,
+) -> Result<TermsView, Problem> {
+    let text = text::multi_line("text", &new.text, TERMS_CHARS)?;
+    let now = app.config.clock.now();
+    let terms = app.store.publish_terms(actor, &text, now).await?;
+    tracing::info!(version = terms.version, "terms published");
+    Ok(announcement::terms(terms))
+}

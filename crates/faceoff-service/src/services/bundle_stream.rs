@@ -1,0 +1,231 @@
+//! Receives a bundle: streams it to a file, counts and hashes its bytes, and detects its format. A bundle is never held
+//! in memory and never unpacked here.
+
+use crate::{
+    boxed,
+    transfer_rate::{MinTransferRate, TransferRateGuard},
+    problem::{Problem, ProblemKind},
+    free_space,
+};
+use axum::body::{Body, BodyDataStream};
+use faceoff_types::ArchiveFormat;
+use futures::StreamExt;
+use std::path::Path;
+use tempfile::NamedTempFile;
+use tokio::{io::AsyncWriteExt, time::Instant};
+
+/// After a refusal the server reads and discards up to so many bytes. A client that is still sending then gets the
+/// response instead of a broken connection.
+const DRAIN_BYTES: u64 = 64 * 1024 * 1024;
+
+/// Bytes that a refusal of an unknown format quotes. Enough for every magic number except plain tar's.
+const SHOWN_BYTES: usize = 4;
+
+/// A bundle on disk; the file is removed when this is dropped.
+#[derive(Debug)]
+pub struct ReceivedBundle {
+    pub file: NamedTempFile,
+    /// Its size in bytes.
+    pub bytes: u64,
+    /// BLAKE3 of all of its bytes.
+    pub blake3: blake3::Hash,
+    /// Detected from its first bytes.
+    pub format: ArchiveFormat,
+}
+
+/// Size limit of a bundle.
+pub(crate) struct SizeLimit {
+    pub(crate) max_bytes: u64,
+    /// The problem for a larger bundle, given its announced number of bytes.
+    pub exceeded: Box<dyn Fn(Option<u64>) -> Problem + Send + Sync>,
+}
+
+/// A body with a minimum transfer rate.
+struct RateGuardedBody {
+    stream: BodyDataStream,
+    rate: MinTransferRate,
+    guard: TransferRateGuard,
+}
+
+/// Streams `body` into a file under `dir`.
+///
+/// # Errors
+/// The problem of `limit` if the body is larger; `UnsupportedMediaType` for an unknown format; `RequestTimeout` if it is
+/// slower than `rate`; `InvalidRequest` if it is empty or breaks off; `StorageFull` if the disk is full; `Internal` if
+/// writing fails.
+pub(crate) async fn receive(
+    body: Body,
+    announced: Option<u64>,
+    dir: &Path,
+    limit: &SizeLimit,
+    rate: MinTransferRate,
+) -> Result<ReceivedBundle, Problem> {
+    let max_bytes = limit.max_bytes;
+    let mut body = RateGuardedBody::new(body, rate);
+    if let Some(bytes) = announced.filter(|bytes| *bytes > max_bytes) {
+        body.drain(bytes).await;
+        return Err((limit.exceeded)(Some(bytes)));
+    }
+
+    let file = new_file(dir)?;
+    let mut writer = tokio::fs::File::from_std(file.reopen().map_err(Problem::internal)?);
+    let mut hasher = blake3::Hasher::new();
+    let mut head = Vec::with_capacity(ArchiveFormat::LONGEST_MAGIC);
+    let mut format = None;
+    let mut bytes = 0;
+    while let Some(chunk) = body.next_chunk().await? {
+        bytes += chunk.len() as u64;
+        if bytes > max_bytes {
+            body.drain(DRAIN_BYTES).await;
+            return Err((limit.exceeded)(None));
+        }
+        if format.is_none() {
+            let missing = ArchiveFormat::LONGEST_MAGIC - head.len();
+            head.extend_from_slice(&chunk[..missing.min(chunk.len())]);
+            format = ArchiveFormat::detect(&head);
+            if format.is_none() && head.len() == ArchiveFormat::LONGEST_MAGIC {
+                body.drain(announced.unwrap_or(DRAIN_BYTES)).await;
+                return Err(not_an_archive(&head));
+            }
+        }
+        hasher.update(&chunk);
+        if let Err(error) = writer.write_all(&chunk).await {
+            body.drain(announced.unwrap_or(DRAIN_BYTES)).await;
+            return Err(free_space::write_problem(error));
+        }
+    }
+    if bytes == 0 {
+        return Err(Problem::new(
+            ProblemKind::InvalidRequest,
+            "expected a bundle, got an empty body; send the bundle itself (.tar.gz, .tar.zst, .zip, or .tar of a container \
+             image)",
+        ));
+    }
+    let format = format.ok_or_else(|| not_an_archive(&head))?;
+    // The artifact is copied from this file by name, so the writer's buffer must be flushed.
+    writer.flush().await.map_err(free_space::write_problem)?;
+    Ok(ReceivedBundle {
+        file,
+        bytes,
+        blake3: hasher.finalize(),
+        format,
+    })
+}
+
+/// Streams a body of any kind into a file under `dir`.
+///
+/// # Errors
+/// `TooLarge` beyond `max_bytes`; otherwise as [`receive`].
+#[boxed]
+pub async fn receive_file(
+    body: Body,
+    dir: &Path,
+    max_bytes: u64,
+    rate: MinTransferRate,
+) -> Result<NamedTempFile, Problem> {
+    let mut body = RateGuardedBody::new(body, rate);
+    let file = new_file(dir)?;
+    let mut writer = tokio::fs::File::from_std(file.reopen().map_err(Problem::internal)?);
+    let mut bytes = 0;
+    while let Some(chunk) = body.next_chunk().await? {
+        bytes += chunk.len() as u64;
+        if bytes > max_bytes {
+            body.drain(DRAIN_BYTES).await;
+            return Err(too_large(max_bytes, None));
+        }
+        if let Err(error) = writer.write_all(&chunk).await {
+            body.drain(DRAIN_BYTES).await;
+            return Err(free_space::write_problem(error));
+        }
+    }
+    writer.flush().await.map_err(free_space::write_problem)?;
+    Ok(file)
+}
+
+fn new_file(dir: &Path) -> Result<NamedTempFile, Problem> {
+    tempfile::Builder::new()
+        .prefix("upload-")
+        .tempfile_in(dir)
+        .map_err(free_space::write_problem)
+}
+
+/// Reads and discards a body that is refused unread.
+#[boxed]
+pub async fn discard(body: Body, rate: MinTransferRate) {
+    RateGuardedBody::new(body, rate).drain(DRAIN_BYTES).await;
+}
+
+impl RateGuardedBody {
+    fn new(body: Body, rate: MinTransferRate) -> Self {
+        Self {
+            stream: body.into_data_stream(),
+            rate,
+            guard: TransferRateGuard::new(rate),
+        }
+    }
+
+    async fn next_chunk(&mut self) -> Result<Option<axum::body::Bytes>, Problem> {
+        let started = Instant::now();
+        let received = tokio::time::timeout(self.guard.remaining(), self.stream.next()).await;
+        self.guard.record_wait(started.elapsed());
+        match received {
+            Ok(None) => Ok(None),
+            Ok(Some(Ok(chunk))) => {
+                self.guard.transferred(chunk.len());
+                Ok(Some(chunk))
+            }
+            Ok(Some(Err(error))) => Err(Problem::new(
+                ProblemKind::InvalidRequest,
+                format!("the upload was interrupted ({error}); nothing was stored; send it again"),
+            )),
+            Err(_) => Err(too_slow(self.rate)),
+        }
+    }
+
+    /// Reads and discards what the client still sends, up to [`DRAIN_BYTES`].
+    async fn drain(&mut self, at_most: u64) {
+        let mut left = at_most.min(DRAIN_BYTES);
+        while left > 0 {
+            match self.next_chunk().await {
+                Ok(Some(chunk)) => left = left.saturating_sub(chunk.len() as u64),
+                Ok(None) | Err(_) => return,
+            }
+        }
+    }
+}
+
+fn too_slow(rate: MinTransferRate) -> Problem {
+    let MinTransferRate { bytes_per_s, grace } = rate;
+    Problem::new(
+        ProblemKind::RequestTimeout,
+        format!(
+            "the upload was more than {} s behind the minimum rate of {bytes_per_s} bytes per second; nothing was stored; \
+             send it again over a faster connection",
+            grace.as_secs_f64()
+        ),
+    )
+    .with("least_bytes_per_s", bytes_per_s)
+}
+
+pub(crate) fn too_large(max_bytes: u64, announced: Option<u64>) -> Problem {
+    let size = announced.map_or_else(|| "got more".to_owned(), |n| format!("got {n}"));
+    Problem::new(
+        ProblemKind::TooLarge,
+        format!(
+            "expected a bundle of at most {max_bytes} bytes, {size}; leave out what the agent does not need \
+             to run (training data, checkpoints, virtual environments)"
+        ),
+    )
+    .with("limit_bytes", max_bytes)
+}
+
+fn not_an_archive(head: &[u8]) -> Problem {
+    Problem::new(
+        ProblemKind::UnsupportedMediaType,
+        format!(
+            "expected a .tar.gz, .tar.zst or .zip bundle, or the .tar of a container image, got a body that begins with the \
+             bytes {}. Send the bundle file itself as the body, not a form",
+            hex::encode(&head[..head.len().min(SHOWN_BYTES)])
+        ),
+    )
+}

@@ -1,0 +1,44 @@
+//! Decisions of organisers: each has a reason; one that cannot be undone is previewed and confirmed by a name.
+
+use crate::problem::Problem;
+
+/// Longest reason of a decision.
+pub(crate) const MAX_REASON_CHARS: usize = 500;
+
+/// The trimmed reason, if its length is valid.
+pub fn checked_reason(reason: &str) -> Result<&str, Problem> {
+    let reason = reason.trim();
+    let chars = reason.chars().count();
+    if !(1..=MAX_REASON_CHARS).contains(&chars) {
+        let detail = format!("expected 1 to {MAX_REASON_CHARS} characters, got {chars}");
+        return Err(Problem::invalid("reason", detail));
+    }
+    Ok(reason)
+}
+
+/// The effects of a decision, before it is made.
+#[derive(Debug, Clone)]
+pub struct Preview {
+    /// The name that confirms the decision: that of the affected resource.
+    pub name: String,
+    /// What the decision does, as a clause without a full stop.
+    pub effect: String,
+}
+
+impl Preview {
+    /// Refuses a decision that is not confirmed, with its effects.
+    ///
+    /// # Errors
+    /// `NotConfirmed`.
+    pub fn check_confirmed(&self, confirmed: Option<&str>) -> Result<(), Problem> {
+        Problem::check_confirmed(confirmed, &self.name, &self.effect)
+    }
+}
+
+/// The clause that the reason is public; quotes the reason, once there is one.
+pub fn reason_clause(reason: Option<&str>) -> String {
+    match reason {
+        Some(reason) => format!("with the public reason {reason:?}"),
+        None => "with a public reason".to_owned(),
+    }
+}

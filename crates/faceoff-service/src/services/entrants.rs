@@ -1,0 +1,73 @@
+//! Entrants of a tournament.
+
+use crate::{
+    app::AppState,
+    boxed,
+    problem::Problem,
+    views::{board, visibility::Visibility},
+};
+use faceoff_api::requests::BoardQuery;
+use faceoff_scoring::tournament::schedule::MAX_ENTRANTS;
+use faceoff_store::Stage;
+use faceoff_types::{TeamId, TeamName, Tier};
+use std::collections::{BTreeMap, BTreeSet};
+
+/// The teams with these names, ignoring case.
+///
+/// # Errors
+/// `InvalidContent`: a name is unknown, or given twice.
+#[boxed]
+pub async fn find_by_names(
+    app: &AppState,
+    field: &str,
+    names: &[TeamName],
+) -> Result<Vec<TeamId>, Problem> {
+    let folded = |name: &TeamName| name.as_str().to_lowercase();
+    let teams = app.store.teams().await?.into_iter();
+    let teams: BTreeMap<String, TeamId> = teams.map(|team| (folded(&team.name), team.id)).collect();
+    let mut found = Vec::new();
+    let mut seen = BTreeSet::new();
+    for name in names {
+        let Some(id) = teams.get(&folded(name)) else {
+            let detail = format!("there is no team {:?}; check the name", name.as_str());
+            return Err(Problem::invalid(field, detail));
+        };
+        if !seen.insert(*id) {
+            let detail = format!("expected each team once, got {name} twice; remove one of them");
+            return Err(Problem::invalid(field, detail));
+        }
+        found.push(*id);
+    }
+    Ok(found)
+}
+
+/// Refuses more entrants than a schedule supports; teams that left count.
+pub fn check_count(teams: usize) -> Result<(), Problem> {
+    if teams > MAX_ENTRANTS {
+        let detail =
+            format!("expected at most {MAX_ENTRANTS} teams, got {teams}; split them into several tournaments");
+        return Err(Problem::invalid("teams", detail));
+    }
+    Ok(())
+}
+
+/// The teams that are deployable or improvable on a stage's live board under its newest rules, without retired ones.
+#[boxed]
+pub async fn qualified_teams(app: &AppState, stage: &Stage) -> Result<Vec<TeamId>, Problem> {
+    let query = BoardQuery {
+        stage: Some(stage.id),
+        live: true,
+        ..BoardQuery::default()
+    };
+    let visibility = Visibility::for_organiser(app).await?;
+    let board = board::query(app, &visibility, query, None).await?;
+    let teams = app.store.teams().await?.into_iter();
+    let retired: BTreeSet<TeamId> = teams
+        .filter(|team| team.retired_at.is_some())
+        .map(|team| team.id)
+        .collect();
+    let entering = board.rows.into_iter().filter(|row| {
+        matches!(row.tier, Tier::Deployable | Tier::Improvable) && !retired.contains(&row.team_id)
+    });
+    Ok(entering.map(|row| row.team_id).collect())
+}

@@ -1,0 +1,191 @@
+//! Evaluation days and evaluations that an organiser starts, cancels or reruns.
+
+use super::decisions::{Preview, checked_reason, reason_clause};
+use crate::{
+    app::AppState,
+    boxed,
+    problem::{Problem, ProblemKind},
+    views::{day, evaluation, visibility::Visibility, stage},
+};
+use faceoff_api::{
+    requests::NewExtraEvaluation,
+    views::{day::DayView, evaluation::EvaluationView},
+};
+use faceoff_store::{Actor, EvaluationState, Stage, StagePhase, StoreError};
+use faceoff_types::{EvaluationId, StageDay, StageId, TeamId};
+use jiff::{Timestamp, civil::Date};
+
+/// Starts a stage's evaluation day. Default: the open stage.
+#[boxed]
+pub async fn start_day(
+    app: &AppState,
+    actor: Actor,
+    stage: Option<StageId>,
+) -> Result<DayView, Problem> {
+    let now = app.config.clock.now();
+    let stage = match stage {
+        Some(id) => app.store.stage(id).await?,
+        None => open_stage(app, now).await?,
+    };
+    match app.store.start_day(actor, stage.id, now).await {
+        Ok(created) => tracing::info!(
+            stage = %stage.name, evaluations = created.len(), "the day was started"
+        ),
+        Err(StoreError::CutoffPassed { day, cutoff_at }) => {
+            return Err(cutoff_passed(app, &stage, day, cutoff_at).await?);
+        }
+        Err(error) => return Err(error.into()),
+    }
+    day::build(app, stage.day(now)).await
+}
+
+/// The open stage. If none is open, the nearest one: its refusal says when it is open.
+async fn open_stage(app: &AppState, now: Timestamp) -> Result<Stage, Problem> {
+    let mut open = app.store.stages().await?;
+    open.retain(|stage| stage.phase(now) == StagePhase::Open);
+    if open.len() > 1 {
+        let names: Vec<String> = open
+            .iter()
+            .map(|stage| format!("{} ({})", stage.name, stage.id))
+            .collect();
+        let detail = format!(
+            "expected the stage whose day is to start, as several are open; name one of: {}",
+            names.join(", ")
+        );
+        return Err(Problem::invalid("stage", detail));
+    }
+    stage::current(app).await
+}
+
+async fn cutoff_passed(
+    app: &AppState,
+    stage: &Stage,
+    day: Date,
+    cutoff_at: Timestamp,
+) -> Result<Problem, Problem> {
+    let next = day::next_cutoff(app, stage).await?;
+    let when = match &next {
+        Some(next) => {
+            format!("The next cutoff evaluates the submissions that are active then: {next}")
+        }
+        None => "The stage has no further day".to_owned(),
+    };
+    let detail = format!(
+        "{day} had its cutoff at {}, and a day has only one; nothing was started. {when}",
+        cutoff_at.strftime("%Y-%m-%d %H:%M:%S UTC")
+    );
+    let next = serde_json::to_value(next).map_err(Problem::internal)?;
+    Ok(Problem::new(ProblemKind::CutoffPassed, detail)
+        .with("day", day.to_string())
+        .with("cut_at", cutoff_at.to_string())
+        .with("next_cut", next))
+}
+
+/// Starts a missed day of a stage.
+#[boxed]
+pub async fn start_missed_day(
+    app: &AppState,
+    actor: Actor,
+    stage_day: StageDay,
+    reason: &str,
+) -> Result<DayView, Problem> {
+    let reason = checked_reason(reason)?;
+    let now = app.config.clock.now();
+    let stage = app.store.stage(stage_day.stage).await?;
+    let day = stage_day.date;
+    match app.store.start_missed_day(actor, stage_day, reason, now).await {
+        Ok(created) => tracing::info!(
+            stage = %stage.name, %day, evaluations = created.len(), reason, "a missed day was started"
+        ),
+        Err(StoreError::CutoffPassed { day, cutoff_at }) => {
+            return Err(cutoff_passed(app, &stage, day, cutoff_at).await?);
+        }
+        Err(error) => return Err(error.into()),
+    }
+    day::build(app, stage_day).await
+}
+
+/// Preview of an extra evaluation; `None` if it replaces no result that counts.
+#[boxed]
+pub async fn preview_extra_evaluation(
+    app: &AppState,
+    stage_day: StageDay,
+    team: TeamId,
+    reason: Option<&str>,
+) -> Result<Option<Preview>, Problem> {
+    let team = app.store.team(team).await?;
+    let own = app.store.evaluations_of(team.id).await?;
+    let ended = |state: &EvaluationState| {
+        matches!(
+            state,
+            EvaluationState::Finished { .. } | EvaluationState::AgentFailed { .. }
+        )
+    };
+    let replaced = own
+        .iter()
+        .find(|one| one.stage_day == stage_day && one.voided.is_none() && ended(&one.state));
+    Ok(replaced.map(|replaced| Preview {
+        effect: format!(
+            "{} has an evaluation of {} that counts ({}). It would be voided at once, {}, and the team's active submission \
+             evaluated in its place",
+            team.name,
+            stage_day.date,
+            replaced.id,
+            reason_clause(reason)
+        ),
+        name: team.name.to_string(),
+    }))
+}
+
+/// Grants a team one more evaluation for a day.
+#[boxed]
+pub async fn grant_extra_evaluation(
+    app: &AppState,
+    actor: Actor,
+    stage_day: StageDay,
+    wanted: &NewExtraEvaluation,
+) -> Result<EvaluationView, Problem> {
+    let reason = checked_reason(&wanted.reason)?;
+    let team = wanted.team;
+    let preview = preview_extra_evaluation(app, stage_day, team, Some(reason)).await?;
+    if let Some(preview) = &preview {
+        preview.check_confirmed(wanted.confirm.as_deref())?;
+    }
+    let now = app.config.clock.now();
+    let extra = app
+        .store
+        .add_extra_evaluation(actor, stage_day, team, reason, preview.is_some(), now)
+        .await?;
+    tracing::info!(%team, day = %stage_day.date, evaluation = %extra.id, reason, "extra evaluation granted");
+    evaluation::build(app, &Visibility::for_organiser(app).await?, extra).await
+}
+
+/// Cancels an evaluation that has not ended.
+#[boxed]
+pub async fn cancel_evaluation(
+    app: &AppState,
+    actor: Actor,
+    id: EvaluationId,
+    reason: &str,
+) -> Result<EvaluationView, Problem> {
+    let reason = checked_reason(reason)?;
+    let now = app.config.clock.now();
+    app.store.cancel_evaluation(actor, id, reason, now).await?;
+    tracing::info!(evaluation = %id, reason, "evaluation cancelled");
+    let visibility = Visibility::for_organiser(app).await?;
+    evaluation::find(app, &visibility, id).await
+}
+
+/// Reruns an evaluation; returns the new one.
+#[boxed]
+pub async fn rerun_evaluation(
+    app: &AppState,
+    actor: Actor,
+    id: EvaluationId,
+) -> Result<EvaluationView, Problem> {
+    let now = app.config.clock.now();
+    let rerun = app.store.rerun_evaluation(actor, id, now).await?;
+    tracing::info!(evaluation = %id, rerun = %rerun.id, "evaluation is rerun");
+    let visibility = Visibility::for_organiser(app).await?;
+    evaluation::build(app, &visibility, rerun).await
+}

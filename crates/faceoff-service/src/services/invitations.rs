@@ -1,0 +1,132 @@
+//! Invitations: creating, listing and revoking them.
+
+use super::accounts::{default_expiry, join_link};
+use crate::{
+    app::AppState,
+    auth::Caller,
+    boxed,
+    problem::{Problem, ProblemKind},
+    text,
+    views::invitation,
+};
+use faceoff_api::{
+    requests::{self, InvitedRole},
+    token::{Secret, SecretKind},
+    views::invitation::{InvitationView, NewInvitationView},
+};
+use faceoff_store::{Invitation, InvitationRole, NewInvitation, Principal};
+use faceoff_types::InvitationId;
+use jiff::SignedDuration;
+
+/// Longest validity of an invitation.
+const MAX_VALIDITY: SignedDuration = SignedDuration::from_hours(90 * 24);
+const NOTE_CHARS: usize = 80;
+
+fn may_manage(caller: &Caller, invitation: &Invitation) -> bool {
+    match (&caller.principal, invitation.role) {
+        (Principal::Host | Principal::Organiser(_), _) => true,
+        (Principal::Member(_, own), InvitationRole::Member(team)) => own.id == team,
+        (Principal::Member(..) | Principal::Team(_), _) => false,
+    }
+}
+
+/// The role that the caller invites to, if they may.
+fn invited_as(caller: &Caller, new: &requests::NewInvitation) -> Result<InvitationRole, Problem> {
+    let check_absent = |field: &str, is_given: bool| match is_given {
+        true => Err(Problem::invalid(
+            field,
+            "expected no value for this role, got one; leave it out",
+        )),
+        false => Ok(()),
+    };
+    if new.role != InvitedRole::Member {
+        check_absent("team", new.team.is_some())?;
+    }
+    if new.role != InvitedRole::Return {
+        check_absent("person", new.person.is_some())?;
+    }
+    let forbidden = |detail: &str| Err(Problem::new(ProblemKind::Forbidden, detail));
+    match (&caller.principal, new.role) {
+        (Principal::Team(_), _) => {
+            forbidden("a team's token cannot invite; use a member's token, or an organiser's")
+        }
+        (Principal::Member(_, own), InvitedRole::Member) => match new.team {
+            Some(team) if team != own.id => Err(Problem::not_found("team")),
+            _ => Ok(InvitationRole::Member(own.id)),
+        },
+        (Principal::Member(..), _) => forbidden("a member can invite only members of their team"),
+        (_, InvitedRole::Organiser) => Ok(InvitationRole::Organiser),
+        (_, InvitedRole::Founder) => Ok(InvitationRole::Founder),
+        (_, InvitedRole::Member) => new.team.map(InvitationRole::Member).ok_or_else(|| {
+            Problem::invalid(
+                "team",
+                "expected the id of the invited member's team",
+            )
+        }),
+        (_, InvitedRole::Return) => new
+            .person
+            .map(InvitationRole::PasswordReset)
+            .ok_or_else(|| Problem::invalid("person", "expected the id of the returning user")),
+    }
+}
+
+/// The invitations that the caller may manage, newest first.
+#[boxed]
+pub async fn invitations(app: &AppState, caller: &Caller) -> Result<Vec<Invitation>, Problem> {
+    let mut invitations = app.store.invitations().await?;
+    invitations.retain(|invitation| may_manage(caller, invitation));
+    Ok(invitations)
+}
+
+/// Creates an invitation. Only this response contains its link.
+#[boxed]
+pub async fn create_invitation(
+    app: &AppState,
+    caller: &Caller,
+    new: requests::NewInvitation,
+) -> Result<NewInvitationView, Problem> {
+    let invited_as = invited_as(caller, &new)?;
+    let note = text::single_line("note", &new.note, NOTE_CHARS)?;
+    let now = app.config.clock.now();
+    let expires_at = new.expires_at.unwrap_or_else(|| default_expiry(now));
+    if now.duration_until(expires_at) > MAX_VALIDITY {
+        let detail = format!(
+            "expected a time within {} days, got {expires_at}",
+            MAX_VALIDITY.as_hours() / 24
+        );
+        return Err(Problem::invalid("expires_at", detail));
+    }
+    let secret = Secret::generate(SecretKind::Invitation).map_err(Problem::internal)?;
+    let new = NewInvitation {
+        code_hash: secret.hash(),
+        role: invited_as,
+        note,
+        expires_at,
+    };
+    let invitation = app.store.invite(caller.actor(), new, now).await?;
+    tracing::info!(invitation = %invitation.id, actor = %caller.actor(), "invited");
+    Ok(NewInvitationView {
+        invitation: invitation::view(invitation, now),
+        link: join_link(app, secret.as_str()),
+        code: secret.as_str().to_owned(),
+    })
+}
+
+/// Revokes an invitation: its link is invalid from now on.
+#[boxed]
+pub async fn revoke_invitation(
+    app: &AppState,
+    caller: &Caller,
+    id: InvitationId,
+) -> Result<InvitationView, Problem> {
+    let invitations = app.store.invitations().await?;
+    let is_known = invitations
+        .iter()
+        .any(|invitation| invitation.id == id && may_manage(caller, invitation));
+    if !is_known {
+        return Err(Problem::not_found("invitation"));
+    }
+    let now = app.config.clock.now();
+    let invitation = app.store.revoke_invitation(caller.actor(), id, now).await?;
+    Ok(invitation::view(invitation, now))
+}

@@ -1,0 +1,76 @@
+//! Registrations of teams.
+
+use super::{
+    decisions::checked_reason,
+    accounts::{default_expiry, join_link, checked_profile},
+};
+use crate::{app::AppState, boxed, problem::Problem, text, views::invitation};
+use faceoff_api::{
+    requests::RegistrationRequest,
+    token::{Secret, SecretKind},
+    views::invitation::{NewRegistrationView, RegistrationView},
+};
+use faceoff_store::{Actor, NewRegistration};
+use faceoff_types::RegistrationId;
+
+const CONTACT_CHARS: usize = 120;
+
+/// Registers a team. The returned link lets the first member join once the organisers have approved the registration.
+#[boxed]
+pub async fn register(
+    app: &AppState,
+    register: RegistrationRequest,
+) -> Result<NewRegistrationView, Problem> {
+    let contact = text::single_line("contact", &register.contact, CONTACT_CHARS)?;
+    let (team_name, profile) = checked_profile(register.team)?;
+    let secret = Secret::generate(SecretKind::Invitation).map_err(Problem::internal)?;
+    let new = NewRegistration {
+        code_hash: secret.hash(),
+        team_name,
+        profile,
+        contact,
+        accepted_terms: register.accepted_terms,
+    };
+    let now = app.config.clock.now();
+    let registration = app.store.register(new, now).await?;
+    tracing::info!(registration = %registration.id, team = %registration.team_name, "registered");
+    Ok(NewRegistrationView {
+        registration: invitation::registration(registration),
+        join_link: join_link(app, secret.as_str()),
+        code: secret.as_str().to_owned(),
+    })
+}
+
+/// Approves a registration and creates the team.
+#[boxed]
+pub async fn approve_registration(
+    app: &AppState,
+    actor: Actor,
+    id: RegistrationId,
+) -> Result<RegistrationView, Problem> {
+    let now = app.config.clock.now();
+    let (registration, team) = app
+        .store
+        .approve_registration(actor, id, default_expiry(now), now)
+        .await?;
+    tracing::info!(registration = %id, team = %team.name, "registration approved");
+    Ok(invitation::registration(registration))
+}
+
+/// Refuses a registration, with a reason that the team reads.
+#[boxed]
+pub async fn refuse_registration(
+    app: &AppState,
+    actor: Actor,
+    id: RegistrationId,
+    reason: &str,
+) -> Result<RegistrationView, Problem> {
+    let reason = checked_reason(reason)?;
+    let now = app.config.clock.now();
+    let registration = app
+        .store
+        .refuse_registration(actor, id, reason, now)
+        .await?;
+    tracing::info!(registration = %id, reason, "registration refused");
+    Ok(invitation::registration(registration))
+}

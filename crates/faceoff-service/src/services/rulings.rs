@@ -1,0 +1,166 @@
+//! Organisers' decisions about results, teams and the queue.
+
+use super::decisions::{Preview, checked_reason, reason_clause};
+use crate::{
+    app::AppState,
+    boxed,
+    problem::Problem,
+    views::{day, evaluation, visibility::Visibility, team},
+};
+use faceoff_api::{
+    requests::Decision,
+    views::{day::DayView, evaluation::EvaluationView, team::TeamView},
+};
+use faceoff_store::{Actor, EvaluationState};
+use faceoff_types::{EvaluationId, StageDay, TeamId};
+
+/// Preview of voiding an evaluation.
+#[boxed]
+pub async fn preview_void_evaluation(
+    app: &AppState,
+    id: EvaluationId,
+    reason: Option<&str>,
+) -> Result<Preview, Problem> {
+    let visibility = Visibility::for_organiser(app).await?;
+    let view = evaluation::find(app, &visibility, id).await?;
+    let effect = format!(
+        "the evaluation of {} by {} would disappear from the boards for good, {}; it can be rerun",
+        view.day,
+        view.team_name,
+        reason_clause(reason)
+    );
+    let name = view.team_name.to_string();
+    Ok(Preview { name, effect })
+}
+
+/// Voids an evaluation, once that is confirmed.
+#[boxed]
+pub async fn void_evaluation(
+    app: &AppState,
+    actor: Actor,
+    id: EvaluationId,
+    decision: &Decision,
+) -> Result<EvaluationView, Problem> {
+    let reason = checked_reason(&decision.reason)?;
+    let preview = preview_void_evaluation(app, id, Some(reason)).await?;
+    preview.check_confirmed(decision.confirm.as_deref())?;
+    let now = app.config.clock.now();
+    let voided = app.store.void_evaluation(actor, id, reason, now).await?;
+    tracing::info!(evaluation = %id, reason, "evaluation voided");
+    let visibility = Visibility::for_organiser(app).await?;
+    evaluation::build(app, &visibility, voided).await
+}
+
+/// Preview of voiding a day.
+#[boxed]
+pub async fn preview_void_day(
+    app: &AppState,
+    stage_day: StageDay,
+    reason: Option<&str>,
+) -> Result<Preview, Problem> {
+    let (mut ended, mut open) = (0, 0);
+    for evaluation in app.store.evaluations_of_day(stage_day).await? {
+        match evaluation.state {
+            EvaluationState::Finished { .. } | EvaluationState::AgentFailed { .. } => {
+                ended += u32::from(evaluation.voided.is_none());
+            }
+            state => open += u32::from(!state.is_over()),
+        }
+    }
+    let effect = format!(
+        "{ended} evaluations of {} would disappear from the boards for good and {open} unfinished ones be cancelled, {}",
+        stage_day.date,
+        reason_clause(reason)
+    );
+    let name = stage_day.date.to_string();
+    Ok(Preview { name, effect })
+}
+
+/// Voids all evaluations of a day, once that is confirmed.
+#[boxed]
+pub async fn void_day(
+    app: &AppState,
+    actor: Actor,
+    stage_day: StageDay,
+    decision: &Decision,
+) -> Result<DayView, Problem> {
+    let reason = checked_reason(&decision.reason)?;
+    let preview = preview_void_day(app, stage_day, Some(reason)).await?;
+    preview.check_confirmed(decision.confirm.as_deref())?;
+    let now = app.config.clock.now();
+    let voided = app.store.void_day(actor, stage_day, reason, now).await?;
+    tracing::info!(day = %stage_day, voided, reason, "day voided");
+    day::build(app, stage_day).await
+}
+
+/// Pauses the queue: no job starts.
+#[boxed]
+pub async fn pause_queue(app: &AppState, actor: Actor, reason: &str) -> Result<(), Problem> {
+    let reason = checked_reason(reason)?;
+    let now = app.config.clock.now();
+    app.store.pause_queue(actor, reason, now).await?;
+    tracing::info!(reason, "queue paused");
+    Ok(())
+}
+
+/// Resumes the queue.
+#[boxed]
+pub async fn resume_queue(app: &AppState, actor: Actor) -> Result<(), Problem> {
+    let now = app.config.clock.now();
+    app.store.resume_queue(actor, now).await?;
+    tracing::info!("queue resumed");
+    Ok(())
+}
+
+/// Preview of disqualifying a team.
+#[boxed]
+pub async fn preview_disqualification(
+    app: &AppState,
+    id: TeamId,
+    reason: Option<&str>,
+) -> Result<Preview, Problem> {
+    let team = app.store.team(id).await?;
+    let own = app.store.evaluations_of(id).await?;
+    let open = own.iter().filter(|evaluation| !evaluation.state.is_over());
+    let effect = format!(
+        "{} would disappear from all boards, {} of its unfinished evaluations be cancelled, and it could neither upload nor \
+         be evaluated until it is reinstated, {}",
+        team.name,
+        open.count(),
+        reason_clause(reason)
+    );
+    let name = team.name.to_string();
+    Ok(Preview { name, effect })
+}
+
+/// Disqualifies a team, once that is confirmed.
+#[boxed]
+pub async fn disqualify_team(
+    app: &AppState,
+    actor: Actor,
+    id: TeamId,
+    decision: &Decision,
+) -> Result<TeamView, Problem> {
+    let reason = checked_reason(&decision.reason)?;
+    let preview = preview_disqualification(app, id, Some(reason)).await?;
+    preview.check_confirmed(decision.confirm.as_deref())?;
+    let now = app.config.clock.now();
+    let team = app.store.disqualify_team(actor, id, reason, now).await?;
+    tracing::info!(team = %team.name, %id, reason, "team disqualified");
+    Ok(team::view(team))
+}
+
+/// Lifts a team's disqualification.
+#[boxed]
+pub async fn reinstate_team(
+    app: &AppState,
+    actor: Actor,
+    id: TeamId,
+    reason: &str,
+) -> Result<TeamView, Problem> {
+    let reason = checked_reason(reason)?;
+    let now = app.config.clock.now();
+    let team = app.store.reinstate_team(actor, id, reason, now).await?;
+    tracing::info!(team = %team.name, %id, reason, "team reinstated");
+    Ok(team::view(team))
+}

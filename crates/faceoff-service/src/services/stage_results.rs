@@ -1,0 +1,96 @@
+//! Freezing boards, starting a stage's final day, and signing its result off.
+
+use super::decisions::{Preview, checked_reason};
+use crate::{
+    app::AppState,
+    boxed,
+    problem::{Problem, ProblemKind},
+    views::{day, stage},
+};
+use faceoff_api::views::{day::DayView, stage::StageView};
+use faceoff_store::{Actor, StoreError};
+use faceoff_types::StageId;
+
+/// Freezes a stage's boards: later results do not appear on them.
+#[boxed]
+pub async fn freeze_boards(
+    app: &AppState,
+    actor: Actor,
+    id: StageId,
+    reason: &str,
+) -> Result<StageView, Problem> {
+    let reason = checked_reason(reason)?;
+    let now = app.config.clock.now();
+    app.store.freeze_boards(actor, id, reason, now).await?;
+    tracing::info!(stage = %id, reason, "boards frozen");
+    stage::find(app, id).await
+}
+
+/// Unfreezes a stage's boards.
+#[boxed]
+pub async fn unfreeze_boards(
+    app: &AppState,
+    actor: Actor,
+    id: StageId,
+) -> Result<StageView, Problem> {
+    let now = app.config.clock.now();
+    app.store.unfreeze_boards(actor, id, now).await?;
+    tracing::info!(stage = %id, "boards unfrozen");
+    stage::find(app, id).await
+}
+
+/// Starts a stage's final day. This is possible once, after the stage has closed.
+#[boxed]
+pub async fn start_final_day(
+    app: &AppState,
+    actor: Actor,
+    id: StageId,
+) -> Result<DayView, Problem> {
+    let now = app.config.clock.now();
+    let stage = app.store.stage(id).await?;
+    let started = app.store.start_final_day(actor, id, now).await;
+    let created = started.map_err(|error| match error {
+        StoreError::CutoffPassed { day, cutoff_at } => Problem::new(
+            ProblemKind::CutoffPassed,
+            format!(
+                "{day} had its cutoff at {}, and a date has only one; nothing was started. The final day needs a date of its \
+                 own: start it on the next date in {}",
+                cutoff_at.strftime("%Y-%m-%d %H:%M:%S UTC"),
+                stage.zone
+            ),
+        )
+        .with("day", day.to_string())
+        .with("cut_at", cutoff_at.to_string()),
+        error => error.into(),
+    })?;
+    tracing::info!(stage = %stage.name, evaluations = created.len(), "the final day was started");
+    day::build(app, stage.day(now)).await
+}
+
+/// Preview of signing a stage off, if that is possible now.
+#[boxed]
+pub async fn preview_sign_off(app: &AppState, id: StageId) -> Result<Preview, Problem> {
+    let now = app.config.clock.now();
+    let stage = app.store.check_can_sign_off(id, now).await?;
+    let name = stage.name.to_string();
+    let effect = format!(
+        "the result of the stage {name:?} would be signed off for good. None of its evaluations could be voided or rerun, \
+         none of its settings changed, and later disqualifications or reinstatements would not affect its boards"
+    );
+    Ok(Preview { name, effect })
+}
+
+/// Signs a stage's result off, once that is confirmed.
+#[boxed]
+pub async fn finalise_stage(
+    app: &AppState,
+    actor: Actor,
+    id: StageId,
+    confirm: Option<&str>,
+) -> Result<StageView, Problem> {
+    preview_sign_off(app, id).await?.check_confirmed(confirm)?;
+    let now = app.config.clock.now();
+    let done = app.store.sign_off_stage(actor, id, now).await?;
+    tracing::info!(stage = %done.name, %id, "stage signed off");
+    stage::build(app, done).await
+}

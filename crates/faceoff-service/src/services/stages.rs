@@ -1,0 +1,295 @@
+//! Creating and changing stages.
+
+use crate::{app::AppState, boxed, problem::Problem, viewer::Viewer, views::stage};
+use faceoff_api::{
+    requests::{NewStage, StageChange},
+    views::stage::StageView,
+};
+use faceoff_store::{Actor, Stage, StagePhase};
+use faceoff_types::{
+    MismatchSettings, PerturbationSettings, Retention, Ruleset, Runtimes, StageId, StageName,
+    StageRules, StageSettings, CountingResult, Variation,
+};
+
+fn name(text: &str) -> Result<StageName, Problem> {
+    text.parse()
+        .map_err(|error| Problem::invalid("name", error))
+}
+
+fn check(rules: &StageRules, settings: &StageSettings) -> Result<(), Problem> {
+    let checked = rules.check().and_then(|()| settings.check());
+    checked.map_err(|error| Problem::invalid(error.field(), error))
+}
+
+/// Refuses runtimes that the server does not offer.
+pub fn check_offered(app: &AppState, wanted: Option<&Runtimes>) -> Result<(), Problem> {
+    let Some(wanted) = wanted else {
+        return Ok(());
+    };
+    wanted
+        .check()
+        .map_err(|error| Problem::invalid("runtimes", error))?;
+    let runtimes = &app.config.capacity.runtimes;
+    match wanted
+        .names()
+        .find(|name| !runtimes.iter().any(|known| known == name))
+    {
+        Some(name) => {
+            let detail = format!(
+                "expected runtimes that this server offers ({}), got {name:?}; null selects all",
+                runtimes.join(", ")
+            );
+            Err(Problem::invalid("runtimes", detail))
+        }
+        None => Ok(()),
+    }
+}
+
+/// Refuses magnitudes for which no robot of the season exists.
+#[boxed]
+pub async fn check_robot(app: &AppState, settings: &PerturbationSettings) -> Result<(), Problem> {
+    if settings.model_mismatch == MismatchSettings::default() {
+        return Ok(());
+    }
+    let seed = app.store.season().await?.secret.model_mismatch();
+    let [least, most] = settings.model_mismatch.static_error_m;
+    let settings = settings.clone();
+    let has_robot = move || faceoff_dataset::has_robot(&settings, seed);
+    if tokio::task::spawn_blocking(has_robot)
+        .await
+        .map_err(Problem::internal)?
+    {
+        return Ok(());
+    }
+    let detail = format!(
+        "model_mismatch: none of 300 robots drawn from these ranges of mass and gains has a largest static error of \
+         {least} to {most} m (static_error_m); widen one of the ranges"
+    );
+    Err(Problem::invalid("perturbations", detail))
+}
+
+/// Creates a stage. Fields that are left out are copied from the open stage, or from the nearest one.
+#[boxed]
+pub async fn create_stage(
+    app: &AppState,
+    actor: Actor,
+    new: NewStage,
+) -> Result<StageView, Problem> {
+    let template = stage::current(app).await?;
+    let now = app.config.clock.now();
+    check_offered(app, new.runtimes.as_ref().and_then(Option::as_ref))?;
+    let rules = StageRules {
+        ruleset: Ruleset::CURRENT,
+        profile: new.profile.unwrap_or(template.rules.rules.profile),
+        tasks: new.tasks.unwrap_or(template.rules.rules.tasks),
+        episodes_per_task: new
+            .episodes_per_task
+            .unwrap_or(template.rules.rules.episodes_per_task),
+        max_faults: new.max_faults.unwrap_or(template.rules.rules.max_faults),
+        variation: Variation {
+            weights: new.weights.unwrap_or(template.rules.rules.variation.weights),
+            tier_bounds: new
+                .tier_bounds
+                .unwrap_or(template.rules.rules.variation.tier_bounds),
+            perturbations: new
+                .perturbations
+                .unwrap_or(template.rules.rules.variation.perturbations),
+        },
+        limits: new.limits.unwrap_or(template.rules.rules.limits),
+        runtimes: new.runtimes.unwrap_or(template.rules.rules.runtimes),
+    };
+    let default = StageSettings::default();
+    let settings = StageSettings {
+        schedule: new.schedule,
+        ablation_episodes: new.ablation_episodes.unwrap_or(0),
+        episodes_per_shard: new
+            .episodes_per_shard
+            .unwrap_or(template.settings.episodes_per_shard),
+        day_deadline: new.day_deadline.unwrap_or_default(),
+        blind: new.blind.unwrap_or(default.blind),
+        publishes: new.publishes.unwrap_or(default.publishes),
+        standings: new.standings.unwrap_or(default.standings),
+        uploads: new.uploads.unwrap_or(template.settings.uploads),
+    };
+    check(&rules, &settings)?;
+    let retention = checked_retention(new.retention)?.unwrap_or_default();
+    check_robot(app, &rules.variation.perturbations).await?;
+    let new_stage = faceoff_store::NewStage {
+        name: name(&new.name)?,
+        opens_at: new.opens_at.unwrap_or(now),
+        closes_at: new.closes_at,
+        zone: new.zone.unwrap_or(template.zone),
+        rules,
+        settings,
+    };
+    let created = app
+        .store
+        .create_stage_with_retention(actor, new_stage, retention, now)
+        .await?;
+    tracing::info!(stage = %created.name, id = %created.id, "stage created");
+    let view = stage::build(app, created).await?;
+    stage::for_viewer(view, app, Viewer::Organiser).await
+}
+
+/// Changes a stage. A change that begins a new revision, reorders a board or removes files must be confirmed with the
+/// stage's name.
+#[boxed]
+pub async fn change_stage(
+    app: &AppState,
+    actor: Actor,
+    id: StageId,
+    change: StageChange,
+) -> Result<StageView, Problem> {
+    let stage = app.store.stage(id).await?;
+    let now = app.config.clock.now();
+    let current = &stage.rules.rules;
+    let has_new_rules = change.profile.is_some()
+        || change.tasks.is_some()
+        || change.episodes_per_task.is_some()
+        || change.max_faults.is_some()
+        || change.weights.is_some()
+        || change.tier_bounds.is_some()
+        || change.perturbations.is_some()
+        || change.limits.is_some()
+        || change.runtimes.is_some();
+    check_offered(app, change.runtimes.as_ref().and_then(Option::as_ref))?;
+    let rules = StageRules {
+        // An upgrade of the server alone does not change a stage.
+        ruleset: if has_new_rules {
+            Ruleset::CURRENT
+        } else {
+            current.ruleset
+        },
+        profile: change.profile.unwrap_or(current.profile),
+        tasks: change.tasks.unwrap_or_else(|| current.tasks.clone()),
+        episodes_per_task: change.episodes_per_task.unwrap_or(current.episodes_per_task),
+        max_faults: change.max_faults.unwrap_or(current.max_faults),
+        variation: Variation {
+            weights: change.weights.unwrap_or(current.variation.weights),
+            tier_bounds: change.tier_bounds.unwrap_or(current.variation.tier_bounds),
+            perturbations: change
+                .perturbations
+                .unwrap_or_else(|| current.variation.perturbations.clone()),
+        },
+        limits: change.limits.unwrap_or_else(|| current.limits.clone()),
+        runtimes: change.runtimes.unwrap_or_else(|| current.runtimes.clone()),
+    };
+    let settings = StageSettings {
+        schedule: change
+            .schedule
+            .unwrap_or_else(|| stage.settings.schedule.clone()),
+        ablation_episodes: change
+            .ablation_episodes
+            .unwrap_or(stage.settings.ablation_episodes),
+        episodes_per_shard: change
+            .episodes_per_shard
+            .unwrap_or(stage.settings.episodes_per_shard),
+        day_deadline: change.day_deadline.unwrap_or(stage.settings.day_deadline),
+        blind: change.blind.unwrap_or(stage.settings.blind),
+        publishes: change.publishes.unwrap_or(stage.settings.publishes),
+        standings: change.standings.unwrap_or(stage.settings.standings),
+        uploads: change.uploads.unwrap_or(stage.settings.uploads),
+    };
+    check(&rules, &settings)?;
+    let retention = checked_retention(change.retention)?;
+    if rules.variation.perturbations != current.variation.perturbations {
+        check_robot(app, &rules.variation.perturbations).await?;
+    }
+    let mut effects = Vec::new();
+    if stage.phase(now) == StagePhase::Open {
+        let new_revision = (rules != *current).then(|| new_revision_effect(&stage));
+        let reordering = (settings.standings != stage.settings.standings)
+            .then(|| reordering_effect(&stage, settings.standings));
+        effects.extend(new_revision.into_iter().chain(reordering));
+    }
+    if let Some(retention) = &retention {
+        effects.extend(retention_effect(app, &stage, retention).await?);
+    }
+    check_confirmed(&stage, &effects, change.confirm.as_deref())?;
+    let stage_change = faceoff_store::StageChange {
+        name: change.name.as_deref().map(name).transpose()?,
+        opens_at: change.opens_at,
+        closes_at: change.closes_at,
+        zone: change.zone,
+        rules: Some(rules),
+        settings: Some(settings),
+        retention,
+    };
+    let changed = app.store.change_stage(actor, id, stage_change, now).await?;
+    tracing::info!(stage = %changed.name, %id, revision = changed.rules.number, "stage changed");
+    let view = stage::build(app, changed).await?;
+    stage::for_viewer(view, app, Viewer::Organiser).await
+}
+
+fn checked_retention(retention: Option<Retention>) -> Result<Option<Retention>, Problem> {
+    if let Some(retention) = &retention {
+        let checked = retention.check();
+        checked.map_err(|error| Problem::invalid("retention", error))?;
+    }
+    Ok(retention)
+}
+
+/// The files that a new retention would remove, in words.
+async fn retention_effect(
+    app: &AppState,
+    stage: &Stage,
+    retention: &Retention,
+) -> Result<Option<String>, Problem> {
+    if app.store.stage_retention(stage.id).await? == *retention {
+        return Ok(None);
+    }
+    let now = app.config.clock.now();
+    let removed = app.store.preview_removal(stage.id, retention, now).await?;
+    if removed.is_empty() {
+        return Ok(None);
+    }
+    let unmeasured = match removed.unmeasured {
+        0 => String::new(),
+        unmeasured => format!(", without {unmeasured} datasets that are not measured yet"),
+    };
+    let time = match removed.later_from {
+        None => "at once".to_owned(),
+        Some(at) => format!(
+            "some of it not before {}",
+            at.strftime("%Y-%m-%d at %H:%M UTC")
+        ),
+    };
+    Ok(Some(format!(
+        "the stage {:?} would keep {retention}; {} datasets of {} teams and {} bundles of submissions that are no longer \
+         used ({} bytes{unmeasured}) would be removed for good, {time}, but only once nothing of the stage is running, \
+         undecided or blind; results stay",
+        stage.name.as_str(),
+        removed.datasets,
+        removed.teams,
+        removed.bundles,
+        removed.bytes
+    )))
+}
+
+fn new_revision_effect(stage: &Stage) -> String {
+    let number = stage.rules.number;
+    format!(
+        "new rules begin revision {} with an empty board; results of revision {number} stay on their own board; this \
+         cannot be undone",
+        number + 1
+    )
+}
+
+fn reordering_effect(stage: &Stage, standings: CountingResult) -> String {
+    format!(
+        "the rows of its boards would be selected by {standings} instead of {}, at once, from all results",
+        stage.settings.standings
+    )
+}
+
+/// Refuses a change with these effects unless it is confirmed with the stage's name.
+fn check_confirmed(
+    stage: &Stage,
+    effects: &[String],
+    confirm: Option<&str>,
+) -> Result<(), Problem> {
+    if effects.is_empty() {
+        return Ok(());
+    }
+    Problem::check_confirmed(confirm, stage.name.as_str(), &effects.join("; "))
+}

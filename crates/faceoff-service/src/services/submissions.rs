@@ -1,0 +1,92 @@
+//! Activating, withdrawing and describing submissions.
+
+use crate::{
+    app::AppState,
+    auth::TeamCaller,
+    boxed,
+    problem::{Problem, ProblemKind},
+    views::submission,
+};
+use faceoff_api::{requests::SubmissionChange, views::submission::SubmissionView};
+use faceoff_store::SubmissionDescription;
+use faceoff_types::SubmissionId;
+
+/// Longest label of a submission.
+const MAX_LABEL_CHARS: usize = 80;
+
+/// Longest note on a submission.
+const MAX_NOTE_CHARS: usize = 2000;
+
+async fn check_own(app: &AppState, caller: &TeamCaller, id: SubmissionId) -> Result<(), Problem> {
+    let found = app.store.submission(id).await;
+    caller.visible("submission", found, |submission| submission.team)?;
+    Ok(())
+}
+
+/// Activates a submission: the next cutoff evaluates it.
+#[boxed]
+pub async fn activate_submission(
+    app: &AppState,
+    caller: &TeamCaller,
+    id: SubmissionId,
+) -> Result<SubmissionView, Problem> {
+    let (actor, name) = (caller.actor(), &caller.team.name);
+    check_own(app, caller, id).await?;
+    let now = app.config.clock.now();
+    let submission = app.store.activate_submission(actor, id, now).await?;
+    tracing::info!(team = %name, submission = %id, "submission activated");
+    submission::build(app, submission).await
+}
+
+/// Withdraws a submission from further evaluations.
+#[boxed]
+pub async fn withdraw_submission(
+    app: &AppState,
+    caller: &TeamCaller,
+    id: SubmissionId,
+) -> Result<SubmissionView, Problem> {
+    let (actor, name) = (caller.actor(), &caller.team.name);
+    check_own(app, caller, id).await?;
+    let now = app.config.clock.now();
+    let submission = app.store.withdraw_submission(actor, id, now).await?;
+    tracing::info!(team = %name, submission = %id, "submission withdrawn");
+    submission::build(app, submission).await
+}
+
+/// Changes label and note of a submission.
+#[boxed]
+pub async fn describe_submission(
+    app: &AppState,
+    caller: &TeamCaller,
+    id: SubmissionId,
+    change: &SubmissionChange,
+) -> Result<SubmissionView, Problem> {
+    check_own(app, caller, id).await?;
+    let description = SubmissionDescription {
+        label: checked_text("label", &change.label, MAX_LABEL_CHARS)?,
+        note: checked_text("note", &change.note, MAX_NOTE_CHARS)?,
+    };
+    if description.label.is_none() && description.note.is_none() {
+        let detail = "expected label, note, or both, got neither; add one of them";
+        return Err(Problem::new(ProblemKind::InvalidContent, detail));
+    }
+    let (actor, now) = (caller.actor(), app.config.clock.now());
+    let submission = app.store.describe_submission(actor, id, description, now).await?;
+    submission::build(app, submission).await
+}
+
+/// The trimmed text, if it is not too long.
+#[expect(clippy::option_option, reason = "null differs from a field that is left out")]
+fn checked_text<'t>(
+    field: &str,
+    text: &'t Option<Option<String>>,
+    max_chars: usize,
+) -> Result<Option<Option<&'t str>>, Problem> {
+    let text = text.as_ref().map(|text| text.as_deref().map(str::trim));
+    let chars = text.flatten().map_or(1, |text| text.chars().count());
+    if !(1..=max_chars).contains(&chars) {
+        let detail = format!("expected 1 to {max_chars} characters, or null, got {chars}");
+        return Err(Problem::invalid(field, detail));
+    }
+    Ok(text)
+}

@@ -1,0 +1,94 @@
+//! Changes of teams and of the season, by teams and organisers.
+
+use super::accounts::checked_profile;
+use crate::{
+    app::AppState,
+    auth::Caller,
+    boxed,
+    problem::{Problem, ProblemKind},
+    views::team,
+};
+use faceoff_api::{
+    requests::{self, SeasonChange},
+    views::team::TeamView,
+};
+use faceoff_store::{Actor, Team, TeamChange, TeamProfile};
+use faceoff_types::TeamId;
+
+/// The team, if the caller may change it: a member their own, an organiser any.
+#[boxed]
+pub async fn find_own(app: &AppState, caller: &Caller, id: TeamId) -> Result<Team, Problem> {
+    let team = app.store.team(id).await;
+    let team = caller.visible("team", team, |team| team.id)?;
+    // A leaked team token must not rename the team or retire it.
+    if caller.user().is_none() && !caller.is_organiser() {
+        return Err(Problem::new(
+            ProblemKind::Forbidden,
+            "a team's token cannot change the team; use a member's token, or an organiser's",
+        ));
+    }
+    Ok(team)
+}
+
+/// Changes a team's name or profile. Only organisers change its division and whether it is a baseline.
+#[boxed]
+pub async fn change_team(
+    app: &AppState,
+    caller: &Caller,
+    id: TeamId,
+    change: requests::TeamChange,
+) -> Result<TeamView, Problem> {
+    let team = find_own(app, caller, id).await?;
+    if change.division.is_some() && !caller.is_organiser() {
+        return Err(Problem::new(
+            ProblemKind::Forbidden,
+            "division: only an organiser can change a team's division",
+        ));
+    }
+    if change.baseline.is_some() && !caller.is_organiser() {
+        return Err(Problem::new(
+            ProblemKind::Forbidden,
+            "baseline: only an organiser can change whether a team is a baseline",
+        ));
+    }
+    let described = requests::FoundedTeam {
+        name: change.name.clone().unwrap_or_else(|| team.name.clone()),
+        affiliation: change.affiliation.unwrap_or(team.profile.affiliation),
+        link: change.link.unwrap_or(team.profile.link),
+        division: change.division.unwrap_or(team.profile.division),
+    };
+    let declines = change.declines_friendly_games;
+    let (_, profile): (_, TeamProfile) = checked_profile(described)?;
+    let change = TeamChange {
+        name: change.name,
+        profile: Some(profile),
+        baseline: change.baseline,
+    };
+    let now = app.config.clock.now();
+    let team = app
+        .store
+        .change_team(caller.actor(), id, change, now)
+        .await?;
+    if let Some(declines) = declines {
+        app.store
+            .set_declines_friendly_games(caller.actor(), id, declines, now)
+            .await?;
+    }
+    tracing::info!(team = %team.name, %id, actor = %caller.actor(), "team changed");
+    team::find(app, id).await
+}
+
+/// Changes whether teams can register, and the divisions.
+#[boxed]
+pub async fn change_season(
+    app: &AppState,
+    actor: Actor,
+    change: &SeasonChange,
+) -> Result<(), Problem> {
+    let now = app.config.clock.now();
+    let (registrations, divisions) = (change.takes_registrations, change.divisions.as_deref());
+    app.store
+        .change_season(actor, registrations, divisions, now)
+        .await?;
+    Ok(())
+}

@@ -1,0 +1,149 @@
+//! API tokens: listing, creating, rotating and revoking them.
+
+use crate::{
+    app::AppState,
+    auth::Caller,
+    boxed,
+    problem::{Problem, ProblemKind},
+    text,
+    views::token,
+};
+use faceoff_api::{
+    requests,
+    token::{Secret, SecretKind},
+    views::token::{NewTokenView, TokenView},
+};
+use faceoff_store::{NewToken, StoreError, Token, TokenKind, TokenOwner, Principal};
+use faceoff_types::{TeamId, TokenId};
+
+/// Longest name of a token.
+const NAME_CHARS: usize = 80;
+
+/// Whether the caller may see and revoke a token: organisers all, a member their own and the team's, a team's API client
+/// the team's.
+fn may_manage(caller: &Caller, token: &Token) -> bool {
+    match (&caller.principal, token.owner) {
+        (Principal::Host | Principal::Organiser(_), _) => true,
+        (Principal::Team(team), TokenOwner::Team(id)) => team.id == id,
+        (Principal::Member(_, team), TokenOwner::Team(id)) => team.id == id,
+        (Principal::Member(user, _), TokenOwner::User(id)) => user.id == id,
+        (Principal::Team(_) | Principal::Member(..), _) => false,
+    }
+}
+
+async fn find(app: &AppState, caller: &Caller, id: TokenId) -> Result<Token, Problem> {
+    match app.store.token(id).await {
+        Ok(token) if may_manage(caller, &token) => Ok(token),
+        Ok(_) | Err(StoreError::NotFound(_)) => Err(Problem::not_found("token")),
+        Err(error) => Err(error.into()),
+    }
+}
+
+/// The tokens and sessions that the caller may manage, newest first.
+#[boxed]
+pub async fn tokens(app: &AppState, caller: &Caller) -> Result<Vec<Token>, Problem> {
+    let mut tokens = app.store.tokens().await?;
+    tokens.retain(|token| may_manage(caller, token));
+    Ok(tokens)
+}
+
+/// The owner of a new token.
+fn owner(caller: &Caller, team: Option<TeamId>) -> Result<TokenOwner, Problem> {
+    match (&caller.principal, team) {
+        (Principal::Host, None) => Ok(TokenOwner::Host),
+        (Principal::Organiser(user) | Principal::Member(user, _), None) => {
+            Ok(TokenOwner::User(user.id))
+        }
+        (Principal::Host | Principal::Organiser(_), Some(id)) => Ok(TokenOwner::Team(id)),
+        (Principal::Member(_, own), Some(id)) if own.id == id => Ok(TokenOwner::Team(id)),
+        (Principal::Member(..), Some(_)) => Err(Problem::not_found("team")),
+        // A leaked team token must not create tokens that outlive it.
+        (Principal::Team(_), _) => Err(Problem::new(
+            ProblemKind::Forbidden,
+            "a team's token cannot create tokens; use a member's token, or an organiser's",
+        )),
+    }
+}
+
+/// Creates a token. Only this response contains its secret.
+#[boxed]
+pub async fn create_token(
+    app: &AppState,
+    caller: &Caller,
+    new: requests::NewToken,
+) -> Result<NewTokenView, Problem> {
+    let owner = owner(caller, new.team)?;
+    let name = text::single_line("name", &new.name, NAME_CHARS)?;
+    let kind = match owner {
+        TokenOwner::Host => SecretKind::Admin,
+        TokenOwner::Team(id) => {
+            app.store.team(id).await?;
+            SecretKind::Team
+        }
+        TokenOwner::User(_) => SecretKind::User,
+    };
+    let secret = Secret::generate(kind).map_err(Problem::internal)?;
+    let new = NewToken {
+        hash: secret.hash(),
+        kind: TokenKind::ApiToken,
+        owner,
+        name,
+        expires_at: new.expires_at,
+    };
+    let now = app.config.clock.now();
+    let token = app.store.create_token(caller.actor(), new, now).await?;
+    tracing::info!(token = %token.id, actor = %caller.actor(), "token created");
+    Ok(NewTokenView {
+        token: token::view(token),
+        secret: secret.as_str().to_owned(),
+    })
+}
+
+/// Replaces a token's secret. Only this response contains the new one.
+#[boxed]
+pub async fn rotate_token(
+    app: &AppState,
+    caller: &Caller,
+    id: TokenId,
+) -> Result<NewTokenView, Problem> {
+    let token = find(app, caller, id).await?;
+    // The secret of another user's token would allow acting as that user.
+    if let TokenOwner::User(owner) = token.owner
+        && caller.user().is_none_or(|user| user.id != owner)
+    {
+        return Err(Problem::new(
+            ProblemKind::Forbidden,
+            "a user's token can be rotated only by that user; you can revoke it (DELETE /api/v1/tokens/ID)",
+        ));
+    }
+    let kind = match token.owner {
+        TokenOwner::Host => SecretKind::Admin,
+        TokenOwner::Team(_) => SecretKind::Team,
+        TokenOwner::User(_) => SecretKind::User,
+    };
+    let secret = Secret::generate(kind).map_err(Problem::internal)?;
+    let (actor, now) = (caller.actor(), app.config.clock.now());
+    let token = app
+        .store
+        .rotate_token(actor, id, secret.hash(), now)
+        .await?;
+    tracing::info!(token = %id, actor = %caller.actor(), "token rotated");
+    Ok(NewTokenView {
+        token: token::view(token),
+        secret: secret.as_str().to_owned(),
+    })
+}
+
+/// Revokes a token: it is invalid from now on.
+#[boxed]
+pub async fn revoke_token(
+    app: &AppState,
+    caller: &Caller,
+    id: TokenId,
+) -> Result<TokenView, Problem> {
+    find(app, caller, id).await?;
+    let now = app.config.clock.now();
+    let token = app.store.revoke_token(caller.actor(), id, now).await?;
+    tracing::info!(token = %id, actor = %caller.actor(), "token revoked");
+    Ok(token::view(token))
+}

@@ -1,0 +1,76 @@
+//! Starting the next round of a tournament, drawn from the results so far.
+
+use crate::{
+    app::AppState,
+    boxed,
+    problem::{Problem, ProblemKind},
+    views::tournament_state::TournamentState,
+};
+use faceoff_scoring::tournament::schedule::{Matchday, Round};
+use faceoff_store::{Actor, DrawnMatchday, DrawnRound, TournamentRound};
+use faceoff_types::{TeamId, TeamName, TournamentId};
+
+/// Draws and starts the next round. The store refuses the draw if another request has started the round meanwhile.
+#[boxed]
+pub async fn start_round(
+    app: &AppState,
+    actor: Actor,
+    id: TournamentId,
+) -> Result<TournamentRound, Problem> {
+    let state = TournamentState::find(app, id).await?;
+    let conflict = |detail: String| Problem::new(ProblemKind::Conflict, detail);
+    if state.tournament.closed_at.is_some() {
+        return Err(conflict(
+            "the tournament is closed; no further round starts".to_owned(),
+        ));
+    }
+    // One half of a mirrored pair is enough for the scoring, so both have to be complete.
+    let open = state.games.iter().filter(|game| state.needs_result(game));
+    let open = open.count();
+    if open > 0 {
+        let round = state.rounds.len();
+        return Err(conflict(format!(
+            "round {round} is running: {open} of its games have no result, and the next round is drawn from all results. \
+             Wait, rerun void and failed games (POST /api/v1/games/ID/rerun), or withdraw a team"
+        )));
+    }
+    let secret = app.store.season().await?.secret;
+    let next_round = state
+        .next_round(&secret)
+        .map_err(|error| conflict(error.to_string()))?;
+    let Some(next_round) = next_round else {
+        return Err(conflict(format!(
+            "all {} rounds of the tournament are over; close it, or create another one",
+            state.rounds.len()
+        )));
+    };
+    let round = with_team_ids(&state, &next_round)?;
+    let now = app.config.clock.now();
+    Ok(app.store.start_round(actor, id, &round, now).await?)
+}
+
+/// The round with team ids in place of names.
+fn with_team_ids(state: &TournamentState, round: &Round) -> Result<DrawnRound, Problem> {
+    let ids = |names: &Vec<TeamName>| -> Result<Vec<TeamId>, Problem> {
+        names.iter().map(|name| state.team(name)).collect()
+    };
+    let matchday = |day: &Matchday| {
+        let games = day
+            .pairings
+            .iter()
+            .map(|pairing| Ok([state.team(&pairing.home)?, state.team(&pairing.away)?]));
+        Ok::<_, Problem>(DrawnMatchday {
+            games: games.collect::<Result<_, Problem>>()?,
+            byes: ids(&day.byes)?,
+        })
+    };
+    Ok(DrawnRound {
+        number: round.number,
+        groups: round.groups.iter().map(ids).collect::<Result<_, _>>()?,
+        matchdays: round
+            .matchdays
+            .iter()
+            .map(matchday)
+            .collect::<Result<_, _>>()?,
+    })
+}

@@ -1,0 +1,84 @@
+//! Users: listing them, closing accounts, and accepting terms.
+
+use crate::{
+    app::AppState,
+    auth::Caller,
+    boxed,
+    problem::{Problem, ProblemKind},
+};
+use faceoff_store::{User, StoreError, Principal};
+use faceoff_types::UserId;
+
+/// The users whom the caller may see: organisers all, a team its members.
+#[boxed]
+pub async fn list_users(app: &AppState, caller: &Caller) -> Result<Vec<User>, Problem> {
+    let users = match caller.team() {
+        Some(team) => app.store.members_of(team.id).await?,
+        None => app.store.users().await?,
+    };
+    Ok(users)
+}
+
+/// The user, if the caller may act for them: an organiser, or the user. A teammate gets `Forbidden`, others `NotFound`.
+#[boxed]
+pub async fn find(app: &AppState, caller: &Caller, id: UserId) -> Result<User, Problem> {
+    let user = match app.store.user(id).await {
+        Ok(user) => user,
+        Err(StoreError::NotFound(_)) => return Err(Problem::not_found("user")),
+        Err(error) => return Err(error.into()),
+    };
+    let is_self = caller.user().is_some_and(|own| own.id == id);
+    if caller.is_organiser() || is_self {
+        return Ok(user);
+    }
+    match (&caller.principal, user.team) {
+        (Principal::Member(_, own) | Principal::Team(own), Some(team)) if own.id == team => Err(Problem::new(
+            ProblemKind::Forbidden,
+            "only this user or an organiser may do this",
+        )),
+        _ => Err(Problem::not_found("user")),
+    }
+}
+
+/// Closes a user's account, once that is confirmed with the user's name.
+#[boxed]
+pub async fn remove_user(
+    app: &AppState,
+    caller: &Caller,
+    id: UserId,
+    confirm: Option<&str>,
+) -> Result<User, Problem> {
+    let user = find(app, caller, id).await?;
+    let effect = format!(
+        "the account of {} would be closed at once and for good, and all of its tokens and sessions revoked; the name \
+         stays in the event log",
+        user.name
+    );
+    Problem::check_confirmed(confirm, user.name.as_str(), &effect)?;
+    let now = app.config.clock.now();
+    let user = app.store.remove_user(caller.actor(), id, now).await?;
+    tracing::info!(user = %id, actor = %caller.actor(), "user removed");
+    Ok(user)
+}
+
+/// Accepts the terms for the calling user.
+#[boxed]
+pub async fn accept_terms(
+    app: &AppState,
+    caller: &Caller,
+    version: u32,
+) -> Result<User, Problem> {
+    let Some(user) = caller.user() else {
+        return Err(Problem::new(
+            ProblemKind::Forbidden,
+            "expected a user's token, got a team's or the host's; a member of the team accepts the terms with their own \
+             token",
+        ));
+    };
+    let now = app.config.clock.now();
+    let accepted = app
+        .store
+        .accept_terms(caller.actor(), user.id, version, now)
+        .await?;
+    Ok(accepted)
+}

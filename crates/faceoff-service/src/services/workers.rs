@@ -1,0 +1,33 @@
+//! Decisions about remote workers.
+
+use super::decisions::checked_reason;
+use crate::{app::AppState, boxed, problem::Problem};
+use faceoff_store::{Actor, WorkerName};
+
+/// Bans a worker, whose results are rejected from now on. Returns the number of shards that are run again.
+#[boxed]
+pub async fn ban_worker(
+    app: &AppState,
+    actor: Actor,
+    worker: &WorkerName,
+    reason: &str,
+) -> Result<u32, Problem> {
+    let reason = checked_reason(reason)?;
+    let now = app.config.clock.now();
+    let requeued = app.store.ban_worker(actor, worker, reason, now).await?;
+    tracing::info!(%worker, reason, requeued, "worker banned");
+    Ok(requeued)
+}
+
+/// Lifts a worker's ban.
+#[boxed]
+pub async fn readmit_worker(
+    app: &AppState,
+    actor: Actor,
+    worker: &WorkerName,
+) -> Result<(), Problem> {
+    let now = app.config.clock.now();
+    app.store.readmit_worker(actor, worker, now).await?;
+    tracing::info!(%worker, "worker readmitted");
+    Ok(())
+}

@@ -1,0 +1,12 @@
+//! The sign-off of a stage's result.
+
+use faceoff_api::views::sign_off::SignOffView;
+use faceoff_store::SignOff;
+
+
+pub fn view(finalised: SignOff) -> SignOffView {
+    SignOffView {
+        at: finalised.at,
+        by: finalised.by.to_string(),
+    }
+}

@@ -1,0 +1,73 @@
+use crate::{
+    boxed,
+    error::{Result, StoreError},
+    event::{Actor, Event, Subject},
+    operations::{purpose, runs},
+    queries,
+    store::Store,
+    tables::{
+        ablations::{self, Ablation},
+        plan::RunPlan,
+        runs::Run,
+        season,
+        submissions::{self, SubmissionState},
+    },
+};
+use faceoff_types::{AblationId, Profile, Ruleset, RunId, SeedLabel, SubmissionId, Task};
+use jiff::Timestamp;
+
+impl Store {
+    /// Queues an ablation of a valid submission: every task in every ablation profile, otherwise as `plan` says.
+    /// [`StoreError::Conflict`] if the submission is not valid, or has an open ablation;
+    /// [`StoreError::SeasonClosed`] once the season is over.
+    #[boxed]
+    pub async fn request_ablation(
+        &self,
+        actor: Actor,
+        submission: SubmissionId,
+        plan: &RunPlan,
+        now: Timestamp,
+    ) -> Result<Ablation> {
+        let plan = RunPlan {
+            tasks: Task::ALL.to_vec(),
+            ..plan.clone()
+        };
+        plan.check()?;
+        self.write(actor, now, async |tx| {
+            season::check_open(tx).await?;
+            let ablated = submissions::find(tx, submission).await?;
+            if ablated.state != SubmissionState::Valid {
+                return Err(StoreError::Conflict(
+                    "only a valid submission can be ablated: wait for its validation run, or upload a \
+                     corrected one"
+                        .into(),
+                ));
+            }
+            let id = AblationId::new();
+            ablations::insert(tx, id, submission, now).await?;
+            for profile in Profile::ABLATION {
+                let run = Run {
+                    id: RunId::new(),
+                    ruleset: Ruleset::CURRENT,
+                    plan: RunPlan {
+                        profile,
+                        ..plan.clone()
+                    },
+                    seed: SeedLabel::Ablation,
+                    keeps_recordings: false,
+                };
+                let (job, team) = (purpose::ABLATION_SHARD, ablated.team);
+                runs::queue_run(tx, &run, &[submission], job, team).await?;
+                ablations::insert_run(tx, id, run.id).await?;
+            }
+            let event = Event::AblationOrdered {
+                submission,
+                episodes_per_task: plan.episodes_per_task,
+            };
+            tx.record(Subject::Ablation(id), event);
+            let ablation = queries::ablations::newest(tx, submission).await?;
+            ablation.ok_or(StoreError::NotFound("ablation"))
+        })
+        .await
+    }
+}

@@ -1,0 +1,110 @@
+use crate::{
+    boxed,
+    error::Result,
+    event::Actor,
+    queue::JobClaim,
+    store::Store,
+    tables::{bundles, proposed_evaluations, runs},
+};
+use faceoff_types::RunId;
+use jiff::{SignedDuration, Timestamp};
+
+/// Time for which the recordings of an ended evaluation are kept. A backup copies the database first
+/// and the artifacts after it (see the handbook), which takes hours at most. Artifacts that its
+/// database refers to must still exist then: the restored evaluation may have to be continued or
+/// scored.
+pub const RECORDINGS_KEPT_FOR: SignedDuration = SignedDuration::from_hours(24);
+
+/// Time for which a bundle is kept after a platform fault in its validation run, for investigation.
+pub const UNCHECKED_KEPT_FOR: SignedDuration = SignedDuration::from_hours(24);
+
+/// Artifact key prefix of all recordings of a run.
+fn recordings_of(run: RunId) -> String {
+    format!("recordings/{run}")
+}
+
+impl JobClaim {
+    /// Artifact key prefix for the recording made under this lease. Every lease has its own, so that
+    /// the files of a worker that lost its lease never mix with those of the next one.
+    #[must_use]
+    pub fn recording_key(&self, run: RunId) -> String {
+        format!("{}/{}/{}", recordings_of(run), self.job, self.nonce)
+    }
+}
+
+impl Store {
+    /// Deletes the shard recordings of evaluations that ended at least [`RECORDINGS_KEPT_FOR`] ago. A
+    /// finished one has them in its dataset, the others do not need them any more. Returns the number
+    /// of runs. To be called periodically; an interrupted call is completed by the next one.
+    #[boxed]
+    pub async fn remove_old_recordings(&self, now: Timestamp) -> Result<usize> {
+        let before = now
+            .saturating_sub(RECORDINGS_KEPT_FOR)
+            .unwrap_or(Timestamp::MIN);
+        let mut connection = self.database.read.acquire().await?;
+        let old = runs::with_old_recordings(&mut connection, before).await?;
+        drop(connection);
+        for run in &old {
+            self.artifacts().delete_folder(&recordings_of(*run)).await?;
+            self.write(Actor::Server, now, async |tx| {
+                runs::set_recordings_removed(tx, *run, now).await
+            })
+            .await?;
+        }
+        Ok(old.len())
+    }
+
+    /// Deletes the datasets of proposals that were dropped at least [`RECORDINGS_KEPT_FOR`] ago; their results stay
+    /// readable. Returns how many. An interrupted call is completed by the next one.
+    #[boxed]
+    pub async fn remove_dropped_datasets(&self, now: Timestamp) -> Result<usize> {
+        let before = now
+            .saturating_sub(RECORDINGS_KEPT_FOR)
+            .unwrap_or(Timestamp::MIN);
+        let mut connection = self.database.read.acquire().await?;
+        let dropped = proposed_evaluations::dropped_with_datasets(&mut connection, before).await?;
+        drop(connection);
+        for (id, key) in &dropped {
+            self.artifacts().delete_dataset(key).await?;
+            self.write(Actor::Server, now, async |tx| {
+                proposed_evaluations::set_dataset_removed(tx, *id, now).await
+            })
+            .await?;
+        }
+        Ok(dropped.len())
+    }
+
+    /// Deletes the bundles of rejected submissions: invalid ones at once, those whose validation had a
+    /// platform fault after [`UNCHECKED_KEPT_FOR`]. Reason and log stay. Returns how many. An interrupted
+    /// call is completed by the next one.
+    #[boxed]
+    pub async fn remove_refused_bundles(&self, now: Timestamp) -> Result<usize> {
+        let before = now.saturating_sub(UNCHECKED_KEPT_FOR).unwrap_or(Timestamp::MIN);
+        let mut connection = self.database.read.acquire().await?;
+        let refused = bundles::refused(&mut connection, before).await?;
+        drop(connection);
+        for (id, key) in &refused {
+            self.artifacts().delete(key).await?;
+            self.write(Actor::Server, now, async |tx| {
+                bundles::set_refused_removed(tx, *id, now).await
+            })
+            .await?;
+        }
+        Ok(refused.len())
+    }
+
+    /// Deletes bundles that no submission refers to and that were stored at `before` or earlier. A process
+    /// was killed between storing the bundle and adding its submission. Returns how many.
+    #[boxed]
+    pub async fn remove_orphaned_bundles(&self, before: Timestamp) -> Result<usize> {
+        // In this order: a submission added after the first query has none of the bundles listed by it.
+        let stored = self.artifacts().stored_until("bundles", before).await?;
+        let in_use = bundles::keys_in_use(&mut *self.database.read.acquire().await?).await?;
+        let mut removed = 0;
+        for key in stored.iter().filter(|key| !in_use.contains(*key)) {
+            self.artifacts().delete(key).await?;
+            removed += 1;
+        }
+        Ok(removed)
+    }
+}

@@ -1,0 +1,152 @@
+//! Effects of a run's start and end on its owner, and the other ends of an evaluation.
+
+use crate::{
+    error::{Result, StoreError},
+    event::{Event, Subject},
+    operations::{
+        proposal_completion, purpose, release_day, rerun,
+        runs::{self, RunOwner},
+    },
+    queue,
+    tables::{
+        ablations,
+        evaluations::{self, Failure},
+        scorings, runs as run_rows,
+    },
+    write::Tx,
+};
+use faceoff_types::{AblationId, EvaluationId, RunId};
+
+/// How a run ends.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum RunEnd<'a> {
+    /// All shards are committed.
+    Completed,
+    /// More agent faults than its plan allows.
+    AgentFailed,
+    /// Given up after platform faults, with the reason.
+    PlatformFailed(&'a str),
+}
+
+/// Marks a run as started when its first shard is claimed.
+pub(crate) async fn record_run_start(tx: &mut Tx, run: RunId, owner: RunOwner) -> Result<()> {
+    if run_rows::begin(tx, run).await?
+        && let RunOwner::Evaluation(_) = owner
+    {
+        tx.record(owner.subject(), Event::EvaluationBegun);
+    }
+    Ok(())
+}
+
+/// Ends a run, and its owner with it where the owner cannot continue.
+pub(crate) async fn end_run(
+    tx: &mut Tx,
+    run: RunId,
+    owner: RunOwner,
+    end: RunEnd<'_>,
+) -> Result<()> {
+    match end {
+        RunEnd::Completed => run_rows::set_complete(tx, run).await?,
+        RunEnd::AgentFailed | RunEnd::PlatformFailed(_) => runs::stop(tx, run).await?,
+    }
+    match (owner, end) {
+        (RunOwner::Evaluation(id), RunEnd::Completed) => queue_scoring(tx, id).await,
+        (RunOwner::Evaluation(id), RunEnd::AgentFailed) => {
+            fail_evaluation(tx, id, run, Failure::Agent).await
+        }
+        (RunOwner::Evaluation(id), RunEnd::PlatformFailed(reason)) => {
+            fail_evaluation(tx, id, run, Failure::Platform(reason)).await
+        }
+        (RunOwner::ProposedEvaluation { id, .. }, RunEnd::Completed) => proposal_completion::queue_scoring(tx, id).await,
+        (RunOwner::ProposedEvaluation { id, proposal }, RunEnd::AgentFailed) => {
+            proposal_completion::fail(tx, id, run, proposal, Failure::Agent).await
+        }
+        (RunOwner::ProposedEvaluation { id, proposal }, RunEnd::PlatformFailed(reason)) => {
+            proposal_completion::fail(tx, id, run, proposal, Failure::Platform(reason)).await
+        }
+        (RunOwner::Ablation(id), RunEnd::Completed) => finish_ablation_if_complete(tx, id).await,
+        (RunOwner::Ablation(id), RunEnd::AgentFailed) => {
+            let plan = run_rows::find(tx, run).await?.plan;
+            let reason = format!(
+                "the agent violated the protocol or a limit more than {} times with {}",
+                plan.max_faults, plan.profile
+            );
+            fail_ablation(tx, id, &reason).await
+        }
+        (RunOwner::Ablation(id), RunEnd::PlatformFailed(reason)) => {
+            fail_ablation(tx, id, reason).await
+        }
+    }
+}
+
+async fn queue_scoring(tx: &mut Tx, id: EvaluationId) -> Result<()> {
+    let account = queue::account(tx, purpose::SCORING.lane, purpose::PLATFORM).await?;
+    let job = queue::insert(tx, purpose::SCORING, account).await?;
+    scorings::insert(tx, id, job).await?;
+    tx.record(Subject::Evaluation(id), Event::EvaluationFinalising);
+    Ok(())
+}
+
+/// Ends an evaluation without a score, whether its run was over or not. After a platform fault it is
+/// rerun automatically, a bounded number of times.
+pub(crate) async fn fail_evaluation(
+    tx: &mut Tx,
+    id: EvaluationId,
+    run: RunId,
+    failure: Failure<'_>,
+) -> Result<()> {
+    runs::stop(tx, run).await?;
+    let scoring = scorings::job_of(tx, id).await?;
+    queue::drop_jobs(tx, scoring.as_slice()).await?;
+    let now = tx.now;
+    evaluations::set_failed(tx, id, failure, now).await?;
+    let event = match failure {
+        Failure::Agent => Event::EvaluationAgentFailed,
+        Failure::Platform(reason) => Event::EvaluationPlatformFailed {
+            reason: reason.to_owned(),
+        },
+        Failure::Cancelled(reason) => Event::EvaluationCancelled {
+            reason: reason.to_owned(),
+        },
+        Failure::NotPlayed(reason) => Event::EvaluationNotPlayed {
+            reason: reason.to_owned(),
+        },
+    };
+    tx.record(Subject::Evaluation(id), event);
+    if let Failure::Platform(_) = failure {
+        log_damage(id, rerun::rerun_after_platform_fault(tx, id).await)?;
+    }
+    log_damage(id, release_day::release_if_over(tx, id).await)
+}
+
+/// Logs damaged rows instead of failing. A damaged evaluation is not rerun and releases no day, but it must
+/// end: it would block the queue otherwise.
+fn log_damage(id: EvaluationId, done: Result<()>) -> Result<()> {
+    match done {
+        Err(StoreError::Damaged(defect)) => {
+            tracing::error!(evaluation = %id, defect, "ended a damaged evaluation");
+            Ok(())
+        }
+        done => done,
+    }
+}
+
+async fn finish_ablation_if_complete(tx: &mut Tx, id: AblationId) -> Result<()> {
+    if ablations::all_complete(tx, id).await? {
+        let now = tx.now;
+        ablations::set_ended(tx, id, None, now).await?;
+        tx.record(Subject::Ablation(id), Event::AblationFinished);
+    }
+    Ok(())
+}
+
+async fn fail_ablation(tx: &mut Tx, id: AblationId, reason: &str) -> Result<()> {
+    for run in ablations::runs(tx, id).await? {
+        runs::stop(tx, run).await?;
+    }
+    let now = tx.now;
+    ablations::set_ended(tx, id, Some(reason), now).await?;
+    let reason = reason.to_owned();
+    tx.record(Subject::Ablation(id), Event::AblationFailed { reason });
+    Ok(())
+}

@@ -1,0 +1,77 @@
+//! Jobs as workers get them, with everything that is needed to run them.
+
+use crate::{
+    operations::runs::RunOwner,
+    queue::JobClaim,
+    tables::{runs::Run, shards::Shard, submissions::Submission},
+};
+use faceoff_types::{
+    BundleRef, EvaluationId, GameId, Seed, StageLimits, StageRuntimes, TournamentRules,
+};
+
+/// A leased job.
+#[derive(Debug, Clone)]
+pub struct ClaimedJob {
+    /// Proof of the lease.
+    pub claim: JobClaim,
+    pub job: Job,
+}
+
+/// A job with all data that a worker needs to run it.
+#[derive(Debug, Clone)]
+pub enum Job {
+    /// Check that an uploaded bundle starts, answers and keeps time.
+    Validation {
+        submission: Submission,
+        /// Seeds of the validation run's own episodes.
+        seeds: RunSeeds,
+        /// Limits for the agent: those of the current stage.
+        limits: Box<StageLimits>,
+        /// Accepted runtimes of each stage that the submission could be evaluated in; it is invalid if none of them
+        /// accepts its runtime. Empty if a stage accepts any runtime.
+        runtimes: Vec<StageRuntimes>,
+    },
+    /// Run a range of episodes.
+    Shard {
+        owner: RunOwner,
+        run: Run,
+        shard: Shard,
+        bundle: BundleRef,
+        /// Seeds of the run's episodes.
+        seeds: RunSeeds,
+        /// Earlier attempts that ended by a platform fault.
+        platform_retries: u32,
+    },
+    Game {
+        game: GameId,
+        rules: Box<TournamentRules>,
+        /// The agents, the home side's first.
+        bundles: [BundleRef; 2],
+        seeds: RunSeeds,
+        /// Number of this attempt, from 1.
+        attempt: u32,
+        /// Earlier attempts that ended by a platform fault.
+        platform_retries: u32,
+        keeps_recording: bool,
+    },
+    /// Join the recordings of an evaluation whose shards are all committed, and score it.
+    Scoring {
+        evaluation: EvaluationId,
+        run: Run,
+        /// Artifact key prefixes of the shards' recordings, in the order of the episodes.
+        recordings: Vec<String>,
+        /// Name that the agent gives itself.
+        agent_name: String,
+        /// Seeds of the run's episodes.
+        seeds: RunSeeds,
+    },
+}
+
+/// Seeds of a job's episodes, derived from the season's secret, which stays in the store.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct RunSeeds {
+    /// Seed of the episodes: that of the day, of ablations, or of a validation run.
+    pub episodes: Seed,
+    /// Seed of the season's model mismatch.
+    pub mismatch: Seed,
+}

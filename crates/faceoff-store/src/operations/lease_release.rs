@@ -1,0 +1,220 @@
+use crate::{
+    boxed,
+    error::{Result, StoreError},
+    event::{Actor, Event, Subject},
+    operations::{
+        proposal_completion,
+        completion::{self, RunEnd},
+        purpose::{self, Purpose},
+        runs,
+        tournament::game_lifecycle,
+    },
+    queue::{self, JobClaim, ClaimState},
+    store::Store,
+    tables::{
+        evaluations::{self, Failure},
+        game_attempts::AttemptOutcome,
+        submissions,
+    },
+    write::Tx,
+};
+use jiff::Timestamp;
+use sqlx::SqliteConnection;
+use uuid::Uuid;
+
+/// Platform faults after which a job is given up.
+pub const MAX_ATTEMPTS: u32 = 5;
+
+/// Pause before a job that met a full disk is run again, seconds. Without it a job that needs more disk
+/// space than there is would take up every slot.
+const FULL_DISK_REST_S: u32 = 10;
+
+/// The subject of a job's events.
+pub(crate) async fn event_subject(
+    connection: &mut SqliteConnection,
+    purpose: &Purpose,
+) -> Result<Subject> {
+    Ok(match purpose {
+        Purpose::Validation(id) => Subject::Submission(*id),
+        Purpose::Game(id) => Subject::Game(*id),
+        Purpose::Shard { run, .. } => runs::owner(connection, *run).await?.subject(),
+        Purpose::Scoring(id) => Subject::Evaluation(*id),
+        Purpose::ProposedScoring { proposal, .. } => Subject::Proposal(*proposal),
+    })
+}
+
+/// Drops a job after platform faults, and ends the submission, run or game that it belongs to.
+pub(crate) async fn give_up(tx: &mut Tx, job: Uuid, label: &str, reason: &str) -> Result<()> {
+    queue::drop_jobs(tx, &[job]).await?;
+    match purpose::of_job(tx, job, label).await {
+        Ok(Purpose::Validation(id)) => {
+            submissions::set_validation_error(tx, id, reason).await?;
+            let reason = reason.to_owned();
+            tx.record(
+                Subject::Submission(id),
+                Event::SubmissionNotValidated { reason },
+            );
+            Ok(())
+        }
+        Ok(Purpose::Game(id)) => game_lifecycle::give_up(tx, id, reason).await,
+        Ok(Purpose::Shard { run, .. }) => {
+            let owner = runs::owner(tx, run).await?;
+            completion::end_run(tx, run, owner, RunEnd::PlatformFailed(reason)).await
+        }
+        Ok(Purpose::Scoring(id)) => {
+            let run = evaluations::run_of(tx, id).await?;
+            completion::fail_evaluation(tx, id, run, Failure::Platform(reason)).await
+        }
+        Ok(Purpose::ProposedScoring { id, run, proposal }) => {
+            proposal_completion::fail(tx, id, run, proposal, Failure::Platform(reason)).await
+        }
+        // No row refers to the job, so there is nothing to end.
+        Err(StoreError::Damaged(_)) => Ok(()),
+        Err(error) => Err(error),
+    }
+}
+
+/// Puts a leased job back into the queue; the attempt does not count.
+async fn release_held(
+    tx: &mut Tx,
+    claim: &JobClaim,
+    kind: &str,
+    rest_s: u32,
+    out_of_space: bool,
+) -> Result<()> {
+    queue::release(tx, claim, rest_s, out_of_space).await?;
+    let purpose = purpose::of_job(tx, claim.job, kind).await?;
+    if let Purpose::Game(id) = purpose {
+        game_lifecycle::end_attempt(tx, id, AttemptOutcome::Released, None).await?;
+    }
+    let subject = event_subject(tx, &purpose).await?;
+    tx.record_progress(subject);
+    Ok(())
+}
+
+/// Puts all jobs leased by `holder` and the holders below it back into the queue; the attempts do not count. Later
+/// results are those of a lost lease.
+pub(crate) async fn release_all_held(tx: &mut Tx, holder: &str) -> Result<u64> {
+    let leases = queue::leases(tx, holder).await?;
+    for (claim, kind) in &leases {
+        release_held(tx, claim, kind, 0, false).await?;
+    }
+    Ok(u64::try_from(leases.len()).unwrap_or(u64::MAX))
+}
+
+impl Store {
+    /// Releases a job after a platform fault: it returns to the queue after a growing pause. After
+    /// [`MAX_ATTEMPTS`] failures an evaluation ends as
+    /// [`PlatformFailed`](crate::EvaluationState::PlatformFailed) and is rerun a limited number of times
+    /// ([`RERUN_PAUSES_S`](crate::RERUN_PAUSES_S)). A validation run ends as
+    /// [`ValidationError`](crate::SubmissionState::ValidationError), an ablation ends without a result. For a lost lease
+    /// nothing is recorded.
+    #[boxed]
+    pub async fn release_failed(&self, claim: &JobClaim, reason: &str, now: Timestamp) -> Result<()> {
+        let actor = Actor::Worker(claim.worker.clone());
+        self.write(actor, now, async |tx| {
+            let ClaimState::Leased { kind } = queue::claim_state(tx, claim).await? else {
+                return Ok(());
+            };
+            let purpose = purpose::of_job(tx, claim.job, &kind).await?;
+            let failures = queue::requeue_failed(tx, claim, now).await?;
+            let event = Event::UnitGivenBack {
+                unit: claim.job,
+                failures,
+                reason: reason.to_owned(),
+            };
+            let subject = event_subject(tx, &purpose).await?;
+            tx.record(subject, event);
+            if let Purpose::Game(id) = purpose {
+                game_lifecycle::end_attempt(tx, id, AttemptOutcome::PlatformFailed, Some(reason)).await?;
+            }
+            if failures >= MAX_ATTEMPTS {
+                give_up(tx, claim.job, &kind, reason).await?;
+            }
+            Ok(())
+        })
+        .await
+    }
+
+    /// Releases a job at once, on shutdown; the attempt does not count. For a lost lease nothing is
+    /// recorded.
+    #[boxed]
+    pub async fn release(&self, claim: &JobClaim, now: Timestamp) -> Result<()> {
+        self.release_after(claim, 0, false, now).await
+    }
+
+    /// Releases a job that was leased in advance and not started: `claim.worker` still holds the lease. False if another
+    /// worker has it, or the lease is lost. The attempt does not count.
+    #[boxed]
+    pub async fn release_unstarted(&self, claim: &JobClaim, now: Timestamp) -> Result<bool> {
+        let actor = Actor::Worker(claim.worker.clone());
+        self.write(actor, now, async |tx| {
+            let ClaimState::Leased { kind } = queue::claim_state(tx, claim).await? else {
+                return Ok(false);
+            };
+            if !queue::is_holder(tx, claim).await? {
+                return Ok(false);
+            }
+            release_held(tx, claim, &kind, 0, false).await?;
+            Ok(true)
+        })
+        .await
+    }
+
+    /// Releases a job that met a full disk; it is run again after a pause. The attempt does not count as a
+    /// failure. For a lost lease nothing is recorded. [`health`](Self::health) reports jobs that repeatedly
+    /// run out of space on a disk with enough free space.
+    #[boxed]
+    pub async fn release_disk_full(&self, claim: &JobClaim, now: Timestamp) -> Result<()> {
+        let out_of_space = !self.free_space.is_short();
+        self.release_after(claim, FULL_DISK_REST_S, out_of_space, now)
+            .await
+    }
+
+    /// Extends all leases to `lease_s` seconds from now: they may have expired only because the database
+    /// could not be written.
+    #[boxed]
+    pub async fn renew_all_leases(&self, lease_s: u32, now: Timestamp) -> Result<()> {
+        self.write(Actor::Server, now, async |tx| {
+            queue::renew_all_leases(tx, lease_s, now).await
+        })
+        .await
+    }
+
+    async fn release_after(
+        &self,
+        claim: &JobClaim,
+        rest_s: u32,
+        out_of_space: bool,
+        now: Timestamp,
+    ) -> Result<()> {
+        let actor = Actor::Worker(claim.worker.clone());
+        self.write(actor, now, async |tx| {
+            match queue::claim_state(tx, claim).await? {
+                ClaimState::Leased { kind } => release_held(tx, claim, &kind, rest_s, out_of_space).await,
+                ClaimState::AlreadyDone | ClaimState::Lost => Ok(()),
+            }
+        })
+        .await
+    }
+
+    /// Releases all jobs leased by `holder` and the holders below it, none of which is running them. Returns their
+    /// number; the attempts do not count.
+    #[boxed]
+    pub async fn release_leases_of(&self, holder: &str, now: Timestamp) -> Result<u64> {
+        let actor = Actor::Worker(holder.to_owned());
+        self.write(actor, now, async |tx| release_all_held(tx, holder).await)
+            .await
+    }
+
+    /// Ends the leases of a worker that is known to be dead, and of its slots, before they expire:
+    /// `worker` itself and every name `worker/…`. Returns how many. The attempts stay counted.
+    #[boxed]
+    pub async fn end_leases_of(&self, worker: &str, now: Timestamp) -> Result<u64> {
+        let actor = Actor::Worker(worker.to_owned());
+        self.write(actor, now, async |tx| {
+            queue::end_leases(tx, worker).await
+        })
+        .await
+    }
+}

@@ -1,0 +1,86 @@
+//! Adds one evaluation to a day: at the cutoff, as a rerun, or as an extra evaluation.
+
+use crate::{
+    error::Result,
+    event::{Event, Subject},
+    operations::{purpose, runs},
+    queue::NewJob,
+    tables::{
+        days,
+        entries::{self, Entry},
+        plan::RunPlan,
+        runs::Run,
+    },
+    write::Tx,
+};
+use faceoff_types::{EvaluationId, Ruleset, RunId, SeedLabel, StageDay, SubmissionId, TeamId};
+
+/// The submission of an evaluation that is to be added.
+pub(crate) struct NewEvaluation {
+    pub(crate) id: EvaluationId,
+    pub(crate) submission: SubmissionId,
+    pub(crate) team: TeamId,
+    pub(crate) rerun_of: Option<EvaluationId>,
+}
+
+/// Rules, seed and plan that all evaluations of a day share.
+pub(crate) struct DaySetup {
+    pub(crate) stage_day: StageDay,
+    /// Revision of the stage's rules.
+    pub(crate) revision: u32,
+    pub(crate) seed: SeedLabel,
+    pub(crate) ruleset: Ruleset,
+    pub(crate) plan: RunPlan,
+}
+
+/// Adds an evaluation of a day and queues its shards, to be run after `rest_s` seconds at the earliest.
+/// [`Conflict`](crate::StoreError::Conflict) if the team already has a counting one of that day.
+pub(crate) async fn queue_evaluation(
+    tx: &mut Tx,
+    requested: NewEvaluation,
+    setup: &DaySetup,
+    rest_s: u32,
+) -> Result<EvaluationId> {
+    let run = Run {
+        id: RunId::new(),
+        ruleset: setup.ruleset,
+        plan: setup.plan.clone(),
+        seed: setup.seed,
+        keeps_recordings: true,
+    };
+    // Unreleased days are run in the order of their cutoffs. Evaluations of a released day queue with today's.
+    let day = days::find(tx, setup.stage_day).await?;
+    let queued_as_of = match day.released_at {
+        None => day.cutoff_at,
+        Some(_) => tx.now,
+    };
+    let job = NewJob {
+        rest_s,
+        batch: queued_as_of.as_millisecond(),
+        ..purpose::SHARD
+    };
+    runs::queue_run(tx, &run, &[requested.submission], job, requested.team).await?;
+    let new = Entry {
+        id: requested.id,
+        submission: requested.submission,
+        team: requested.team,
+        stage_day: setup.stage_day,
+        revision: setup.revision,
+        run: run.id,
+        rerun_of: requested.rerun_of,
+    };
+    let now = tx.now;
+    entries::insert(tx, &new, now).await?;
+    tx.record(
+        Subject::Evaluation(new.id),
+        Event::EvaluationQueued {
+            team: new.team,
+            submission: new.submission,
+            stage: Some(new.stage_day.stage),
+            day: new.stage_day.date,
+            run: new.run,
+            rerun_of: new.rerun_of,
+        },
+    );
+    Ok(new.id)
+}

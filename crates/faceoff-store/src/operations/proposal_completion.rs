@@ -1,0 +1,42 @@
+//! Ends of the evaluations of proposals. Unlike counting evaluations, they affect no board and no evaluation day.
+
+use crate::{
+    error::Result,
+    event::{Event, Subject},
+    operations::{purpose, runs},
+    queue,
+    tables::{proposed_evaluations, evaluations::Failure},
+    write::Tx,
+};
+use faceoff_types::{EvaluationId, ProposalId, RunId};
+
+/// Queues the scoring of a proposal's evaluation after its last shard is committed.
+pub(crate) async fn queue_scoring(tx: &mut Tx, id: EvaluationId) -> Result<()> {
+    let account = queue::account(tx, purpose::SCORING.lane, purpose::PLATFORM).await?;
+    let job = queue::insert(tx, purpose::SCORING, account).await?;
+    proposed_evaluations::insert_scoring(tx, id, job).await
+}
+
+/// Ends a proposal's evaluation without a score.
+pub(crate) async fn fail(
+    tx: &mut Tx,
+    id: EvaluationId,
+    run: RunId,
+    proposal: ProposalId,
+    failure: Failure<'_>,
+) -> Result<()> {
+    runs::stop(tx, run).await?;
+    let scoring = proposed_evaluations::job_of(tx, id).await?;
+    queue::drop_jobs(tx, scoring.as_slice()).await?;
+    let now = tx.now;
+    proposed_evaluations::set_failed(tx, id, failure, now).await?;
+    record_if_over(tx, proposal).await
+}
+
+/// Records the end of a proposal once all its evaluations have ended.
+pub(crate) async fn record_if_over(tx: &mut Tx, proposal: ProposalId) -> Result<()> {
+    if proposed_evaluations::count_open(tx, Some(proposal)).await? == 0 {
+        tx.record(Subject::Proposal(proposal), Event::ProposalPlayed);
+    }
+    Ok(())
+}

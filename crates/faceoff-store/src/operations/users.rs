@@ -1,0 +1,151 @@
+//! User accounts, and the terms that users accept.
+
+use crate::{
+    boxed,
+    error::{Result, StoreError},
+    event::{Actor, Event, Subject},
+    operations::tokens::revoke_all,
+    store::Store,
+    tables::{
+        users::{self, User},
+        terms::{self, Terms},
+        tokens::{self, TokenOwner},
+    },
+};
+use faceoff_types::{UserId, TeamId, TokenId};
+use jiff::Timestamp;
+
+impl Store {
+    /// All users who have ever joined, by name.
+    #[boxed]
+    pub async fn users(&self) -> Result<Vec<User>> {
+        users::all(&mut *self.database.read.acquire().await?).await
+    }
+
+    /// Current and former members of a team, by name.
+    #[boxed]
+    pub async fn members_of(&self, team: TeamId) -> Result<Vec<User>> {
+        users::of_team(&mut *self.database.read.acquire().await?, team).await
+    }
+
+    #[boxed]
+    pub async fn user(&self, id: UserId) -> Result<User> {
+        users::find(&mut *self.database.read.acquire().await?, id).await
+    }
+
+    /// Id and password hash (PHC string) of the user with this name, if there is one with a password.
+    #[boxed]
+    pub async fn password_hash_of(&self, name: &str) -> Result<Option<(UserId, String)>> {
+        users::find_with_password(&mut *self.database.read.acquire().await?, name).await
+    }
+
+    /// Sets a user's password, as a PHC string. All tokens and sessions of the user are revoked except the one used
+    /// for this request (`by`).
+    #[boxed]
+    pub async fn set_password(
+        &self,
+        actor: Actor,
+        id: UserId,
+        password: &str,
+        by: TokenId,
+        now: Timestamp,
+    ) -> Result<User> {
+        self.write(actor, now, async |tx| {
+            users::set_password(tx, id, password).await?;
+            revoke_all(tx, TokenOwner::User(id), Some(by)).await?;
+            tx.record(Subject::User(id), Event::PasswordSet);
+            users::find(tx, id).await
+        })
+        .await
+    }
+
+    /// Removes a user: all tokens and sessions are revoked at once. The name stays in the log.
+    /// [`StoreError::Conflict`] if the user has left, or is the last who can organise: no other organiser, and no
+    /// valid host token.
+    #[boxed]
+    pub async fn remove_user(
+        &self,
+        actor: Actor,
+        id: UserId,
+        now: Timestamp,
+    ) -> Result<User> {
+        self.write(actor, now, async |tx| {
+            let user = users::find(tx, id).await?;
+            if user.left_at.is_some() {
+                return Err(StoreError::Conflict(format!("{} has left", user.name)));
+            }
+            let is_last = user.team.is_none() && users::count_organisers(tx).await? == 1;
+            if is_last && tokens::count_valid(tx, TokenOwner::Host, now).await? == 0 {
+                return Err(StoreError::Conflict(format!(
+                    "{} is the last who can organise: invite another organiser first",
+                    user.name
+                )));
+            }
+            users::set_left(tx, id, now).await?;
+            revoke_all(tx, TokenOwner::User(id), None).await?;
+            let name = user.name;
+            tx.record(Subject::User(id), Event::PersonLeft { name });
+            users::find(tx, id).await
+        })
+        .await
+    }
+
+    /// All versions of the terms, the newest first.
+    #[boxed]
+    pub async fn terms(&self) -> Result<Vec<Terms>> {
+        terms::all(&mut *self.database.read.acquire().await?).await
+    }
+
+    /// Sets new terms. Teams cannot upload or choose submissions until one of their members has accepted them.
+    /// [`StoreError::Conflict`] if the text is unchanged.
+    #[boxed]
+    pub async fn publish_terms(&self, actor: Actor, text: &str, now: Timestamp) -> Result<Terms> {
+        self.write(actor, now, async |tx| {
+            let newest = terms::all(tx).await?.into_iter().next();
+            if newest.as_ref().is_some_and(|newest| newest.text == text) {
+                return Err(StoreError::Conflict(
+                    "the terms are the same as the current ones; nothing was changed".into(),
+                ));
+            }
+            let new = Terms {
+                version: newest.map_or(0, |newest| newest.version) + 1,
+                since: now,
+                text: text.to_owned(),
+            };
+            terms::insert(tx, &new).await?;
+            let version = new.version;
+            tx.record(Subject::Season, Event::TermsPublished { version });
+            Ok(new)
+        })
+        .await
+    }
+
+    /// Records that a user accepts the terms. [`StoreError::Conflict`] unless `version` is the newest.
+    #[boxed]
+    pub async fn accept_terms(
+        &self,
+        actor: Actor,
+        id: UserId,
+        version: u32,
+        now: Timestamp,
+    ) -> Result<User> {
+        self.write(actor, now, async |tx| {
+            match terms::newest(tx).await? {
+                Some(newest) if newest == version => {}
+                Some(newest) => {
+                    return Err(StoreError::Conflict(format!(
+                        "version: expected {newest}, the newest of the terms, got {version}"
+                    )));
+                }
+                None => return Err(StoreError::Conflict("this season has no terms".into())),
+            }
+            let user = users::find(tx, id).await?;
+            if user.accepted_terms != Some(version) {
+                users::set_accepted_terms(tx, id, version).await?;
+                tx.record(Subject::User(id), Event::TermsAccepted { version });
+            }
+            users::find(tx, id).await
+        })
+        .await
+    }
+}

@@ -1,0 +1,220 @@
+use crate::{
+    boxed,
+    column::{Instant, Json},
+    error::Result,
+    store::Store,
+    tables::{
+        stages::Stage,
+        teams::{Team, TeamProfile},
+    },
+};
+use faceoff_types::{
+    DivisionName, EvaluationId, EvaluationResult, RunId, StageId, SubmissionId, TeamId, TeamName,
+};
+use jiff::{Timestamp, civil::Date};
+use sqlx::types::Text;
+
+/// The data of one board row.
+#[derive(Debug, Clone)]
+pub struct BoardRecord {
+    pub team: Team,
+    pub submission: SubmissionId,
+    /// When the submission was uploaded.
+    pub submitted_at: Timestamp,
+    /// The name in the agent's manifest.
+    pub agent_name: Option<String>,
+    /// The team's newest finished evaluation.
+    pub evaluation: EvaluationId,
+    pub run: RunId,
+    /// The date of the evaluation day.
+    pub day: Date,
+    /// When the day was released; `None` if it is not.
+    pub released_at: Option<Timestamp>,
+    /// The reason of an extra evaluation; `None` for the team's regular one of the day.
+    pub extra_for: Option<String>,
+    /// When the evaluation was scored.
+    pub finished_at: Timestamp,
+    pub result: EvaluationResult,
+}
+
+/// A row of the statements that read boards.
+pub(super) struct Row {
+    pub(super) team: Text<TeamId>,
+    pub(super) name: Text<TeamName>,
+    pub(super) invited_at: Instant,
+    pub(super) affiliation: Option<String>,
+    pub(super) link: Option<String>,
+    pub(super) division: Option<Text<DivisionName>>,
+    pub(super) retired_at: Option<Instant>,
+    pub(super) is_baseline: bool,
+    pub(super) submission: Text<SubmissionId>,
+    pub(super) submitted_at: Instant,
+    pub(super) agent_name: Option<String>,
+    pub(super) evaluation: Text<EvaluationId>,
+    pub(super) run: Text<RunId>,
+    pub(super) day: Text<Date>,
+    pub(super) released_at: Option<Instant>,
+    pub(super) extra_for: Option<String>,
+    pub(super) finished_at: Instant,
+    pub(super) result: Json<EvaluationResult>,
+}
+
+impl From<Row> for BoardRecord {
+    fn from(row: Row) -> Self {
+        Self {
+            team: Team {
+                id: row.team.0,
+                name: row.name.0,
+                created_at: row.invited_at.0,
+                disqualified: None,
+                profile: TeamProfile {
+                    affiliation: row.affiliation,
+                    link: row.link,
+                    division: row.division.map(|name| name.0),
+                },
+                retired_at: row.retired_at.map(|at| at.0),
+                is_baseline: row.is_baseline,
+            },
+            submission: row.submission.0,
+            submitted_at: row.submitted_at.0,
+            agent_name: row.agent_name,
+            evaluation: row.evaluation.0,
+            run: row.run.0,
+            day: row.day.0,
+            released_at: row.released_at.map(|at| at.0),
+            extra_for: row.extra_for,
+            finished_at: row.finished_at.0,
+            result: row.result.0,
+        }
+    }
+}
+
+/// `SELECT` of board records: takes the statement's name as a comment, the SQL after the columns, and its arguments.
+macro_rules! select_board {
+    ($name:literal, $tail:literal, $($argument:expr),* $(,)?) => {
+        sqlx::query_as!(
+            crate::queries::board::Row,
+            $name + r#"SELECT t.id AS "team: Text<TeamId>", t.name AS "name: Text<TeamName>",
+                      t.created_at AS "invited_at: Instant", t.affiliation, t.link,
+                      t.division AS "division: Text<DivisionName>", t.retired_at AS "retired_at: Instant",
+                      t.is_baseline AS "is_baseline: bool",
+                      s.id AS "submission: Text<SubmissionId>",
+                      s.created_at AS "submitted_at: Instant", s.agent_name,
+                      e.id AS "evaluation: Text<EvaluationId>", e.run_id AS "run: Text<RunId>",
+                      e.day AS "day: Text<Date>", d.released_at AS "released_at: Instant",
+                      e.extra_for, e.finished_at AS "finished_at!: Instant",
+                      e.result AS "result!: Json<EvaluationResult>" "# + $tail,
+            $($argument),*
+        )
+    };
+}
+pub(super) use select_board;
+
+/// Which of a stage's results a board leaves out.
+#[derive(Debug, Clone, Default)]
+pub struct BoardScope {
+    /// Evaluations that finished later are left out; `None`: no limit.
+    pub until: Option<Timestamp>,
+    /// Evaluations of later days are left out; `None`: no limit.
+    pub until_day: Option<Date>,
+    /// These evaluations are left out.
+    pub without: Vec<EvaluationId>,
+}
+
+impl Store {
+    /// The newest revision of a stage's rules under which an evaluation has finished; the current one if none has.
+    #[boxed]
+    pub async fn board_revision(&self, stage: &Stage) -> Result<u32> {
+        self.board_revision_within(stage, &BoardScope::default())
+            .await
+    }
+
+    /// As [`board_revision`](Self::board_revision), of the evaluations within the time limits of `scope`.
+    #[boxed]
+    pub async fn board_revision_within(&self, stage: &Stage, scope: &BoardScope) -> Result<u32> {
+        let (id, until) = (Text(stage.id), scope.until.map(Instant));
+        let until_day = scope.until_day.map(Text);
+        let newest = sqlx::query_scalar!(
+            r#"SELECT MAX(revision) AS "revision: u32" FROM evaluations
+               WHERE stage_id = ?1 AND state = 'finished' AND voided_at IS NULL
+                 AND (?2 IS NULL OR finished_at <= ?2) AND (?3 IS NULL OR day <= ?3)"#,
+            id,
+            until,
+            until_day,
+        );
+        let newest = newest.fetch_one(&self.database.read).await?;
+        Ok(newest.unwrap_or(stage.rules.number))
+    }
+
+    /// The days of a stage that have results under one revision of its rules within the time limits of `scope`, the
+    /// earliest first.
+    #[boxed]
+    pub async fn board_days(
+        &self,
+        stage: StageId,
+        revision: u32,
+        scope: &BoardScope,
+    ) -> Result<Vec<Date>> {
+        let (stage, until) = (Text(stage), scope.until.map(Instant));
+        let until_day = scope.until_day.map(Text);
+        let days = sqlx::query_scalar!(
+            r#"SELECT DISTINCT day AS "day: Text<Date>" FROM evaluations
+               WHERE stage_id = ?1 AND revision = ?2 AND state = 'finished' AND voided_at IS NULL
+                 AND (?3 IS NULL OR finished_at <= ?3) AND (?4 IS NULL OR day <= ?4)
+               ORDER BY day"#,
+            stage,
+            revision,
+            until,
+            until_day,
+        );
+        let days = days.fetch_all(&self.database.read).await?;
+        Ok(days.into_iter().map(|day| day.0).collect())
+    }
+
+    /// The board of a stage under one revision of its rules, with all results.
+    #[boxed]
+    pub async fn board(&self, stage: StageId, revision: u32) -> Result<Vec<BoardRecord>> {
+        let scope = BoardScope::default();
+        self.board_within(stage, revision, &scope).await
+    }
+
+    /// The board of a stage under one revision of its rules, by team name. It has each team's newest finished evaluation
+    /// within `scope` that was not voided. Disqualified teams are left out; after the sign-off, those that were
+    /// disqualified at that time. Ranks and tiers are computed by the scoring.
+    #[boxed]
+    pub async fn board_within(
+        &self,
+        stage: StageId,
+        revision: u32,
+        scope: &BoardScope,
+    ) -> Result<Vec<BoardRecord>> {
+        let (stage, until) = (Text(stage), scope.until.map(Instant));
+        let without = Json(&scope.without);
+        let until_day = scope.until_day.map(Text);
+        let rows = select_board!(
+            "/* board */ ",
+            r#"FROM teams t
+               JOIN evaluations e ON e.rowid = (SELECT n.rowid FROM evaluations n
+                                                WHERE n.team_id = t.id AND n.stage_id = ?1
+                                                  AND n.revision = ?2 AND n.state = 'finished'
+                                                  AND n.voided_at IS NULL
+                                                  AND (?3 IS NULL OR n.finished_at <= ?3)
+                                                  AND (?5 IS NULL OR n.day <= ?5)
+                                                  AND n.id NOT IN (SELECT value FROM json_each(?4))
+                                                ORDER BY n.day DESC LIMIT 1)
+               JOIN days d ON d.stage_id = e.stage_id AND d.day = e.day
+               JOIN submissions s ON s.id = e.submission_id
+               JOIN stages g ON g.id = e.stage_id
+               WHERE CASE WHEN g.finalised_at IS NULL THEN t.disqualified_at IS NULL
+                          ELSE t.id NOT IN (SELECT value FROM json_each(g.finalised_without)) END
+               ORDER BY t.name"#,
+            stage,
+            revision,
+            until,
+            without,
+            until_day,
+        );
+        let rows = rows.fetch_all(&self.database.read).await?;
+        Ok(rows.into_iter().map(BoardRecord::from).collect())
+    }
+}

@@ -1,0 +1,75 @@
+use crate::{
+    boxed,
+    column::{Instant, Json},
+    error::Result,
+    queries::board::{BoardRecord, BoardScope, select_board},
+    store::Store,
+};
+use faceoff_types::{
+    DivisionName, EvaluationId, EvaluationResult, RunId, StageId, SubmissionId, TeamId, TeamName,
+};
+use jiff::{Timestamp, civil::Date};
+use sqlx::types::Text;
+
+/// The days of a stage from which its board is computed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum BoardDays {
+    All,
+    /// The given number of last days on which a team has a result.
+    Last(u32),
+    Final,
+}
+
+impl Store {
+    /// The cutoff of a stage's final day; `None` before it.
+    #[boxed]
+    pub async fn final_cutoff(&self, stage: StageId) -> Result<Option<Timestamp>> {
+        crate::tables::sign_offs::final_cutoff(&mut *self.database.read.acquire().await?, stage).await
+    }
+
+    /// As [`Store::board_within`], with several days of each team: by team name, then by day.
+    #[boxed]
+    pub async fn board_of_days(
+        &self,
+        stage: StageId,
+        revision: u32,
+        days: BoardDays,
+        scope: &BoardScope,
+    ) -> Result<Vec<BoardRecord>> {
+        let (stage, until) = (Text(stage), scope.until.map(Instant));
+        let without = Json(&scope.without);
+        let until_day = scope.until_day.map(Text);
+        let (last, only_final) = match days {
+            BoardDays::All => (u32::MAX, false),
+            BoardDays::Last(days) => (days, false),
+            BoardDays::Final => (u32::MAX, true),
+        };
+        let rows = select_board!(
+            "/* board of days */ ",
+            r#"FROM (SELECT n.rowid AS row, ROW_NUMBER() OVER (PARTITION BY n.team_id ORDER BY n.day DESC) AS age
+                     FROM evaluations n
+                     WHERE n.stage_id = ?1 AND n.revision = ?2 AND n.state = 'finished'
+                       AND n.voided_at IS NULL AND (?5 IS NULL OR n.finished_at <= ?5)
+                       AND (?7 IS NULL OR n.day <= ?7)
+                       AND n.id NOT IN (SELECT value FROM json_each(?6))) a
+               JOIN evaluations e ON e.rowid = a.row
+               JOIN teams t ON t.id = e.team_id
+               JOIN days d ON d.stage_id = e.stage_id AND d.day = e.day
+               JOIN submissions s ON s.id = e.submission_id
+               JOIN stages g ON g.id = e.stage_id
+               WHERE a.age <= ?3 AND (NOT ?4 OR d.is_final = 1)
+                 AND CASE WHEN g.finalised_at IS NULL THEN t.disqualified_at IS NULL
+                          ELSE t.id NOT IN (SELECT value FROM json_each(g.finalised_without)) END
+               ORDER BY t.name, e.day"#,
+            stage,
+            revision,
+            last,
+            only_final,
+            until,
+            without,
+            until_day,
+        );
+        let rows = rows.fetch_all(&self.database.read).await?;
+        Ok(rows.into_iter().map(BoardRecord::from).collect())
+    }
+}

@@ -1,0 +1,110 @@
+use crate::{
+    boxed,
+    error::{Result, StoreError},
+    queries::progress,
+    store::Store,
+    tables::evaluations::{self, Evaluation, EvaluationRow},
+};
+use faceoff_types::{EvaluationId, StageDay, TeamId};
+use jiff::{Timestamp, civil::Date};
+use sqlx::SqliteConnection;
+
+/// Adds the progress of running evaluations.
+async fn with_progress(
+    connection: &mut SqliteConnection,
+    rows: Vec<EvaluationRow>,
+) -> Result<Vec<Evaluation>> {
+    let running: Vec<_> = rows
+        .iter()
+        .filter_map(EvaluationRow::run_under_way)
+        .collect();
+    let done = progress::of_runs(connection, &running).await?;
+    rows.into_iter()
+        .map(|row| {
+            let run = row.run_under_way();
+            let done = run.and_then(|run| done.get(&run).copied());
+            row.into_evaluation(done.unwrap_or(0))
+        })
+        .collect()
+}
+
+/// One evaluation with its progress.
+pub(crate) async fn find(
+    connection: &mut SqliteConnection,
+    id: EvaluationId,
+) -> Result<Evaluation> {
+    let row = evaluations::find(connection, id).await?;
+    let mut evaluations = with_progress(connection, vec![row]).await?;
+    evaluations.pop().ok_or(StoreError::NotFound("evaluation"))
+}
+
+/// Selects the evaluations of a list.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum EvaluationFilter {
+    /// The evaluations of a team, on one date or on all, the newest first.
+    Team(TeamId, Option<Date>),
+    /// The evaluations of all stages on a date, in the order in which they were queued.
+    Day(Date),
+}
+
+impl Store {
+    /// One page of a list: its beginning, or what follows the evaluation `after`. `None` if `after` is unknown.
+    #[boxed]
+    pub async fn evaluations_after(
+        &self,
+        filter: EvaluationFilter,
+        after: Option<EvaluationId>,
+        limit: u32,
+    ) -> Result<Option<Vec<Evaluation>>> {
+        let mut tx = self.database.read.begin().await?;
+        let start = match after {
+            None => None,
+            Some(id) => match evaluations::created_at(&mut tx, id).await? {
+                Some(at) => Some((at, Some(id))),
+                None => return Ok(None),
+            },
+        };
+        let rows = match filter {
+            EvaluationFilter::Team(team, date) => {
+                let start = start.unwrap_or((Timestamp::MAX, None));
+                evaluations::of_team_after(&mut tx, team, date, start, limit).await?
+            }
+            EvaluationFilter::Day(date) => {
+                let start = start.unwrap_or((Timestamp::UNIX_EPOCH, None));
+                evaluations::on_date_after(&mut tx, date, start, limit).await?
+            }
+        };
+        with_progress(&mut tx, rows).await.map(Some)
+    }
+
+    /// The evaluation with this id.
+    #[boxed]
+    pub async fn evaluation(&self, id: EvaluationId) -> Result<Evaluation> {
+        find(&mut *self.database.read.begin().await?, id).await
+    }
+
+    /// A team's evaluations, the newest first.
+    #[boxed]
+    pub async fn evaluations_of(&self, team: TeamId) -> Result<Vec<Evaluation>> {
+        let mut tx = self.database.read.begin().await?;
+        let rows = evaluations::of_team(&mut tx, team).await?;
+        with_progress(&mut tx, rows).await
+    }
+
+    /// The evaluations of a stage on one day, in the order in which they were queued.
+    #[boxed]
+    pub async fn evaluations_of_day(&self, stage_day: StageDay) -> Result<Vec<Evaluation>> {
+        let mut tx = self.database.read.begin().await?;
+        let rows = evaluations::of_day(&mut tx, stage_day).await?;
+        with_progress(&mut tx, rows).await
+    }
+
+    /// The evaluations of all stages on this date, in the order in which they were queued.
+    #[boxed]
+    pub async fn evaluations_on(&self, date: Date) -> Result<Vec<Evaluation>> {
+        let mut tx = self.database.read.begin().await?;
+        let first = (Timestamp::UNIX_EPOCH, None);
+        let rows = evaluations::on_date_after(&mut tx, date, first, u32::MAX).await?;
+        with_progress(&mut tx, rows).await
+    }
+}

@@ -1,0 +1,44 @@
+//! Gauges of the queue, for monitoring.
+
+use crate::{boxed, error::Result, queue, store::Store};
+use jiff::Timestamp;
+
+/// Numbers of running and waiting jobs.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Gauges {
+    /// Jobs under a valid lease.
+    pub running: u32,
+    /// Jobs that can be claimed.
+    pub waiting: u32,
+    /// Since when the first of them can be claimed.
+    pub waiting_since: Option<Timestamp>,
+    /// Jobs that ran out of disk space repeatedly.
+    pub out_of_space: u32,
+    /// An organiser has paused the queue.
+    pub paused: bool,
+    /// Evaluations that have not ended.
+    pub open_evaluations: u32,
+}
+
+impl Store {
+    /// Gauges of the queue at `now`.
+    #[boxed]
+    pub async fn gauges(&self, now: Timestamp) -> Result<Gauges> {
+        let paused = self.season().await?.paused.is_some();
+        let mut connection = self.database.read.acquire().await?;
+        let queue = queue::gauges(&mut connection, now).await?;
+        let open_evaluations = sqlx::query_scalar!(
+            r#"SELECT COUNT(*) AS "count!: u32" FROM evaluations WHERE state = 'open'"#
+        )
+        .fetch_one(&mut *connection)
+        .await?;
+        Ok(Gauges {
+            running: queue.running,
+            waiting: queue.waiting,
+            waiting_since: queue.waiting_since,
+            out_of_space: queue.out_of_space,
+            paused,
+            open_evaluations,
+        })
+    }
+}

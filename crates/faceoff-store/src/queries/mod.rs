@@ -1,0 +1,23 @@
+//! Read-only queries for the API and the pages.
+
+pub(crate) mod ablations;
+pub(crate) mod board;
+pub(crate) mod subject_contexts;
+mod days;
+pub(crate) mod evaluations;
+mod events;
+mod leases;
+pub(crate) mod gauges;
+pub(crate) mod queue_forecast;
+pub(crate) mod progress;
+pub(crate) mod proposals;
+pub(crate) mod runs;
+mod season;
+mod stages;
+pub(crate) mod board_days;
+pub(crate) mod storage;
+mod submissions;
+mod summaries;
+mod teams;
+pub(crate) mod tournaments;
+pub(crate) mod worker_bans;

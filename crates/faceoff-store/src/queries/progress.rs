@@ -1,0 +1,29 @@
+//! Progress of runs.
+
+use crate::{column::Json, error::Result};
+use faceoff_types::RunId;
+use sqlx::{SqliteConnection, types::Text};
+use std::collections::HashMap;
+
+/// Episodes done of each of these runs, as reported by the workers, in one query.
+pub(crate) async fn of_runs(
+    connection: &mut SqliteConnection,
+    runs: &[RunId],
+) -> Result<HashMap<RunId, u32>> {
+    if runs.is_empty() {
+        return Ok(HashMap::new());
+    }
+    let runs = Json(runs);
+    let rows = sqlx::query!(
+        r#"SELECT s.run_id AS "run: Text<RunId>", SUM(u.progress) AS "episodes_done!: u32"
+           FROM shards s JOIN units u ON u.id = s.unit_id
+           WHERE s.run_id IN (SELECT value FROM json_each(?)) GROUP BY s.run_id"#,
+        runs,
+    )
+    .fetch_all(connection)
+    .await?;
+    Ok(rows
+        .into_iter()
+        .map(|row| (row.run.0, row.episodes_done))
+        .collect())
+}

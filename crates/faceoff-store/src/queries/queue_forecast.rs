@@ -1,0 +1,375 @@
+//! Queue positions and expected ends of waiting jobs. The queue's own rule is simulated with the recent durations of
+//! similar jobs. Jobs of a kind that was never measured get no expected end.
+
+use crate::{
+    boxed,
+    column::Instant,
+    error::Result,
+    queue::forecast::{AccountQueue, DurationMs, Forecast, GroupEnd, JobGroup, QueuedJob},
+    store::Store,
+    tables::{
+        job_durations::{self, JobDurations, OpenEvaluation},
+        season,
+    },
+};
+use faceoff_types::{EvaluationId, GameId, RunId, StageDay, SubmissionId, TeamId};
+use jiff::{SignedDuration, Timestamp};
+use sqlx::{SqliteConnection, types::Text};
+use std::collections::{BTreeMap, HashMap};
+
+/// Position of an entity in the queue, among those of its kind.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct QueuePosition {
+    /// From 1: rank by expected end.
+    pub position: u32,
+    /// Number of open entities of its kind.
+    pub total: u32,
+    /// Expected end; `None` while the queue is paused, and if it depends on an unknown duration.
+    pub expected_at: Option<Timestamp>,
+}
+
+/// Queue positions of all open submissions, evaluations and games.
+#[derive(Debug, Clone, Default)]
+pub struct QueueForecast {
+    /// They end with their validation runs.
+    pub submissions: HashMap<SubmissionId, QueuePosition>,
+    /// They end with their scores.
+    pub evaluations: HashMap<EvaluationId, QueuePosition>,
+    /// They end with their results; games of paused tournaments are left out.
+    pub games: HashMap<GameId, QueuePosition>,
+}
+
+impl QueueForecast {
+    /// The expected end of the last one: `now` if nothing is open, `None` if it depends on an unknown duration.
+    #[must_use]
+    pub fn completed_at(&self, now: Timestamp) -> Option<Timestamp> {
+        let positions = self
+            .submissions
+            .values()
+            .chain(self.evaluations.values())
+            .chain(self.games.values());
+        positions
+            .map(|position| position.expected_at)
+            .try_fold(now, |latest, at| at.map(|at| latest.max(at)))
+    }
+}
+
+/// Episodes that an open evaluation still has to run.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct EvaluationBacklog {
+    pub stage_day: StageDay,
+    pub team: TeamId,
+    /// Episodes that are not committed.
+    pub episodes: u32,
+    /// Number of shards with these episodes.
+    pub shards: u32,
+    /// The evaluation ends without a score after more agent faults than this.
+    pub max_faults: u32,
+    /// Slot time that they will take, in milliseconds, by recent durations; `None` if none was measured.
+    pub expected_ms: Option<f64>,
+}
+
+/// An open job with its purpose.
+struct OpenJob {
+    account: i64,
+    batch: i64,
+    queue_no: i64,
+    is_leased: bool,
+    claimable_at: Instant,
+    charged_ms: i64,
+    progress: u32,
+    urgency: u32,
+    episodes: Option<u32>,
+    holder: String,
+    run: Option<Text<RunId>>,
+    smoke_of: Option<Text<SubmissionId>>,
+    score_of: Option<Text<EvaluationId>>,
+    game: Option<Text<GameId>>,
+    game_steps: Option<u32>,
+    is_paused: bool,
+}
+
+async fn open_jobs(connection: &mut SqliteConnection) -> Result<Vec<OpenJob>> {
+    Ok(sqlx::query_as!(
+        OpenJob,
+        r#"SELECT u.account_no AS "account!: i64", u.batch, u.queue_no, u.state = 'leased' AS "is_leased!: bool",
+                  u.claimable_at AS "claimable_at: Instant", u.charged_ms, u.progress AS "progress: u32",
+                  l.urgency AS "urgency: u32", s.end_episode - s.first_episode AS "episodes?: u32",
+                  a.holder, s.run_id AS "run?: Text<RunId>",
+                  m.submission_id AS "smoke_of?: Text<SubmissionId>",
+                  f.evaluation_id AS "score_of?: Text<EvaluationId>", g.id AS "game?: Text<GameId>",
+                  json_extract(t.rules, '$.steps') AS "game_steps?: u32", t.paused_at IS NOT NULL AS "is_paused!: bool"
+           FROM units u JOIN accounts a ON a.account_no = u.account_no JOIN lanes l ON l.lane = a.lane
+           LEFT JOIN shards s ON s.unit_id = u.id LEFT JOIN smoke_runs m ON m.unit_id = u.id
+           LEFT JOIN finalisations f ON f.unit_id = u.id
+           LEFT JOIN games g ON g.unit_id = u.id LEFT JOIN tournaments t ON t.id = g.tournament_id
+           WHERE u.state IN ('queued', 'leased') ORDER BY u.batch, u.queue_no"#
+    )
+    .fetch_all(connection)
+    .await?)
+}
+
+/// All accounts by number, without their jobs.
+async fn accounts(connection: &mut SqliteConnection) -> Result<BTreeMap<i64, AccountQueue>> {
+    let rows = sqlx::query!(
+        r#"SELECT a.account_no, a.lane, l.urgency AS "urgency: u32", l.rank AS "rank: u32",
+                  l.served_ms AS of_lane, a.served_ms
+           FROM accounts a JOIN lanes l ON l.lane = a.lane"#
+    )
+    .fetch_all(connection)
+    .await?;
+    let mut lanes = Vec::new();
+    Ok(rows
+        .into_iter()
+        .map(|row| {
+            let known = lanes.iter().position(|lane| *lane == row.lane);
+            let lane = known.unwrap_or_else(|| {
+                lanes.push(row.lane);
+                lanes.len() - 1
+            });
+            let account = AccountQueue {
+                lane,
+                urgency: row.urgency,
+                rank: row.rank,
+                lane_served_ms: row.of_lane as f64,
+                served_ms: row.served_ms as f64,
+                waiting: Default::default(),
+            };
+            (row.account_no, account)
+        })
+        .collect())
+}
+
+/// The entity that a job group belongs to.
+#[derive(Clone, Copy, PartialEq)]
+enum GroupTarget {
+    Submission(SubmissionId),
+    Evaluation(EvaluationId),
+    Game(GameId),
+    /// An ablation, a trial or a proposal: it only matters for the slots that it occupies.
+    Uncounted,
+}
+
+/// Greatest urgency value of the lanes that the forecast covers: validation runs, scoring, shards and games that count.
+const MAX_URGENCY: u32 = 1;
+
+/// Urgency of the lane of finalisations.
+const SCORING_URGENCY: u32 = 0;
+
+/// Duration of an episode of an open evaluation: the mean of its committed shards, else of its team's recent episodes.
+fn episode_ms(open: &OpenEvaluation, durations: &JobDurations) -> Option<f64> {
+    let (episodes, ms) = open.done;
+    match episodes {
+        0 => durations.episode_ms_of(open.team),
+        _ => Some(ms as f64 / f64::from(episodes)),
+    }
+}
+
+struct JobGroups<'a> {
+    durations: &'a JobDurations,
+    /// The first groups are those of these evaluations.
+    open: &'a [OpenEvaluation],
+    /// Index of the evaluation's group, by run.
+    by_run: HashMap<RunId, usize>,
+    groups: Vec<(GroupTarget, JobGroup)>,
+}
+
+impl<'a> JobGroups<'a> {
+    fn of_evaluations(open: &'a [OpenEvaluation], durations: &'a JobDurations) -> Self {
+        let follow_up = Some(durations.scoring_ms);
+        let group = |open: &OpenEvaluation| (GroupTarget::Evaluation(open.id), JobGroup { follow_up });
+        Self {
+            durations,
+            open,
+            by_run: (0..).zip(open).map(|(at, open)| (open.run, at)).collect(),
+            groups: open.iter().map(group).collect(),
+        }
+    }
+
+    /// The group of a job, which is added if it is new, and the whole duration of the job.
+    fn add_job(&mut self, job: &OpenJob) -> (usize, DurationMs) {
+        let group_of_run = |run: &Text<RunId>| self.by_run.get(&run.0).copied();
+        if let Some(group) = job.run.as_ref().and_then(group_of_run) {
+            let each_ms = episode_ms(&self.open[group], self.durations);
+            let duration = job.episodes.zip(each_ms);
+            return (group, duration.map(|(episodes, ms)| f64::from(episodes) * ms));
+        }
+        if let Some(id) = &job.score_of {
+            let is_target =
+                |(target, _): &(GroupTarget, JobGroup)| *target == GroupTarget::Evaluation(id.0);
+            if let Some(group) = self.groups.iter().position(is_target) {
+                // The finalisation is queued already.
+                self.groups[group].1.follow_up = None;
+                return (group, self.durations.scoring_ms);
+            }
+        }
+        if let Some(id) = &job.game {
+            let duration = job.game_steps.zip(self.durations.game_step_ms);
+            let duration = duration.map(|(steps, ms)| f64::from(steps) * ms);
+            return (self.push(GroupTarget::Game(id.0)), duration);
+        }
+        let (target, duration) = match &job.smoke_of {
+            Some(id) => (GroupTarget::Submission(id.0), self.durations.validation_ms),
+            None if job.urgency == SCORING_URGENCY => {
+                (GroupTarget::Uncounted, self.durations.scoring_ms)
+            }
+            None => {
+                let team: Option<TeamId> = job.holder.parse().ok();
+                let each_ms = team.and_then(|team| self.durations.episode_ms_of(team));
+                let duration = job.episodes.zip(each_ms);
+                let duration = duration.map(|(episodes, ms)| f64::from(episodes) * ms);
+                (GroupTarget::Uncounted, duration)
+            }
+        };
+        (self.push(target), duration)
+    }
+
+    fn push(&mut self, target: GroupTarget) -> usize {
+        self.groups.push((target, JobGroup { follow_up: None }));
+        self.groups.len() - 1
+    }
+}
+
+impl OpenJob {
+    /// The remaining duration of a running job: by the episodes that it has reported, else by the time since its claim.
+    fn remaining_ms(&self, duration: DurationMs, now: Timestamp) -> DurationMs {
+        let duration_ms = duration?;
+        let share_done = match self.episodes {
+            Some(episodes) if episodes > 0 && self.progress > 0 => {
+                f64::from(self.progress) / f64::from(episodes)
+            }
+            _ => {
+                let rest_ms = self.claimable_at.0.as_millisecond() - now.as_millisecond();
+                (self.charged_ms - rest_ms).max(0) as f64 / duration_ms.max(1.0)
+            }
+        };
+        Some((duration_ms * (1.0 - share_done)).max(0.0))
+    }
+}
+
+impl Store {
+    /// Queue positions and expected ends, if this number of slots works and no job is added.
+    #[boxed]
+    pub async fn queue_forecast(&self, slots: u32, now: Timestamp) -> Result<QueueForecast> {
+        let mut tx = self.database.read.begin().await?;
+        let open_jobs = open_jobs(&mut tx).await?;
+        if open_jobs.is_empty() {
+            return Ok(QueueForecast::default());
+        }
+        let open = job_durations::open_evaluations(&mut tx).await?;
+        let durations = job_durations::recent(&mut tx, &open, now).await?;
+        let is_paused = season::is_paused(&mut tx).await?;
+        let mut accounts = accounts(&mut tx).await?;
+        drop(tx);
+
+        let mut groups = JobGroups::of_evaluations(&open, &durations);
+        let mut running = Vec::new();
+        for job in &open_jobs {
+            let is_running = job.is_leased && job.claimable_at.0 > now;
+            if (job.urgency > MAX_URGENCY || job.is_paused) && !is_running {
+                continue;
+            }
+            let (group, duration) = groups.add_job(job);
+            if is_running {
+                running.push((job.remaining_ms(duration, now), group));
+            } else if let Some(account) = accounts.get_mut(&job.account) {
+                let rest_ms = job.claimable_at.0.as_millisecond() - now.as_millisecond();
+                account.waiting.push_back(QueuedJob {
+                    batch: job.batch,
+                    queue_no: job.queue_no,
+                    from_ms: rest_ms.max(0) as f64,
+                    duration,
+                    group,
+                });
+            }
+        }
+        let (targets, groups): (Vec<GroupTarget>, Vec<JobGroup>) =
+            groups.groups.into_iter().unzip();
+        let forecast = Forecast {
+            accounts: accounts.into_values().collect(),
+            groups,
+            running,
+        };
+        let ends = forecast.ends(usize::try_from(slots).unwrap_or(1));
+        Ok(positions(&targets, &ends, is_paused, now))
+    }
+
+    /// The backlog of all open evaluations, and the recent durations of jobs.
+    #[boxed]
+    pub async fn evaluation_backlog(
+        &self,
+        now: Timestamp,
+    ) -> Result<(Vec<EvaluationBacklog>, JobDurations)> {
+        let mut tx = self.database.read.begin().await?;
+        let open = job_durations::open_evaluations(&mut tx).await?;
+        let durations = job_durations::recent(&mut tx, &open, now).await?;
+        let backlog = |open: &OpenEvaluation| EvaluationBacklog {
+            stage_day: open.stage_day,
+            team: open.team,
+            episodes: open.episodes_left,
+            shards: open.shards_left,
+            max_faults: open.max_faults,
+            expected_ms: episode_ms(open, &durations).map(|ms| ms * f64::from(open.episodes_left)),
+        };
+        Ok((open.iter().map(backlog).collect(), durations))
+    }
+}
+
+/// The positions of all groups, counted separately for submissions, evaluations and games.
+fn positions(
+    targets: &[GroupTarget],
+    ends: &[GroupEnd],
+    is_paused: bool,
+    now: Timestamp,
+) -> QueueForecast {
+    let mut by_end: Vec<(&GroupTarget, &GroupEnd)> = targets.iter().zip(ends).collect();
+    by_end.sort_by_key(|(_, end)| end.rank);
+    let count = |is_kind: fn(&GroupTarget) -> bool| {
+        let count = targets.iter().filter(|target| is_kind(target)).count();
+        u32::try_from(count).unwrap_or(u32::MAX)
+    };
+    let submissions = count(|target| matches!(target, GroupTarget::Submission(_)));
+    let evaluations = count(|target| matches!(target, GroupTarget::Evaluation(_)));
+    let games = count(|target| matches!(target, GroupTarget::Game(_)));
+    let mut forecast = QueueForecast::default();
+    let expected_at = |end: &GroupEnd| {
+        let in_ms = end.in_ms.filter(|_| !is_paused)?;
+        let in_ms = SignedDuration::try_from_secs_f64(in_ms / 1000.0).ok()?;
+        now.checked_add(in_ms).ok()
+    };
+    let mut last = [0, 0, 0];
+    for (target, end) in by_end {
+        let expected_at = expected_at(end);
+        match target {
+            GroupTarget::Submission(id) => {
+                last[0] += 1;
+                let position = QueuePosition {
+                    position: last[0],
+                    total: submissions,
+                    expected_at,
+                };
+                forecast.submissions.insert(*id, position);
+            }
+            GroupTarget::Evaluation(id) => {
+                last[1] += 1;
+                let position = QueuePosition {
+                    position: last[1],
+                    total: evaluations,
+                    expected_at,
+                };
+                forecast.evaluations.insert(*id, position);
+            }
+            GroupTarget::Game(id) => {
+                last[2] += 1;
+                let position = QueuePosition {
+                    position: last[2],
+                    total: games,
+                    expected_at,
+                };
+                forecast.games.insert(*id, position);
+            }
+            GroupTarget::Uncounted => {}
+        }
+    }
+    forecast
+}

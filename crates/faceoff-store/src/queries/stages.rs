@@ -1,0 +1,36 @@
+use crate::{
+    boxed,
+    error::Result,
+    store::Store,
+    tables::stages::{self, Revision, Stage},
+};
+use faceoff_types::StageId;
+use jiff::Timestamp;
+
+impl Store {
+    /// All stages, by opening time.
+    #[boxed]
+    pub async fn stages(&self) -> Result<Vec<Stage>> {
+        stages::all(&mut *self.database.read.acquire().await?).await
+    }
+
+    /// The stage with this id.
+    #[boxed]
+    pub async fn stage(&self, id: StageId) -> Result<Stage> {
+        stages::find(&mut *self.database.read.acquire().await?, id).await
+    }
+
+    /// The current stage at `now`: of the open ones the one that opened last, else the one that closed last, else the
+    /// next to open. `None` before the server has created one.
+    #[boxed]
+    pub async fn current_stage(&self, now: Timestamp) -> Result<Option<Stage>> {
+        let stages = self.stages().await?;
+        Ok(stages::current(&stages, now).cloned())
+    }
+
+    /// All revisions of a stage's rules, the oldest first.
+    #[boxed]
+    pub async fn stage_revisions(&self, stage: StageId) -> Result<Vec<Revision>> {
+        stages::revisions(&mut *self.database.read.acquire().await?, stage).await
+    }
+}

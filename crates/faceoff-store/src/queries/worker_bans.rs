@@ -1,0 +1,61 @@
+//! Banned workers, and the results to which a worker has contributed.
+
+use crate::{
+    boxed,
+    error::Result,
+    store::Store,
+    tables::worker_bans::{self, WorkerBan},
+    workers::WorkerName,
+};
+use faceoff_types::{EvaluationId, GameId};
+use sqlx::types::Text;
+
+/// Finished results to which a worker has contributed.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct WorkerResults {
+    /// Finished evaluations that are not voided, the newest first.
+    pub evaluations: Vec<EvaluationId>,
+    /// Games whose result counts, the newest first.
+    pub games: Vec<GameId>,
+}
+
+impl Store {
+    /// All banned workers, by name.
+    #[boxed]
+    pub async fn worker_bans(&self) -> Result<Vec<WorkerBan>> {
+        worker_bans::all(&mut *self.database.read.acquire().await?).await
+    }
+
+    /// The counting results of a remote worker, at most `limit` of each kind.
+    #[boxed]
+    pub async fn results_of_worker(&self, worker: &WorkerName, limit: u32) -> Result<WorkerResults> {
+        let holder = worker.holder();
+        let mut connection = self.database.read.acquire().await?;
+        let evaluations = sqlx::query_scalar!(
+            r#"SELECT e.id AS "id!: Text<EvaluationId>"
+               FROM units u JOIN shards s ON s.unit_id = u.id JOIN evaluations e ON e.run_id = s.run_id
+               WHERE u.state = 'done' AND u.worker >= 'remote/' AND u.worker < 'remote0'
+                 AND u.worker >= ?1 || '/' AND u.worker < ?1 || '0'
+                 AND e.state = 'finished' AND e.voided_at IS NULL
+               GROUP BY e.id ORDER BY MAX(e.finished_at) DESC LIMIT ?2"#,
+            holder,
+            limit,
+        )
+        .fetch_all(&mut *connection)
+        .await?;
+        let games = sqlx::query_scalar!(
+            r#"SELECT g.id AS "id!: Text<GameId>" FROM games g
+               JOIN game_attempts a ON a.game_id = g.id AND a.number = g.attempt
+               WHERE a.worker >= ?1 || '/' AND a.worker < ?1 || '0'
+               ORDER BY a.ended_at DESC LIMIT ?2"#,
+            holder,
+            limit,
+        )
+        .fetch_all(&mut *connection)
+        .await?;
+        Ok(WorkerResults {
+            evaluations: evaluations.into_iter().map(|id| id.0).collect(),
+            games: games.into_iter().map(|id| id.0).collect(),
+        })
+    }
+}

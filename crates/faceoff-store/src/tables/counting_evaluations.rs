@@ -1,0 +1,155 @@
+//! Open, counting and voided evaluations of a day or a team, as needed for rulings.
+
+use crate::{column::Instant, error::Result, tables::rulings::Ruling};
+use faceoff_types::{EvaluationId, RunId, StageDay, TeamId};
+use jiff::Timestamp;
+use sqlx::{SqliteConnection, types::Text};
+
+/// The part of an evaluation's state that a ruling depends on.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct EvaluationStatus {
+    pub(crate) id: EvaluationId,
+    pub(crate) run: RunId,
+    pub(crate) is_open: bool,
+    /// It finished, or failed by agent faults, and was not voided.
+    pub(crate) counts: bool,
+}
+
+pub(crate) async fn of_day(
+    connection: &mut SqliteConnection,
+    stage_day: StageDay,
+) -> Result<Vec<EvaluationStatus>> {
+    let (stage, day) = (Text(stage_day.stage), Text(stage_day.date));
+    let rows = sqlx::query!(
+        r#"SELECT id AS "id: Text<EvaluationId>", run_id AS "run: Text<RunId>",
+                  state = 'open' AS "is_open!: bool",
+                  state IN ('finished', 'agent_failed') AND voided_at IS NULL AS "counts!: bool"
+           FROM evaluations WHERE stage_id = ? AND day = ? ORDER BY created_at, id"#,
+        stage,
+        day
+    )
+    .fetch_all(connection)
+    .await?;
+    Ok(rows
+        .into_iter()
+        .map(|row| EvaluationStatus {
+            id: row.id.0,
+            run: row.run.0,
+            is_open: row.is_open,
+            counts: row.counts,
+        })
+        .collect())
+}
+
+pub(crate) async fn of_day_and_team(
+    connection: &mut SqliteConnection,
+    stage_day: StageDay,
+    team: TeamId,
+) -> Result<Vec<EvaluationStatus>> {
+    let (stage, day, team) = (Text(stage_day.stage), Text(stage_day.date), Text(team));
+    let rows = sqlx::query!(
+        r#"SELECT id AS "id: Text<EvaluationId>", run_id AS "run: Text<RunId>",
+                  state = 'open' AS "is_open!: bool",
+                  state IN ('finished', 'agent_failed') AND voided_at IS NULL AS "counts!: bool"
+           FROM evaluations WHERE stage_id = ? AND day = ? AND team_id = ? ORDER BY created_at, id"#,
+        stage,
+        day,
+        team
+    )
+    .fetch_all(connection)
+    .await?;
+    Ok(rows
+        .into_iter()
+        .map(|row| EvaluationStatus {
+            id: row.id.0,
+            run: row.run.0,
+            is_open: row.is_open,
+            counts: row.counts,
+        })
+        .collect())
+}
+
+/// The newest revision of its stage's rules with an evaluation on this day; `None` if there is no evaluation.
+pub(crate) async fn revision_of_day(
+    connection: &mut SqliteConnection,
+    stage_day: StageDay,
+) -> Result<Option<u32>> {
+    let (stage, day) = (Text(stage_day.stage), Text(stage_day.date));
+    Ok(sqlx::query_scalar!(
+        r#"SELECT MAX(revision) AS "revision: u32" FROM evaluations WHERE stage_id = ? AND day = ?"#,
+        stage,
+        day
+    )
+    .fetch_one(connection)
+    .await?)
+}
+
+/// The open evaluations of a day whose runs are not complete.
+pub(crate) async fn incomplete_of_day(
+    connection: &mut SqliteConnection,
+    stage_day: StageDay,
+) -> Result<Vec<(EvaluationId, RunId)>> {
+    let (stage, day) = (Text(stage_day.stage), Text(stage_day.date));
+    let rows = sqlx::query!(
+        r#"SELECT e.id AS "id: Text<EvaluationId>", e.run_id AS "run: Text<RunId>"
+           FROM evaluations e JOIN runs r ON r.id = e.run_id
+           WHERE e.stage_id = ? AND e.day = ? AND e.state = 'open' AND r.state <> 'played'
+           ORDER BY e.created_at, e.id"#,
+        stage,
+        day
+    )
+    .fetch_all(connection)
+    .await?;
+    Ok(rows.into_iter().map(|row| (row.id.0, row.run.0)).collect())
+}
+
+/// The open evaluations of a team.
+pub(crate) async fn open_of_team(
+    connection: &mut SqliteConnection,
+    team: TeamId,
+) -> Result<Vec<(EvaluationId, RunId)>> {
+    let team = Text(team);
+    let rows = sqlx::query!(
+        r#"SELECT id AS "id: Text<EvaluationId>", run_id AS "run: Text<RunId>"
+           FROM evaluations WHERE team_id = ? AND state = 'open' ORDER BY created_at, id"#,
+        team
+    )
+    .fetch_all(connection)
+    .await?;
+    Ok(rows.into_iter().map(|row| (row.id.0, row.run.0)).collect())
+}
+
+/// Voids an evaluation: it does not count any more.
+pub(crate) async fn set_voided(
+    connection: &mut SqliteConnection,
+    id: EvaluationId,
+    ruling: &Ruling,
+) -> Result<()> {
+    let (id, at) = (Text(id), Instant(ruling.at));
+    sqlx::query!(
+        "UPDATE evaluations SET voided_at = ?, voided_for = ? WHERE id = ?",
+        at,
+        ruling.reason,
+        id,
+    )
+    .execute(connection)
+    .await?;
+    Ok(())
+}
+
+/// Marks an evaluation's dataset as published.
+pub(crate) async fn set_published(
+    connection: &mut SqliteConnection,
+    id: EvaluationId,
+    now: Timestamp,
+) -> Result<()> {
+    let (id, now) = (Text(id), Instant(now));
+    sqlx::query!(
+        "UPDATE evaluations SET published_at = ? WHERE id = ?",
+        now,
+        id
+    )
+    .execute(connection)
+    .await?;
+    Ok(())
+}

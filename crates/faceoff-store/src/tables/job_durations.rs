@@ -1,0 +1,161 @@
+//! Recent durations of jobs, as charged by the queue.
+
+use crate::{column::Instant, error::Result};
+use faceoff_types::{EvaluationId, RunId, StageDay, StageId, TeamId};
+use jiff::{SignedDuration, Timestamp, civil::Date, tz::TimeZone};
+use sqlx::{SqliteConnection, types::Text};
+use std::collections::HashMap;
+
+/// The measured period: a week has the current agents and all days of the week.
+const PERIOD: SignedDuration = SignedDuration::from_hours(7 * 24);
+
+/// Mean slot time of recent jobs, in milliseconds; `None` or absent if none was measured.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct JobDurations {
+    /// An episode, by team, including its share of starting and stopping the agent.
+    pub episode_ms: HashMap<TeamId, f64>,
+    /// An episode of any team.
+    pub mean_episode_ms: Option<f64>,
+    /// A validation run.
+    pub validation_ms: Option<f64>,
+    /// A finalisation: computing a score.
+    pub scoring_ms: Option<f64>,
+    /// A control step of a game of any teams.
+    pub game_step_ms: Option<f64>,
+}
+
+impl JobDurations {
+    /// An episode of this team, else of any team.
+    #[must_use]
+    pub fn episode_ms_of(&self, team: TeamId) -> Option<f64> {
+        self.episode_ms.get(&team).copied().or(self.mean_episode_ms)
+    }
+}
+
+/// An evaluation that has not ended.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct OpenEvaluation {
+    pub(crate) id: EvaluationId,
+    pub(crate) team: TeamId,
+    pub(crate) stage_day: StageDay,
+    pub(crate) run: RunId,
+    /// Episodes of its committed shards, and their slot time in milliseconds.
+    pub(crate) done: (u32, i64),
+    /// Episodes of its other shards.
+    pub(crate) episodes_left: u32,
+    /// Number of its other shards.
+    pub(crate) shards_left: u32,
+    /// It ends without a score after more agent faults than this.
+    pub(crate) max_faults: u32,
+}
+
+/// All open evaluations, in the order in which they were queued.
+pub(crate) async fn open_evaluations(connection: &mut SqliteConnection) -> Result<Vec<OpenEvaluation>> {
+    let rows = sqlx::query!(
+        r#"SELECT e.id AS "id!: Text<EvaluationId>", e.team_id AS "team!: Text<TeamId>",
+                  e.stage_id AS "stage!: Text<StageId>", e.day AS "day!: Text<Date>", e.run_id AS "run!: Text<RunId>",
+                  r.max_faults AS "max_faults!: u32",
+                  SUM(CASE WHEN u.state = 'done' AND u.charged_ms > 0 THEN s.end_episode - s.first_episode ELSE 0 END)
+                      AS "done_episodes!: u32",
+                  SUM(CASE WHEN u.state = 'done' THEN u.charged_ms ELSE 0 END) AS "done_ms!: i64",
+                  SUM(CASE WHEN u.state <> 'done' THEN s.end_episode - s.first_episode ELSE 0 END)
+                      AS "episodes_left!: u32",
+                  SUM(u.state <> 'done') AS "shards_left!: u32"
+           FROM evaluations e JOIN runs r ON r.id = e.run_id JOIN shards s ON s.run_id = e.run_id
+           JOIN units u ON u.id = s.unit_id
+           WHERE e.state = 'open' GROUP BY +e.id ORDER BY e.created_at, e.id"#
+    )
+    .fetch_all(connection)
+    .await?;
+    Ok(rows
+        .into_iter()
+        .map(|row| OpenEvaluation {
+            id: row.id.0,
+            team: row.team.0,
+            stage_day: StageDay {
+                stage: row.stage.0,
+                date: row.day.0,
+            },
+            run: row.run.0,
+            done: (row.done_episodes, row.done_ms),
+            episodes_left: row.episodes_left,
+            shards_left: row.shards_left,
+            max_faults: row.max_faults,
+        })
+        .collect())
+}
+
+/// The durations of the week until `now`, including those of open evaluations.
+pub(crate) async fn recent(
+    connection: &mut SqliteConnection,
+    open: &[OpenEvaluation],
+    now: Timestamp,
+) -> Result<JobDurations> {
+    let since = now.saturating_sub(PERIOD).unwrap_or(Timestamp::MIN);
+    // A stage's date may differ by a day from the UTC date.
+    let first = since.to_zoned(TimeZone::UTC).date();
+    let (first, since) = (Text(first.yesterday().unwrap_or(first)), Instant(since));
+    let rows = sqlx::query!(
+        r#"SELECT e.team_id AS "team!: Text<TeamId>", SUM(e.slot_ms) AS "slot_ms!: i64",
+                  SUM(r.episodes_per_task * json_array_length(r.tasks)) AS "episodes!: i64"
+           FROM evaluations e JOIN runs r ON r.id = e.run_id
+           WHERE e.day >= ? AND e.finished_at >= ? AND e.state = 'finished' AND e.slot_ms > 0 GROUP BY +e.team_id"#,
+        first,
+        since
+    )
+    .fetch_all(&mut *connection)
+    .await?;
+    let running = open
+        .iter()
+        .map(|open| (open.team, open.done.1, i64::from(open.done.0)));
+    let finished = rows
+        .into_iter()
+        .map(|row| (row.team.0, row.slot_ms, row.episodes));
+    let mut by_team: HashMap<TeamId, (i64, i64)> = HashMap::new();
+    for (team, ms, episodes) in finished.chain(running).filter(|(_, _, count)| *count > 0) {
+        let sum = by_team.entry(team).or_default();
+        *sum = (sum.0 + ms, sum.1 + episodes);
+    }
+    let all = by_team
+        .values()
+        .fold((0, 0), |all, team| (all.0 + team.0, all.1 + team.1));
+    let validation_ms = sqlx::query_scalar!(
+        r#"SELECT AVG(u.charged_ms) AS "ms: f64"
+           FROM submissions s JOIN smoke_runs r ON r.submission_id = s.id JOIN units u ON u.id = r.unit_id
+           WHERE s.created_at >= ? AND u.state = 'done' AND u.charged_ms > 0"#,
+        since
+    )
+    .fetch_one(&mut *connection)
+    .await?;
+    let finalisation_ms = sqlx::query_scalar!(
+        r#"SELECT AVG(u.charged_ms) AS "ms: f64"
+           FROM evaluations e JOIN finalisations f ON f.evaluation_id = e.id JOIN units u ON u.id = f.unit_id
+           WHERE e.day >= ? AND e.finished_at >= ? AND u.state = 'done' AND u.charged_ms > 0"#,
+        first,
+        since
+    )
+    .fetch_one(&mut *connection)
+    .await?;
+    let game_step_ms = sqlx::query_scalar!(
+        r#"SELECT AVG(CAST(u.charged_ms AS REAL) / json_extract(t.rules, '$.steps')) AS "ms: f64"
+           FROM games g JOIN tournaments t ON t.id = g.tournament_id JOIN units u ON u.id = g.unit_id
+           WHERE g.ended_at >= ? AND g.state = 'played' AND u.state = 'done' AND u.charged_ms > 0"#,
+        since
+    )
+    .fetch_one(connection)
+    .await?;
+    Ok(JobDurations {
+        game_step_ms,
+        mean_episode_ms: mean(all),
+        episode_ms: by_team
+            .into_iter()
+            .filter_map(|(team, sum)| Some((team, mean(sum)?)))
+            .collect(),
+        validation_ms,
+        scoring_ms: finalisation_ms,
+    })
+}
+
+fn mean((ms, episodes): (i64, i64)) -> Option<f64> {
+    (episodes > 0).then(|| ms as f64 / episodes as f64)
+}

@@ -1,0 +1,318 @@
+//! Evaluations of trials and proposals, in the table `drafts`. If a proposal is applied, they become regular
+//! evaluations with the same ids.
+
+use crate::{
+    column::{Instant, Json},
+    error::{Result, StoreError},
+    tables::{
+        evaluations::{EvaluationState, Failure},
+        runs::RunState,
+    },
+};
+use faceoff_types::{EvaluationId, EvaluationResult, ProposalId, RunId, SubmissionId, TeamId};
+use jiff::Timestamp;
+use sqlx::{SqliteConnection, types::Text};
+use uuid::Uuid;
+
+/// An evaluation of a trial or a proposal; it does not count.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ProposedEvaluation {
+    /// Also the id of the regular evaluation that it becomes if it is applied.
+    pub id: EvaluationId,
+    pub proposal: ProposalId,
+    pub submission: SubmissionId,
+    pub team: TeamId,
+    /// The evaluation that it repeats; `None` in a trial.
+    pub replaces: Option<EvaluationId>,
+    pub run: RunId,
+    /// When it was queued.
+    pub created_at: Timestamp,
+    pub state: EvaluationState,
+}
+
+/// A proposed evaluation with its run, without the run's progress.
+pub(crate) struct ProposedEvaluationRow {
+    id: Text<EvaluationId>,
+    pub(crate) proposal: Text<ProposalId>,
+    submission: Text<SubmissionId>,
+    team: Text<TeamId>,
+    replaces: Option<Text<EvaluationId>>,
+    pub(crate) run: Text<RunId>,
+    run_state: RunState,
+    episodes_total: u32,
+    created_at: Instant,
+    state: String,
+    finished_at: Option<Instant>,
+    reason: Option<String>,
+    dataset: Option<String>,
+    dataset_blake3: Option<String>,
+    result: Option<Json<EvaluationResult>>,
+}
+
+impl ProposedEvaluationRow {
+    pub(crate) fn into_evaluation(self, episodes_done: u32) -> Result<ProposedEvaluation> {
+        let id = self.id.0;
+        let damaged = || {
+            StoreError::Damaged(format!("proposed evaluation {id}: {} and incomplete", self.state))
+        };
+        let finished_at = self.finished_at.map(|at| at.0);
+        let state = match (self.state.as_str(), finished_at) {
+            ("open", None) => match self.run_state {
+                RunState::Queued => EvaluationState::Queued,
+                RunState::Running => EvaluationState::Running {
+                    episodes_done: episodes_done.min(self.episodes_total),
+                    episodes_total: self.episodes_total,
+                },
+                RunState::Complete => EvaluationState::Finalising,
+                RunState::Stopped => return Err(damaged()),
+            },
+            ("finished", Some(finished_at)) => EvaluationState::Finished {
+                finished_at,
+                result: Box::new(self.result.ok_or_else(damaged)?.0),
+                dataset: self.dataset.ok_or_else(damaged)?,
+                dataset_blake3: self.dataset_blake3,
+            },
+            ("agent_failed", Some(finished_at)) => EvaluationState::AgentFailed { finished_at },
+            ("platform_failed", Some(finished_at)) => EvaluationState::PlatformFailed {
+                finished_at,
+                reason: self.reason.ok_or_else(damaged)?,
+            },
+            ("cancelled", Some(finished_at)) => EvaluationState::Cancelled {
+                finished_at,
+                reason: self.reason.ok_or_else(damaged)?,
+            },
+            _ => return Err(damaged()),
+        };
+        Ok(ProposedEvaluation {
+            id,
+            proposal: self.proposal.0,
+            submission: self.submission.0,
+            team: self.team.0,
+            replaces: self.replaces.map(|id| id.0),
+            run: self.run.0,
+            created_at: self.created_at.0,
+            state,
+        })
+    }
+}
+
+/// `SELECT` of proposed evaluations with their runs; the arguments are the SQL after the tables, and its argument.
+macro_rules! select_proposed_evaluations {
+    ($tail:literal, $argument:expr) => {
+        sqlx::query_as!(
+            ProposedEvaluationRow,
+            r#"SELECT d.id AS "id: Text<EvaluationId>", d.proposal_id AS "proposal: Text<ProposalId>",
+                      d.submission_id AS "submission: Text<SubmissionId>", d.team_id AS "team: Text<TeamId>",
+                      d.replaces AS "replaces: Text<EvaluationId>", d.run_id AS "run: Text<RunId>",
+                      r.state AS "run_state: RunState",
+                      r.episodes_per_task * json_array_length(r.tasks) AS "episodes_total!: u32",
+                      d.created_at AS "created_at: Instant", d.state, d.finished_at AS "finished_at: Instant",
+                      d.reason, d.dataset, d.dataset_blake3, d.result AS "result: Json<EvaluationResult>"
+               FROM drafts d JOIN runs r ON r.id = d.run_id "# + $tail,
+            $argument
+        )
+    };
+}
+
+/// The proposed evaluation with this id.
+pub(crate) async fn find(connection: &mut SqliteConnection, id: EvaluationId) -> Result<ProposedEvaluationRow> {
+    let id = Text(id);
+    let found = select_proposed_evaluations!("WHERE d.id = ?", id).fetch_optional(connection);
+    found.await?.ok_or(StoreError::NotFound("evaluation"))
+}
+
+/// The evaluations of a proposal, in the order in which they were queued.
+pub(crate) async fn of_proposal(
+    connection: &mut SqliteConnection,
+    proposal: ProposalId,
+) -> Result<Vec<ProposedEvaluationRow>> {
+    let proposal = Text(proposal);
+    let evaluations = select_proposed_evaluations!(
+        "WHERE d.proposal_id = ? ORDER BY d.created_at, d.id",
+        proposal
+    );
+    Ok(evaluations.fetch_all(connection).await?)
+}
+
+/// The proposed evaluation that owns a run, if one does, and its proposal.
+pub(crate) async fn of_run(
+    connection: &mut SqliteConnection,
+    run: RunId,
+) -> Result<Option<(EvaluationId, ProposalId)>> {
+    let run = Text(run);
+    let found = sqlx::query!(
+        r#"SELECT id AS "id: Text<EvaluationId>", proposal_id AS "proposal: Text<ProposalId>"
+           FROM drafts WHERE run_id = ?"#,
+        run
+    )
+    .fetch_optional(connection)
+    .await?;
+    Ok(found.map(|row| (row.id.0, row.proposal.0)))
+}
+
+/// The proposed evaluation that a job scores, with its run and its proposal.
+pub(crate) async fn of_job(
+    connection: &mut SqliteConnection,
+    job: Uuid,
+) -> Result<Option<(EvaluationId, RunId, ProposalId)>> {
+    let job = Text(job);
+    let found = sqlx::query!(
+        r#"SELECT d.id AS "id: Text<EvaluationId>", d.run_id AS "run: Text<RunId>",
+                  d.proposal_id AS "proposal: Text<ProposalId>"
+           FROM draft_finalisations f JOIN drafts d ON d.id = f.draft_id WHERE f.unit_id = ?"#,
+        job
+    )
+    .fetch_optional(connection)
+    .await?;
+    Ok(found.map(|row| (row.id.0, row.run.0, row.proposal.0)))
+}
+
+pub(crate) async fn insert(connection: &mut SqliteConnection, new: &ProposedEvaluation) -> Result<()> {
+    let (id, proposal, submission) = (Text(new.id), Text(new.proposal), Text(new.submission));
+    let (team, replaces, run) = (Text(new.team), new.replaces.map(Text), Text(new.run));
+    let created_at = Instant(new.created_at);
+    sqlx::query!(
+        "INSERT INTO drafts (id, proposal_id, submission_id, team_id, replaces, run_id, created_at, state)
+         VALUES (?, ?, ?, ?, ?, ?, ?, 'open')",
+        id,
+        proposal,
+        submission,
+        team,
+        replaces,
+        run,
+        created_at,
+    )
+    .execute(connection)
+    .await?;
+    Ok(())
+}
+
+/// Notes which job scores a proposed evaluation.
+pub(crate) async fn insert_scoring(
+    connection: &mut SqliteConnection,
+    id: EvaluationId,
+    job: Uuid,
+) -> Result<()> {
+    let (id, job) = (Text(id), Text(job));
+    sqlx::query!(
+        "INSERT INTO draft_finalisations (draft_id, unit_id) VALUES (?, ?)",
+        id,
+        job
+    )
+    .execute(connection)
+    .await?;
+    Ok(())
+}
+
+/// The job that scores a proposed evaluation, or has scored it; `None` before that job is queued.
+pub(crate) async fn job_of(
+    connection: &mut SqliteConnection,
+    id: EvaluationId,
+) -> Result<Option<Uuid>> {
+    let id = Text(id);
+    let job = sqlx::query_scalar!(
+        r#"SELECT unit_id AS "id: Text<Uuid>" FROM draft_finalisations WHERE draft_id = ?"#,
+        id
+    )
+    .fetch_optional(connection)
+    .await?;
+    Ok(job.map(|id| id.0))
+}
+
+pub(crate) async fn set_finished(
+    connection: &mut SqliteConnection,
+    id: EvaluationId,
+    result: &EvaluationResult,
+    dataset: &str,
+    dataset_blake3: &str,
+    now: Timestamp,
+) -> Result<()> {
+    let (id, result, now) = (Text(id), Json(result), Instant(now));
+    sqlx::query!(
+        "UPDATE drafts SET state = 'finished', finished_at = ?, result = ?, dataset = ?, dataset_blake3 = ?
+         WHERE id = ?",
+        now,
+        result,
+        dataset,
+        dataset_blake3,
+        id,
+    )
+    .execute(connection)
+    .await?;
+    Ok(())
+}
+
+pub(crate) async fn set_failed(
+    connection: &mut SqliteConnection,
+    id: EvaluationId,
+    failure: Failure<'_>,
+    now: Timestamp,
+) -> Result<()> {
+    let (id, now) = (Text(id), Instant(now));
+    let (state, reason) = match failure {
+        Failure::Agent => ("agent_failed", None),
+        Failure::Platform(reason) => ("platform_failed", Some(reason)),
+        Failure::Cancelled(reason) | Failure::NotPlayed(reason) => ("cancelled", Some(reason)),
+    };
+    sqlx::query!(
+        "UPDATE drafts SET state = ?, finished_at = ?, reason = ? WHERE id = ?",
+        state,
+        now,
+        reason,
+        id,
+    )
+    .execute(connection)
+    .await?;
+    Ok(())
+}
+
+/// Number of open evaluations, of one proposal or of all.
+pub(crate) async fn count_open(
+    connection: &mut SqliteConnection,
+    proposal: Option<ProposalId>,
+) -> Result<u32> {
+    let proposal = proposal.map(Text);
+    Ok(sqlx::query_scalar!(
+        r#"SELECT COUNT(*) AS "count!: u32" FROM drafts
+           WHERE state = 'open' AND (?1 IS NULL OR proposal_id = ?1)"#,
+        proposal
+    )
+    .fetch_one(connection)
+    .await?)
+}
+
+/// Evaluations of proposals that were dropped until `before` and whose datasets are still stored.
+pub(crate) async fn dropped_with_datasets(
+    connection: &mut SqliteConnection,
+    before: Timestamp,
+) -> Result<Vec<(EvaluationId, String)>> {
+    let before = Instant(before);
+    let rows = sqlx::query!(
+        r#"SELECT d.id AS "id: Text<EvaluationId>", d.dataset AS "dataset!"
+           FROM proposals p JOIN drafts d ON d.proposal_id = p.id
+           WHERE p.outcome = 'dropped' AND p.settled_at <= ? AND d.dataset IS NOT NULL AND d.dataset_removed_at IS NULL"#,
+        before
+    )
+    .fetch_all(connection)
+    .await?;
+    Ok(rows
+        .into_iter()
+        .map(|row| (row.id.0, row.dataset))
+        .collect())
+}
+
+pub(crate) async fn set_dataset_removed(
+    connection: &mut SqliteConnection,
+    id: EvaluationId,
+    now: Timestamp,
+) -> Result<()> {
+    let (id, now) = (Text(id), Instant(now));
+    sqlx::query!(
+        "UPDATE drafts SET dataset_removed_at = ? WHERE id = ?",
+        now,
+        id
+    )
+    .execute(connection)
+    .await?;
+    Ok(())
+}

@@ -1,0 +1,52 @@
+//! Finalisations: jobs that score evaluations whose shards are all committed.
+
+use crate::error::Result;
+use faceoff_types::EvaluationId;
+use sqlx::{SqliteConnection, types::Text};
+use uuid::Uuid;
+
+pub(crate) async fn insert(
+    connection: &mut SqliteConnection,
+    evaluation: EvaluationId,
+    job: Uuid,
+) -> Result<()> {
+    let (evaluation, job) = (Text(evaluation), Text(job));
+    sqlx::query!(
+        "INSERT INTO finalisations (evaluation_id, unit_id) VALUES (?, ?)",
+        evaluation,
+        job,
+    )
+    .execute(connection)
+    .await?;
+    Ok(())
+}
+
+/// The evaluation that a job scores.
+pub(crate) async fn of_job(
+    connection: &mut SqliteConnection,
+    job: Uuid,
+) -> Result<Option<EvaluationId>> {
+    let job = Text(job);
+    let found = sqlx::query_scalar!(
+        r#"SELECT evaluation_id AS "id: Text<EvaluationId>" FROM finalisations WHERE unit_id = ?"#,
+        job
+    )
+    .fetch_optional(connection)
+    .await?;
+    Ok(found.map(|id| id.0))
+}
+
+/// The job that scores an evaluation; `None` before it is queued.
+pub(crate) async fn job_of(
+    connection: &mut SqliteConnection,
+    evaluation: EvaluationId,
+) -> Result<Option<Uuid>> {
+    let evaluation = Text(evaluation);
+    let found = sqlx::query_scalar!(
+        r#"SELECT unit_id AS "id: Text<Uuid>" FROM finalisations WHERE evaluation_id = ?"#,
+        evaluation
+    )
+    .fetch_optional(connection)
+    .await?;
+    Ok(found.map(|id| id.0))
+}

@@ -1,0 +1,210 @@
+use crate::{
+    column::Instant,
+    error::{Result, StoreError},
+};
+use faceoff_types::{UserId, UserName, TeamId};
+use jiff::Timestamp;
+use sqlx::{SqliteConnection, types::Text};
+
+/// A user with an account: an organiser, or a member of one team for the whole season.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct User {
+    pub id: UserId,
+    /// The name to sign in with, unique regardless of case.
+    pub name: UserName,
+    /// The team of a member; `None` for an organiser.
+    pub team: Option<TeamId>,
+    /// When the invitation was accepted.
+    pub joined_at: Timestamp,
+    /// When the account was closed.
+    pub left_at: Option<Timestamp>,
+    /// False if the user can only use tokens.
+    pub has_password: bool,
+    /// The newest version of the terms that the user has accepted.
+    pub accepted_terms: Option<u32>,
+}
+
+struct Row {
+    id: Text<UserId>,
+    name: Text<UserName>,
+    team_id: Option<Text<TeamId>>,
+    joined_at: Instant,
+    left_at: Option<Instant>,
+    has_password: bool,
+    accepted_terms: Option<u32>,
+}
+
+impl From<Row> for User {
+    fn from(row: Row) -> Self {
+        Self {
+            id: row.id.0,
+            name: row.name.0,
+            team: row.team_id.map(|id| id.0),
+            joined_at: row.joined_at.0,
+            left_at: row.left_at.map(|at| at.0),
+            has_password: row.has_password,
+            accepted_terms: row.accepted_terms,
+        }
+    }
+}
+
+/// `SELECT` of whole users; the argument is the SQL after `FROM people`.
+macro_rules! select_users {
+    ($tail:literal $(, $argument:expr)*) => {
+        sqlx::query_as!(
+            Row,
+            r#"SELECT id AS "id: Text<UserId>", name AS "name: Text<UserName>",
+                      team_id AS "team_id: Text<TeamId>", joined_at AS "joined_at: Instant",
+                      left_at AS "left_at: Instant", password IS NOT NULL AS "has_password!: bool",
+                      accepted_terms AS "accepted_terms: u32"
+               FROM people "# + $tail
+            $(, $argument)*
+        )
+    };
+}
+
+/// All users, including those who have left, by name.
+pub(crate) async fn all(connection: &mut SqliteConnection) -> Result<Vec<User>> {
+    let rows = select_users!("ORDER BY name")
+        .fetch_all(connection)
+        .await?;
+    Ok(rows.into_iter().map(User::from).collect())
+}
+
+/// The members of a team, including those who have left, by name.
+pub(crate) async fn of_team(
+    connection: &mut SqliteConnection,
+    team: TeamId,
+) -> Result<Vec<User>> {
+    let team = Text(team);
+    let rows = select_users!("WHERE team_id = ? ORDER BY name", team)
+        .fetch_all(connection)
+        .await?;
+    Ok(rows.into_iter().map(User::from).collect())
+}
+
+pub(crate) async fn find(connection: &mut SqliteConnection, id: UserId) -> Result<User> {
+    let id = Text(id);
+    select_users!("WHERE id = ?", id)
+        .fetch_optional(connection)
+        .await?
+        .map(User::from)
+        .ok_or(StoreError::NotFound("user"))
+}
+
+/// The active user of this name with the hash of the password, if they have one.
+pub(crate) async fn find_with_password(
+    connection: &mut SqliteConnection,
+    name: &str,
+) -> Result<Option<(UserId, String)>> {
+    let row = sqlx::query!(
+        r#"SELECT id AS "id: Text<UserId>", password AS "password!" FROM people
+           WHERE name = ? AND password IS NOT NULL AND left_at IS NULL"#,
+        name
+    )
+    .fetch_optional(connection)
+    .await?;
+    Ok(row.map(|row| (row.id.0, row.password)))
+}
+
+/// Adds a user. [`StoreError::UserNameTaken`] if the name exists, regardless of case.
+pub(crate) async fn insert(
+    connection: &mut SqliteConnection,
+    user: &User,
+    password: Option<&str>,
+) -> Result<()> {
+    let (id, name) = (Text(user.id), user.name.as_str());
+    let (team, joined_at) = (user.team.map(Text), Instant(user.joined_at));
+    sqlx::query!(
+        "INSERT INTO people (id, name, team_id, joined_at, password, accepted_terms) VALUES (?, ?, ?, ?, ?, ?)",
+        id,
+        name,
+        team,
+        joined_at,
+        password,
+        user.accepted_terms,
+    )
+    .execute(connection)
+    .await
+    .map_err(|error| {
+        if StoreError::is_duplicate(&error, "people.name") {
+            StoreError::UserNameTaken(user.name.to_string())
+        } else {
+            error.into()
+        }
+    })?;
+    Ok(())
+}
+
+pub(crate) async fn set_password(
+    connection: &mut SqliteConnection,
+    id: UserId,
+    password: &str,
+) -> Result<()> {
+    let id = Text(id);
+    sqlx::query!("UPDATE people SET password = ? WHERE id = ?", password, id)
+        .execute(connection)
+        .await?;
+    Ok(())
+}
+
+pub(crate) async fn set_accepted_terms(
+    connection: &mut SqliteConnection,
+    id: UserId,
+    version: u32,
+) -> Result<()> {
+    let id = Text(id);
+    sqlx::query!(
+        "UPDATE people SET accepted_terms = ? WHERE id = ?",
+        version,
+        id
+    )
+    .execute(connection)
+    .await?;
+    Ok(())
+}
+
+pub(crate) async fn set_left(
+    connection: &mut SqliteConnection,
+    id: UserId,
+    at: Timestamp,
+) -> Result<()> {
+    let (id, at) = (Text(id), Instant(at));
+    sqlx::query!(
+        "UPDATE people SET left_at = ?, password = NULL WHERE id = ?",
+        at,
+        id
+    )
+    .execute(connection)
+    .await?;
+    Ok(())
+}
+
+/// Number of active organisers.
+pub(crate) async fn count_organisers(connection: &mut SqliteConnection) -> Result<i64> {
+    Ok(
+        sqlx::query_scalar!(
+            "SELECT COUNT(*) FROM people WHERE team_id IS NULL AND left_at IS NULL"
+        )
+        .fetch_one(connection)
+        .await?,
+    )
+}
+
+/// Does the team have active members, of whom none has accepted this version of the terms?
+pub(crate) async fn lacks_accepted_terms(
+    connection: &mut SqliteConnection,
+    team: TeamId,
+    version: u32,
+) -> Result<bool> {
+    let team = Text(team);
+    Ok(sqlx::query_scalar!(
+        r#"SELECT EXISTS (SELECT 1 FROM people WHERE team_id = ?1 AND left_at IS NULL)
+              AND NOT EXISTS (SELECT 1 FROM people
+                              WHERE team_id = ?1 AND left_at IS NULL AND accepted_terms >= ?2) AS "owes!: bool""#,
+        team,
+        version
+    )
+    .fetch_one(connection)
+    .await?)
+}

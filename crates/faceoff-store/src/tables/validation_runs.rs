@@ -1,0 +1,37 @@
+//! Validation runs, which check that a submission's agent starts, responds, and meets its time limits.
+
+use crate::error::Result;
+use faceoff_types::SubmissionId;
+use sqlx::{SqliteConnection, types::Text};
+use uuid::Uuid;
+
+pub(crate) async fn insert(
+    connection: &mut SqliteConnection,
+    submission: SubmissionId,
+    job: Uuid,
+) -> Result<()> {
+    let (submission, job) = (Text(submission), Text(job));
+    sqlx::query!(
+        "INSERT INTO smoke_runs (submission_id, unit_id) VALUES (?, ?)",
+        submission,
+        job,
+    )
+    .execute(connection)
+    .await?;
+    Ok(())
+}
+
+/// The submission that a job validates.
+pub(crate) async fn of_job(
+    connection: &mut SqliteConnection,
+    job: Uuid,
+) -> Result<Option<SubmissionId>> {
+    let job = Text(job);
+    let found = sqlx::query_scalar!(
+        r#"SELECT submission_id AS "id: Text<SubmissionId>" FROM smoke_runs WHERE unit_id = ?"#,
+        job
+    )
+    .fetch_optional(connection)
+    .await?;
+    Ok(found.map(|id| id.0))
+}

@@ -1,0 +1,149 @@
+use crate::fixture::*;
+use faceoff_store::*;
+use sqlx::Connection;
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 4)]
+async fn concurrent_openers_agree_on_one_season() {
+    let folder = tempfile::tempdir().unwrap();
+    let openers: Vec<_> = (0..8)
+        .map(|_| {
+            let path = folder.path().to_owned();
+            tokio::spawn(async move { Store::open(&path).await.unwrap().season().await.unwrap() })
+        })
+        .collect();
+    let mut commitments = Vec::new();
+    for opener in openers {
+        let season = opener.await.unwrap();
+        assert_eq!(
+            season.commitment,
+            blake3::hash(season.secret.as_bytes()).to_string(),
+            "the commitment is the hash of the secret"
+        );
+        commitments.push(season.commitment);
+    }
+    commitments.dedup();
+    assert_eq!(commitments.len(), 1);
+    let another = TestStore::new().await.store.season().await.unwrap();
+    assert_ne!(
+        another.commitment, commitments[0],
+        "secrets are random"
+    );
+}
+
+#[tokio::test]
+async fn reopened_store_has_all_data() {
+    let f = TestStore::new().await;
+    let submission = f.ready_team("Alpha").await;
+    let evaluation = f.evaluate(submission.id, &plan()).await;
+    let (claim, _, shard) = f.claim_shard().await;
+    f.commit_shard(&claim, &shard, 1).await;
+    let (held, ..) = f.claim_shard().await;
+    let before = f.store.evaluation(evaluation.id).await.unwrap();
+    let season = f.store.season().await.unwrap();
+    f.store.close().await;
+    let reopened = f.reopen().await;
+    assert_eq!(reopened.evaluation(evaluation.id).await.unwrap(), before);
+    assert_eq!(
+        reopened.submission(submission.id).await.unwrap(),
+        submission
+    );
+    assert_eq!(reopened.season().await.unwrap().secret, season.secret);
+    assert!(
+        reopened.heartbeat(&held, 1, LEASE_S, f.now).await.unwrap(),
+        "leases outlive the process"
+    );
+}
+
+/// Damages the database with a statement of another connection.
+async fn damage(f: &TestStore, sql: &'static str) {
+    let mut connection = f.connection().await;
+    let unchecked = "PRAGMA foreign_keys = OFF";
+    sqlx::raw_sql(unchecked)
+        .execute(&mut connection)
+        .await
+        .unwrap();
+    sqlx::raw_sql(sql).execute(&mut connection).await.unwrap();
+    connection.close().await.unwrap();
+}
+
+#[tokio::test]
+async fn damaged_values_are_reported_without_panic() {
+    let f = TestStore::new().await;
+    let submission = f.ready_team("Alpha").await;
+    let evaluation = f.evaluate(submission.id, &plan()).await;
+    let damages = [
+        "UPDATE evaluations SET day = 'someday'",
+        "UPDATE runs SET profile = 'dream'",
+        "UPDATE runs SET tasks = '[\"hit\"'",
+        "UPDATE evaluations SET created_at = 9223372036854775807",
+        "UPDATE runs SET max_faults = 5000000000",
+    ];
+    for sql in damages {
+        damage(&f, sql).await;
+        let error = f.store.evaluation(evaluation.id).await.unwrap_err();
+        assert!(matches!(&error, StoreError::Damaged(_)), "{sql}: {error:?}");
+        let error = f.store.evaluations_of(submission.team).await.unwrap_err();
+        assert!(matches!(&error, StoreError::Damaged(_)), "{sql}: {error:?}");
+    }
+    damage(&f, "UPDATE teams SET name = '<b>'").await;
+    assert!(matches!(f.store.teams().await, Err(StoreError::Damaged(_))));
+    damage(&f, "PRAGMA foreign_keys = OFF; UPDATE teams SET id = 'x'").await;
+    assert!(matches!(f.store.teams().await, Err(StoreError::Damaged(_))));
+}
+
+#[tokio::test]
+async fn damaged_job_does_not_block_others() {
+    let f = TestStore::new().await;
+    let alpha = f.ready_team("Alpha").await;
+    let beta = f.ready_team("Beta").await;
+    let sound = f.evaluate(beta.id, &plan()).await;
+    damage(
+        &f,
+        "UPDATE runs SET profile = 'dream' WHERE id = (SELECT run_id FROM contestants c
+             JOIN submissions s ON s.id = c.submission_id JOIN teams t ON t.id = s.team_id
+             WHERE t.name = 'Alpha')",
+    )
+    .await;
+    let (_, run, _) = f.claim_shard().await;
+    assert_eq!(run.id, sound.run);
+    damage(
+        &f,
+        "UPDATE runs SET profile = 'ideal' WHERE profile = 'dream'",
+    )
+    .await;
+    let evaluations = f.store.evaluations_of(alpha.team).await.unwrap();
+    let state = &evaluations[0].state;
+    assert!(
+        matches!(state, EvaluationState::PlatformFailed { .. }),
+        "{state:?}"
+    );
+    assert_eq!(evaluations.len(), 1, "it is not rerun");
+}
+
+#[tokio::test]
+async fn incomplete_states_cannot_be_stored() {
+    let f = TestStore::new().await;
+    let submission = f.ready_team("Alpha").await;
+    f.evaluate(submission.id, &plan()).await;
+    let mut connection = f.connection().await;
+    for sql in [
+        "UPDATE evaluations SET state = 'finished', finished_at = 1, dataset = 'd'",
+        "UPDATE evaluations SET state = 'platform_failed', finished_at = 1",
+        "UPDATE submissions SET state = 'invalid'",
+        "UPDATE shards SET committed_at = 1, recording = 'r'",
+        "UPDATE units SET state = 'leased'",
+        "UPDATE tokens SET hash = x'00'",
+        "UPDATE tokens SET owner = 'person'",
+        "UPDATE tokens SET kind = 'session'",
+        "UPDATE teams SET disqualified_at = 1",
+    ] {
+        let error = sqlx::raw_sql(sql)
+            .execute(&mut connection)
+            .await
+            .unwrap_err();
+        assert!(
+            error.to_string().contains("CHECK constraint failed"),
+            "{sql}: {error}"
+        );
+    }
+}

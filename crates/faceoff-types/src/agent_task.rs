@@ -1,0 +1,144 @@
+use crate::Task;
+use serde::{Deserialize, Serialize};
+use std::fmt;
+
+/// The task of an agent: a qualifying task, or one side of a game. Its JSON is `{"task":"hit"}` or
+/// `{"task":"tournament","side":2}`, for use with `#[serde(flatten)]`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(try_from = "Fields", into = "Fields")]
+pub enum AgentTask {
+    /// Episodes of a qualifying task.
+    Qualifying(Task),
+    /// A game against another agent.
+    Game {
+        /// The side that the agent plays.
+        side: Side,
+    },
+}
+
+impl AgentTask {
+    /// `agent_id` of the protocol: 1, or 2 for the second side of a game.
+    #[must_use]
+    pub const fn agent_id(self) -> u32 {
+        match self {
+            Self::Qualifying(_) => 1,
+            Self::Game { side } => side.number(),
+        }
+    }
+}
+
+impl From<Task> for AgentTask {
+    fn from(task: Task) -> Self {
+        Self::Qualifying(task)
+    }
+}
+
+impl fmt::Display for AgentTask {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Qualifying(task) => task.fmt(f),
+            Self::Game { side } => write!(f, "tournament, side {}", side.number()),
+        }
+    }
+}
+
+/// A side of a game. Its JSON is its number, 1 or 2.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(try_from = "u32", into = "u32")]
+pub enum Side {
+    /// The simulator's first robot.
+    First,
+    /// The simulator's second robot.
+    Second,
+}
+
+impl Side {
+    /// Both sides, in the order of pairs.
+    pub const BOTH: [Self; 2] = [Self::First, Self::Second];
+
+    #[must_use]
+    pub const fn other(self) -> Self {
+        match self {
+            Self::First => Self::Second,
+            Self::Second => Self::First,
+        }
+    }
+
+    /// The number in the protocol: 1 or 2.
+    #[must_use]
+    pub const fn number(self) -> u32 {
+        match self {
+            Self::First => 1,
+            Self::Second => 2,
+        }
+    }
+
+    /// Index in pairs: 0 or 1.
+    #[must_use]
+    pub const fn index(self) -> usize {
+        match self {
+            Self::First => 0,
+            Self::Second => 1,
+        }
+    }
+}
+
+impl From<Side> for u32 {
+    fn from(side: Side) -> Self {
+        side.number()
+    }
+}
+
+impl TryFrom<u32> for Side {
+    type Error = String;
+    fn try_from(number: u32) -> Result<Self, String> {
+        match number {
+            1 => Ok(Self::First),
+            2 => Ok(Self::Second),
+            other => Err(format!("a game has the sides 1 and 2, not {other}")),
+        }
+    }
+}
+
+/// The JSON form of [`AgentTask`].
+#[derive(Serialize, Deserialize)]
+struct Fields {
+    task: Name,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    side: Option<Side>,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+enum Name {
+    Hit,
+    Defend,
+    Prepare,
+    Tournament,
+}
+
+impl From<AgentTask> for Fields {
+    fn from(agent_task: AgentTask) -> Self {
+        let (task, side) = match agent_task {
+            AgentTask::Qualifying(Task::Hit) => (Name::Hit, None),
+            AgentTask::Qualifying(Task::Defend) => (Name::Defend, None),
+            AgentTask::Qualifying(Task::Prepare) => (Name::Prepare, None),
+            AgentTask::Game { side } => (Name::Tournament, Some(side)),
+        };
+        Self { task, side }
+    }
+}
+
+impl TryFrom<Fields> for AgentTask {
+    type Error = &'static str;
+    fn try_from(Fields { task, side }: Fields) -> Result<Self, Self::Error> {
+        match (task, side) {
+            (Name::Hit, None) => Ok(Self::Qualifying(Task::Hit)),
+            (Name::Defend, None) => Ok(Self::Qualifying(Task::Defend)),
+            (Name::Prepare, None) => Ok(Self::Qualifying(Task::Prepare)),
+            (Name::Tournament, Some(side)) => Ok(Self::Game { side }),
+            (Name::Tournament, None) => Err("a tournament needs a side, 1 or 2"),
+            (_, Some(_)) => Err("only a tournament has sides"),
+        }
+    }
+}

@@ -1,0 +1,49 @@
+use crate::Task;
+use serde::{Deserialize, Serialize};
+
+/// The outcome of a validation run.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "verdict", rename_all = "snake_case")]
+pub enum ValidationOutcome {
+    /// The agent starts, answers, and does so in time.
+    Valid {
+        /// Runtime named in its manifest.
+        runtime: String,
+        /// Name of the agent in its manifest.
+        agent_name: String,
+        /// Answer times, one entry per task.
+        timing: Vec<ValidationTiming>,
+        /// Tail of its standard error.
+        log: String,
+    },
+    Invalid {
+        /// Runtime named in its manifest, if that could be read.
+        runtime: Option<String>,
+        /// Name of the agent in its manifest, if that could be read.
+        agent_name: Option<String>,
+        /// What is wrong, and where.
+        reason: String,
+        /// Answer times of the tasks that were played.
+        timing: Vec<ValidationTiming>,
+        /// Tail of its standard error.
+        log: String,
+    },
+}
+
+/// Answer times of an agent in a validation run.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
+pub struct ValidationTiming {
+    /// The task.
+    pub task: Task,
+    /// Control steps that were answered.
+    pub steps: u32,
+    /// Mean computation time of a step, seconds.
+    pub mean_s: f64,
+    /// 99th percentile of the computation times, seconds.
+    pub p99_s: f64,
+    /// Longest computation time of a step, seconds.
+    pub max_s: f64,
+    /// Penalty points per episode for computation time.
+    pub points_per_episode: f64,
+}

@@ -1,0 +1,275 @@
+//! Jobs as slots receive them, locally or on another machine, and the reports that slots send back.
+//!
+//! A job carries the seeds of its own episodes, never the secret from which they are derived. So a worker learns
+//! nothing about other days.
+
+use crate::game::GameSpec;
+use faceoff_types::{
+    AgentLimits, BundleRef, EpisodeOutcome, EvaluationId, EvaluationResult, GameId,
+    PerturbationSettings, Profile, Ruleset, Seed, ValidationOutcome, StageRuntimes, SubmissionId, Task,
+    Variation,
+};
+use jiff::Timestamp;
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+use std::{fmt, ops::Range};
+use uuid::Uuid;
+
+/// A job that is leased to one slot.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct JobSpec {
+    /// The slot's right to run the job, for a limited time.
+    pub lease: Lease,
+    /// What the slot has to do.
+    #[serde(rename = "assignment")]
+    pub payload: JobPayload,
+}
+
+/// Files of a shard that are stored in addition to the episodes' outcomes.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum OutputFiles {
+    /// No files.
+    #[serde(rename = "nothing")]
+    None,
+    /// The clips for replays, under this key.
+    Clips(String),
+    /// The complete recording, under this key prefix.
+    Recording(String),
+}
+
+/// A slot's right to run a job for a limited time.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Lease {
+    /// Id of the job in the queue; the same for each lease of the job.
+    #[serde(rename = "unit")]
+    pub job_id: Uuid,
+    /// Random id of this lease.
+    pub nonce: Uuid,
+    /// Name of the lease holder.
+    pub slot: String,
+    /// When the lease ends unless it is renewed, by the server's clock.
+    pub expires_at: Timestamp,
+    /// Duration of the lease, and of each renewal, in seconds. Remote workers use it in place of `expires_at`, since
+    /// their clocks may differ.
+    pub duration_s: u32,
+}
+
+/// The task of a job, by its kind.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "snake_case")]
+pub enum JobPayload {
+    /// Check whether a submitted agent starts, answers and keeps the time limits.
+    #[serde(rename = "smoke")]
+    Validation {
+        /// The submission; used in log messages.
+        submission: SubmissionId,
+        /// The submitted file, which may not be a valid bundle.
+        agent: AgentSpec,
+        /// The episodes of the validation run.
+        spec: ValidationSpec,
+        /// Stages of which at least one must accept the agent's runtime; empty: every runtime is accepted.
+        #[serde(default, skip_serializing_if = "Vec::is_empty")]
+        runtimes: Vec<StageRuntimes>,
+    },
+    /// Play a range of episodes.
+    #[serde(rename = "play")]
+    Shard {
+        /// Id of the evaluation or ablation; used in log messages.
+        part_of: Uuid,
+        /// An agent with a valid bundle.
+        agent: AgentSpec,
+        /// The episodes and how to simulate them.
+        spec: ShardSpec,
+        /// Files to store in addition to the outcomes.
+        #[serde(rename = "keeps")]
+        output: OutputFiles,
+    },
+    /// Play a game.
+    Game {
+        /// Id of the game; used in log messages and for live updates.
+        game: GameId,
+        /// Number of the attempt, from 1.
+        attempt: u32,
+        /// Two agents with valid bundles, the home side's first. They may be the same agent.
+        agents: Box<[AgentSpec; 2]>,
+        /// The rules, length and seeds of the game.
+        spec: GameSpec,
+        /// Key prefix for the recording; `None`: only the score is stored.
+        recording: Option<String>,
+    },
+    /// Merge the recordings of an evaluation into its dataset and score them.
+    #[serde(rename = "finalise")]
+    Scoring {
+        /// Id of the evaluation; used in log messages.
+        evaluation: EvaluationId,
+        /// Metadata of the dataset.
+        meta: EvaluationMeta,
+        /// Key prefixes of the recordings, in order of play.
+        recordings: Vec<String>,
+        /// Storage key for the dataset.
+        dataset: String,
+    },
+}
+
+/// An agent with its limits. They are the same in a validation run and in an evaluation.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct AgentSpec {
+    /// The agent's bundle.
+    pub bundle: BundleRef,
+    /// Limits, enforced by the slot.
+    pub limits: AgentLimits,
+}
+
+/// Storage key and hashes of a game's files.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct GameFiles {
+    /// Key prefix under which `game.zip`, `side-1.zip` and `side-2.zip` are stored.
+    pub key: String,
+    /// BLAKE3 of `game.zip`, 64 hexadecimal digits.
+    pub game_blake3: String,
+    /// BLAKE3 of `side-1.zip` and `side-2.zip`; the home side is side 1.
+    pub side_blake3: [String; 2],
+}
+
+/// Seeds of the episodes of a validation run.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct ValidationSpec {
+    /// The submission's own seed.
+    pub seed: Seed,
+    /// Seed of the season's model mismatch, so that the robot is the same as in counting evaluations.
+    pub mismatch_seed: Seed,
+}
+
+/// A range of episodes and how to simulate them.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ShardSpec {
+    /// The ruleset; absent in recordings of the first ruleset.
+    #[serde(default = "first_ruleset")]
+    pub ruleset: Ruleset,
+    /// The task.
+    pub task: Task,
+    /// The episodes, by their index within the evaluation.
+    pub episodes: Range<u32>,
+    /// The perturbation profile.
+    pub profile: Profile,
+    /// The evaluation's seed.
+    pub seed: Seed,
+    /// The seed of the season's model mismatch.
+    pub mismatch_seed: Seed,
+    /// Agent faults allowed; one more ends the shard early.
+    pub max_faults: u32,
+    /// Number of earlier attempts that a platform fault ended.
+    #[serde(default)]
+    pub platform_retries: u32,
+    /// Magnitudes of the profile's perturbations; absent: the ruleset's.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub perturbations: Box<PerturbationSettings>,
+}
+
+/// Metadata of an evaluation's dataset.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct EvaluationMeta {
+    /// The perturbation profile.
+    pub profile: Profile,
+    /// The evaluation's seed.
+    pub seed: Seed,
+    /// The seed of the season's model mismatch.
+    pub mismatch_seed: Seed,
+    /// The agent's name.
+    pub agent: String,
+    /// The ruleset of the evaluation.
+    pub ruleset: Ruleset,
+    /// Deviations from the ruleset, in playing and in scoring.
+    #[serde(flatten)]
+    pub variation: Variation,
+}
+
+fn is_default(perturbations: &PerturbationSettings) -> bool {
+    *perturbations == PerturbationSettings::default()
+}
+
+const fn first_ruleset() -> Ruleset {
+    Ruleset::First
+}
+
+/// The result of a completed job. A platform fault yields no report: it releases the job.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "snake_case")]
+pub enum JobReport {
+    /// Of [`JobPayload::Validation`].
+    #[serde(rename = "smoke")]
+    Validation(ValidationOutcome),
+    /// Of [`JobPayload::Shard`].
+    #[serde(rename = "play")]
+    Shard {
+        /// One outcome per episode, in order; fewer if faults ended the shard.
+        outcomes: Vec<EpisodeOutcome>,
+        /// Tail of the agent's standard error, with its faults.
+        log: String,
+        /// Did the agent exceed the allowed faults, so that the remaining episodes were not played?
+        stopped_by_faults: bool,
+        /// Key prefix of the recording, if it was stored.
+        recording: Option<String>,
+    },
+    /// Of [`JobPayload::Game`].
+    Game {
+        /// The score: the content of the game's `results.json`.
+        score: Value,
+        /// The game's files, if they were stored.
+        recording: Option<GameFiles>,
+        /// Tails of both agents' standard errors with their faults, the home side's first.
+        logs: [String; 2],
+    },
+    /// Of [`JobPayload::Scoring`].
+    #[serde(rename = "finalise")]
+    Scoring {
+        /// Storage key of the dataset.
+        dataset: String,
+        /// BLAKE3 of the dataset archive, 64 hexadecimal digits.
+        blake3: String,
+        /// The score: the content of `results.json`.
+        result: Box<EvaluationResult>,
+    },
+}
+
+impl JobReport {
+    /// Number of episodes played; 0 for other kinds of jobs.
+    #[must_use]
+    pub fn episodes(&self) -> u32 {
+        match self {
+            Self::Shard { outcomes, .. } => u32::try_from(outcomes.len()).unwrap_or(u32::MAX),
+            Self::Validation(_) | Self::Game { .. } | Self::Scoring { .. } => 0,
+        }
+    }
+}
+
+/// The description used in log messages.
+impl fmt::Display for JobPayload {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Validation { submission, .. } => write!(f, "validation run of submission {submission}"),
+            Self::Shard { part_of, spec, .. } => write!(
+                f,
+                "{} episodes {} to {} of {part_of}, profile {}",
+                spec.task,
+                spec.episodes.start,
+                spec.episodes.end.saturating_sub(1),
+                spec.profile
+            ),
+            Self::Game {
+                game,
+                attempt,
+                spec,
+                ..
+            } => write!(
+                f,
+                "game {game}, {} steps, profile {}, attempt {attempt}",
+                spec.steps, spec.profile
+            ),
+            Self::Scoring { evaluation, .. } => {
+                write!(f, "scoring of evaluation {evaluation}")
+            }
+        }
+    }
+}

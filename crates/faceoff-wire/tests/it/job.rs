@@ -1,0 +1,239 @@
+//! Jobs and reports survive a round trip through JSON.
+
+use faceoff_types::*;
+use faceoff_wire::game::GameSpec;
+use faceoff_wire::job::*;
+use serde::{Serialize, de::DeserializeOwned};
+use std::{collections::BTreeMap, fmt::Debug};
+use uuid::Uuid;
+
+fn assert_round_trips<T: Serialize + DeserializeOwned + PartialEq + Debug>(value: &T) {
+    let text = serde_json::to_string(value).expect("it is JSON");
+    assert_eq!(
+        serde_json::from_str::<T>(&text)
+            .as_ref()
+            .expect("it is read back"),
+        value,
+        "{text}"
+    );
+}
+
+fn job(payload: JobPayload) -> JobSpec {
+    JobSpec {
+        lease: Lease {
+            job_id: Uuid::from_u128(1),
+            nonce: Uuid::from_u128(2),
+            slot: "worker/slot-0".into(),
+            expires_at: "2026-03-01T06:00:30.25Z".parse().expect("an instant"),
+            duration_s: 30,
+        },
+        payload,
+    }
+}
+
+fn agent() -> AgentSpec {
+    AgentSpec {
+        bundle: BundleRef {
+            key: "bundles/x".into(),
+            bytes: 1 << 40,
+            blake3: "ab".repeat(32),
+            file_name: "agent é.tar.gz".into(),
+        },
+        limits: AgentLimits::default(),
+    }
+}
+
+fn shard(recording: Option<&str>) -> JobPayload {
+    JobPayload::Shard {
+        part_of: Uuid::from_u128(3),
+        agent: agent(),
+        spec: ShardSpec {
+            ruleset: Ruleset::CURRENT,
+            platform_retries: 1,
+            task: Task::Defend,
+            episodes: 100..u32::MAX,
+            profile: Profile::TrackingLoss,
+            seed: Seed::from_number(4),
+            mismatch_seed: Seed::from_number(5),
+            max_faults: 6,
+            perturbations: Default::default(),
+        },
+        output: recording.map_or(OutputFiles::None, |key| OutputFiles::Recording(key.to_owned())),
+    }
+}
+
+fn game(recording: Option<&str>) -> JobPayload {
+    JobPayload::Game {
+        game: Uuid::from_u128(4).into(),
+        attempt: 2,
+        agents: Box::new([agent(), agent()]),
+        spec: GameSpec {
+            ruleset: Ruleset::CURRENT,
+            steps: 45_000,
+            profile: Profile::Evaluation,
+            seed: Seed::from_number(6),
+            mismatch_seed: Seed::from_number(5),
+            limits: GameLimits::default(),
+            platform_retries: 1,
+            perturbations: Default::default(),
+        },
+        recording: recording.map(str::to_owned),
+    }
+}
+
+#[test]
+fn all_jobs_round_trip() {
+    let scoring = JobPayload::Scoring {
+        evaluation: EvaluationId::new(),
+        meta: EvaluationMeta {
+            profile: Profile::Evaluation,
+            seed: Seed::from_number(7),
+            mismatch_seed: Seed::from_number(8),
+            agent: "striker".into(),
+            ruleset: Ruleset::CURRENT,
+            variation: Default::default(),
+        },
+        recordings: vec!["recordings/a".into(), "recordings/b".into()],
+        dataset: "datasets/c.zip".into(),
+    };
+    let validation = JobPayload::Validation {
+        submission: SubmissionId::new(),
+        agent: agent(),
+        spec: ValidationSpec {
+            seed: Seed::from_number(3),
+            mismatch_seed: Seed::from_number(4),
+        },
+        runtimes: vec![StageRuntimes {
+            stage: "Qualifying".parse().unwrap(),
+            runtimes: ["native".to_owned()].into_iter().collect(),
+        }],
+    };
+    for payload in [
+        validation,
+        shard(Some("recordings/a")),
+        shard(None),
+        game(Some("games/a")),
+        game(None),
+        scoring,
+    ] {
+        assert_round_trips(&job(payload));
+    }
+}
+
+#[test]
+fn all_reports_round_trip() {
+    let outcome = EpisodeOutcome {
+        task: Task::Hit,
+        episode: 1,
+        steps: 499,
+        end: EpisodeEnd::AgentFault,
+        success: false,
+        violations: Violations::default(),
+        computation_time: ComputationTime {
+            mean_s: 0.1 + 0.2,
+            max_s: 1e-7,
+        },
+        fault: Some(AgentFault {
+            fault: AgentFaultKind::Exited { code: 3 },
+            agent_task: Task::Hit.into(),
+            episode: Some(1),
+            step: None,
+            line: Some("\u{fffd}".into()),
+        }),
+    };
+    let result = EvaluationResult {
+        ruleset: RULESET.into(),
+        profile: Profile::Evaluation,
+        seed: Seed::from_number(1),
+        tasks: BTreeMap::new(),
+        score: 54.9,
+        penalty_points: 327.5,
+        tier: Tier::Deployable,
+        timing: Some(SlotTiming::default()),
+        variation: Default::default(),
+    };
+    let reports = [
+        JobReport::Validation(ValidationOutcome::Valid {
+            runtime: "native".into(),
+            agent_name: "striker".into(),
+            timing: Vec::new(),
+            log: "begun\n".into(),
+        }),
+        JobReport::Validation(ValidationOutcome::Invalid {
+            runtime: None,
+            agent_name: None,
+            reason: "agent.toml is missing".into(),
+            timing: Vec::new(),
+            log: String::new(),
+        }),
+        JobReport::Shard {
+            outcomes: vec![outcome],
+            log: "begun\n".into(),
+            stopped_by_faults: true,
+            recording: Some("recordings/a".into()),
+        },
+        JobReport::Game {
+            score: serde_json::json!({"winner": null, "sides": [{"goals": 3}, {"goals": 3}]}),
+            recording: Some(GameFiles {
+                key: "games/a".into(),
+                game_blake3: "ab".repeat(32),
+                side_blake3: ["cd".repeat(32), "ef".repeat(32)],
+            }),
+            logs: ["begun\n".into(), String::new()],
+        },
+        JobReport::Scoring {
+            dataset: "datasets/c.zip".into(),
+            blake3: "cd".repeat(32),
+            result: Box::new(result),
+        },
+    ];
+    for report in reports {
+        assert_round_trips(&report);
+    }
+}
+
+#[test]
+fn job_description_names_the_job() {
+    let description = shard(None).to_string();
+    assert_eq!(
+        description,
+        "defend episodes 100 to 4294967294 of 00000000-0000-0000-0000-000000000003, profile \
+         tracking_loss"
+    );
+    let description = game(None).to_string();
+    assert_eq!(
+        description,
+        "game 00000000-0000-0000-0000-000000000004, 45000 steps, profile evaluation, attempt 2"
+    );
+}
+
+#[test]
+fn jobs_without_variation_round_trip_unchanged() {
+    let JobPayload::Shard { spec, .. } = shard(None) else {
+        unreachable!();
+    };
+    let text = serde_json::to_string(&spec).expect("it is JSON");
+    assert!(!text.contains("perturbations"), "{text}");
+    let read: ShardSpec = serde_json::from_str(&text).expect("it comes back");
+    assert_eq!(*read.perturbations, PerturbationSettings::default());
+    let mut changed = spec;
+    changed.perturbations.disturbance.sigma_n_per_m_s = 1.0 / 3.0;
+    assert_round_trips(&changed);
+
+    let meta = EvaluationMeta {
+        profile: Profile::Evaluation,
+        seed: Seed::from_number(1),
+        mismatch_seed: Seed::from_number(2),
+        agent: "a".into(),
+        ruleset: Ruleset::CURRENT,
+        variation: Variation::default(),
+    };
+    let text = serde_json::to_string(&meta).expect("it is JSON");
+    for key in ["weights", "tier_bounds", "perturbations", "variation"] {
+        assert!(!text.contains(key), "{text}");
+    }
+    let mut changed = meta;
+    changed.variation.weights = "0.1,0.2,0.7".parse().expect("they sum to 1");
+    changed.variation.perturbations.tracking_loss.steps = [1, 2];
+    assert_round_trips(&changed);
+}

@@ -1,0 +1,97 @@
+//! Periodic removal of data that is no longer needed.
+
+use crate::{ablation_clips, boxed};
+use faceoff_scoring::EpisodeSummary;
+use faceoff_store::{ClearableRun, Store};
+use jiff::{SignedDuration, Timestamp};
+
+/// Upper bound of the time that writing an artifact takes.
+const LONGEST_WRITE: SignedDuration = SignedDuration::from_hours(1);
+
+/// Removes obsolete recordings, the data of old runs and half-written files, and keeps the database's log short.
+/// Failures are logged, and retried by the next call.
+#[boxed]
+pub async fn clean_up(store: &Store, now: Timestamp) {
+    if let Err(error) = store.remove_old_recordings(now).await {
+        tracing::warn!(%error, "old recordings could not be removed");
+    }
+    if let Err(error) = clear_runs(store, now).await {
+        tracing::warn!(
+            error = format!("{error:#}"),
+            "finished runs could not be cleared"
+        );
+    }
+    if let Err(error) = store.remove_dropped_datasets(now).await {
+        tracing::warn!(%error, "datasets of dropped proposals could not be removed");
+    }
+    if let Err(error) = store.delete_old_deliveries(now).await {
+        tracing::warn!(%error, "old webhook deliveries could not be removed");
+    }
+    ablation_clips::join_parts(store).await;
+    apply_retentions(store, now).await;
+    if let Err(error) = store.checkpoint().await {
+        tracing::warn!(%error, "the database's log could not be copied");
+    }
+    let abandoned = store.artifacts().remove_abandoned(now - LONGEST_WRITE);
+    if let Err(error) = abandoned.await {
+        tracing::warn!(%error, "half-written artifacts could not be removed");
+    }
+    remove_invalid_bundles(store, now).await;
+    match store.remove_orphaned_bundles(now - LONGEST_WRITE).await {
+        Ok(0) => {}
+        Ok(bundles) => tracing::info!(bundles, "bundles without a submission were removed"),
+        Err(error) => tracing::warn!(%error, "bundles without a submission could not be removed"),
+    }
+}
+
+/// Applies the stages' retentions, and measures the remaining datasets.
+async fn apply_retentions(store: &Store, now: Timestamp) {
+    if let Err(error) = store.measure_datasets(now).await {
+        tracing::warn!(%error, "datasets could not be measured");
+    }
+    match store.apply_retentions(now).await {
+        Ok(removed) if removed.is_empty() => {}
+        Ok(removed) => tracing::info!(
+            datasets = removed.datasets,
+            archives = removed.bundles,
+            bytes = removed.bytes,
+            "files were removed according to the stages' retentions"
+        ),
+        Err(error) => tracing::warn!(%error, "the stages' retentions could not be applied"),
+    }
+}
+
+/// Removes the bundles of invalid submissions.
+pub(crate) async fn remove_invalid_bundles(store: &Store, now: Timestamp) {
+    match store.remove_refused_bundles(now).await {
+        Ok(0) => {}
+        Ok(bundles) => tracing::info!(bundles, "invalid bundles were removed"),
+        Err(error) => tracing::warn!(%error, "invalid bundles could not be removed"),
+    }
+}
+
+/// Clears finished runs, each in its own transaction, so that a failure does not affect the others.
+async fn clear_runs(store: &Store, now: Timestamp) -> anyhow::Result<()> {
+    for clearable in store.clearable_runs(EpisodeSummary::VERSION, now).await? {
+        let run = clearable.run;
+        if let Err(error) = clear_run(store, clearable, now).await {
+            tracing::warn!(%run, error = format!("{error:#}"), "a finished run could not be cleared");
+        }
+    }
+    Ok(())
+}
+
+/// Clears a run after storing a summary of its episodes, if it has none.
+async fn clear_run(store: &Store, clearable: ClearableRun, now: Timestamp) -> anyhow::Result<()> {
+    let ClearableRun { run, needs_summary: wants_summary } = clearable;
+    if wants_summary {
+        let outcomes = store.outcomes(run).await?;
+        let bounds = store.run_variation(run).await?.tier_bounds;
+        let summary = tokio::task::spawn_blocking(move || EpisodeSummary::from_outcomes(&outcomes, &bounds));
+        let json = serde_json::to_string(&summary.await??)?;
+        store
+            .store_episode_summary(run, EpisodeSummary::VERSION, &json, now)
+            .await?;
+    }
+    Ok(store.clear_run(run, now).await?)
+}

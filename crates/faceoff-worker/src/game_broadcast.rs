@@ -1,0 +1,67 @@
+use crate::{
+    lease::Progress,
+    server::{GameUpdate, JobServer},
+};
+use faceoff_runner::LiveFeedSink;
+use faceoff_types::{GameId, LiveEvent, LivePosition};
+use faceoff_wire::job::Lease;
+use std::sync::Arc;
+
+/// Publishes live updates of a running game, and reports its progress to the lease keeper, until it is dropped.
+pub(crate) struct GameBroadcast {
+    server: Arc<dyn JobServer>,
+    lease: Lease,
+    game: GameId,
+    attempt: u32,
+    progress: Progress,
+}
+
+impl GameBroadcast {
+    pub(crate) fn begin(
+        server: Arc<dyn JobServer>,
+        lease: Lease,
+        (game, attempt): (GameId, u32),
+        steps: u32,
+        progress: Progress,
+    ) -> Self {
+        let broadcast = Self {
+            server,
+            lease,
+            game,
+            attempt,
+            progress,
+        };
+        broadcast.publish(GameUpdate::Started { steps });
+        broadcast
+    }
+
+    pub(crate) const fn progress(&self) -> &Progress {
+        &self.progress
+    }
+
+    fn publish(&self, update: GameUpdate) {
+        self.server
+            .publish_game(&self.lease, (self.game, self.attempt), update);
+    }
+}
+
+impl LiveFeedSink for GameBroadcast {
+    fn receive(&mut self, events: Vec<LiveEvent>, position: LivePosition) {
+        self.progress.game_stepped(position.step);
+        self.publish(GameUpdate::Progress {
+            events,
+            position,
+        });
+    }
+
+    fn cancelled(&self) -> bool {
+        self.progress.stopped()
+    }
+}
+
+/// Ends the broadcast, even if a panic ends the game.
+impl Drop for GameBroadcast {
+    fn drop(&mut self) {
+        self.publish(GameUpdate::Ended);
+    }
+}

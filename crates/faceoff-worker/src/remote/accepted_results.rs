@@ -1,0 +1,310 @@
+//! Accepts results of remote workers after checking them.
+
+use super::{
+    dispatch::{Dispatcher, POLL_INTERVAL},
+    grants::{Acceptance, open_grant, store_result},
+    pending_results::PendingResult,
+    names,
+};
+use crate::server::{ReleaseReason, LeaseStatus, JobServer};
+use anyhow::Context as _;
+use async_nats::jetstream::{self, AckKind};
+use faceoff_store::{Actor, StoreError, WorkerName};
+use faceoff_types::escape_unprintable;
+use faceoff_wire::{
+    grant::Grant,
+    remote::{JobEnd, ResultMessage},
+};
+use futures::StreamExt as _;
+use std::{
+    sync::Arc,
+    time::{Duration, Instant},
+};
+use tokio::task::{JoinError, JoinSet};
+use tokio_util::sync::CancellationToken;
+
+/// Delay before a result that could not be stored is delivered again.
+const RETRY_AFTER: Duration = Duration::from_secs(5);
+/// Delay before a result whose files are still being uploaded is delivered again.
+const FILES_RETRY_AFTER: Duration = Duration::from_secs(1);
+/// Maximum number of results checked at a time; each check occupies a thread.
+const MAX_CONCURRENT_CHECKS: usize = 2;
+/// Maximum number of pending results looked up in the stream at a time, since each lookup reads the whole message.
+const MAX_LOOKUPS: usize = 16;
+/// Maximum length of a worker's description of a platform fault, in characters.
+const MAX_REASON_CHARS: usize = 500;
+
+impl Dispatcher {
+    /// Accepts results until the shutdown. Fetches no more than can be checked at once: NATS would deliver a waiting result
+    /// again after a while.
+    pub(super) async fn accept_results(
+        self: &Arc<Self>,
+        shutdown: &CancellationToken,
+    ) -> anyhow::Result<()> {
+        let mut checks = JoinSet::new();
+        let mut ended = self.fetch(&mut checks, shutdown).await;
+        // Running checks are completed even if no more results can be fetched.
+        while let Some(done) = checks.join_next().await {
+            ended = ended.and(join_result(Some(done)));
+        }
+        ended
+    }
+
+    async fn fetch(
+        self: &Arc<Self>,
+        checks: &mut JoinSet<anyhow::Result<()>>,
+        shutdown: &CancellationToken,
+    ) -> anyhow::Result<()> {
+        let mut consumer = self.streams.results().await?;
+        let mut undelivered = None;
+        while !shutdown.is_cancelled() {
+            while checks.len() >= MAX_CONCURRENT_CHECKS {
+                join_result(checks.join_next().await)?;
+            }
+            let mut results = consumer
+                .batch()
+                .max_messages(MAX_CONCURRENT_CHECKS - checks.len())
+                .expires(POLL_INTERVAL)
+                .messages()
+                .await
+                .context("fetching results")?;
+            let mut is_empty = true;
+            while let Some(message) = results.next().await {
+                is_empty = false;
+                let message = message.map_err(|error| anyhow::anyhow!(error))?;
+                let dispatcher = Arc::clone(self);
+                checks.spawn(async move {
+                    let acknowledgement = dispatcher.accept(&message).await;
+                    let acknowledged = message.ack_with(acknowledgement).await;
+                    acknowledged.map_err(|error| anyhow::anyhow!(error))
+                });
+            }
+            while let Some(done) = checks.try_join_next() {
+                join_result(Some(done))?;
+            }
+            if is_empty {
+                let checked = self.streams.check_results(&mut consumer, &mut undelivered);
+                checked.await?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Renews the leases of pending results, since their slots run other jobs. A job whose result NATS has lost is released.
+    pub(super) async fn keep_pending(&self, shutdown: &CancellationToken) -> anyhow::Result<()> {
+        let every = Duration::from_secs(self.server.lease_s.into()) / 3;
+        while !shutdown.is_cancelled() {
+            let mut overdue = self.pending_results.overdue(Instant::now());
+            for PendingResult {
+                lease,
+                episodes_done,
+                ..
+            } in overdue.clone()
+            {
+                let (server, nonce) = (self.server.clone(), lease.nonce);
+                let renewed =
+                    tokio::task::spawn_blocking(move || server.renew(&lease, episodes_done));
+                if renewed.await?? == LeaseStatus::Lost {
+                    self.pending_results.remove(nonce);
+                }
+            }
+            // NATS loses results in order, so checking the oldest ones suffices.
+            overdue.sort_by_key(|result| result.since);
+            overdue.truncate(MAX_LOOKUPS);
+            for PendingResult {
+                lease, sequence, ..
+            } in overdue
+            {
+                let is_stored = self.streams.has_result(&lease, sequence).await?;
+                // A result that is being processed, or was accepted meanwhile, is not lost.
+                if is_stored || self.pending_results.is_processed(lease.nonce) {
+                    continue;
+                }
+                self.pending_results.remove(lease.nonce);
+                tracing::warn!(job = %lease.job_id, slot = lease.slot, "NATS has lost a result: the job is queued again");
+                let server = self.server.clone();
+                let released = tokio::task::spawn_blocking(move || {
+                    server.release(&lease, ReleaseReason::Shutdown)
+                });
+                released.await??;
+            }
+            tokio::select! {
+                () = shutdown.cancelled() => {}
+                () = tokio::time::sleep(every) => {}
+            }
+        }
+        Ok(())
+    }
+
+    /// Checks and stores a result; how to acknowledge its message.
+    async fn accept(&self, message: &jetstream::Message) -> AckKind {
+        let Some(worker) = names::worker_of(&message.subject) else {
+            tracing::error!(subject = %message.subject, "a result from an unknown worker; ignored");
+            return AckKind::Term;
+        };
+        let mut result: ResultMessage = match serde_json::from_slice(&message.payload) {
+            Ok(result) => result,
+            Err(error) => {
+                tracing::error!(%worker, %error, "a worker sent an unreadable result; ignored");
+                return AckKind::Term;
+            }
+        };
+        let id = result.lease.job_id;
+        let Some(grant) = open_grant(&result, &self.remote.key) else {
+            tracing::error!(job = %id, %worker, "a worker sent a result without a valid grant; ignored");
+            return AckKind::Ack;
+        };
+        if !result.lease.slot.starts_with(&names::slot(&worker, "")) {
+            result.lease.slot = names::slot(&worker, "?");
+        }
+        let (workers, now) = (self.server.store.workers(), self.server.clock.now());
+        if workers.ban_reason(worker.as_str()).is_some() {
+            tracing::warn!(job = %id, %worker, "the worker is banned; result ignored");
+            return AckKind::Ack;
+        }
+        let nonce = result.lease.nonce;
+        // Only the worker that started the job may send its result.
+        let is_over = match self.server.store.lease_holder(id, nonce).await {
+            Ok(Some(holder)) if WorkerName::from_holder(&holder).as_ref() != Some(&worker) => {
+                tracing::warn!(job = %id, %worker, holder, "the worker does not have the lease; result ignored");
+                return AckKind::Ack;
+            }
+            Ok(holder) => holder.is_none(),
+            Err(error) => {
+                tracing::error!(job = %id, %worker, %error, "the lease of a result could not be read; trying again");
+                return AckKind::Nak(Some(RETRY_AFTER));
+            }
+        };
+        if grant.program != self.remote.required.program
+            && matches!(result.end, JobEnd::Done { .. })
+        {
+            tracing::info!(job = %id, %worker, "the result is from another program version: the job is queued again");
+            result.end = JobEnd::Shutdown;
+        }
+        if let JobEnd::PlatformFault { reason } = &mut result.end {
+            *reason = escape_unprintable(reason).chars().take(MAX_REASON_CHARS).collect();
+        }
+        let failed = matches!(result.end, JobEnd::PlatformFault { .. });
+        let was_played = matches!(result.end, JobEnd::Done { .. });
+        let record_failure = || {
+            if let Some((jobs, until)) = workers.record_failure(worker.as_str(), id, now) {
+                tracing::warn!(%worker, jobs, %until, "all recent jobs of a worker failed; it gets none for a while");
+            }
+        };
+        let _processing = self.pending_results.start_processing(nonce);
+        let acknowledgement = match self.check_and_store(message, grant, result).await {
+            // A repeated result has no effect.
+            Ok(Acceptance::Accepted | Acceptance::Unusable) if is_over => {
+                tracing::info!(job = %id, %worker, "the job is over already; result ignored");
+                AckKind::Ack
+            }
+            Ok(Acceptance::Accepted) => {
+                workers.end_job(id);
+                if was_played {
+                    workers.record_success(worker.as_str());
+                }
+                if failed {
+                    record_failure();
+                }
+                tracing::info!(job = %id, %worker, "result accepted");
+                AckKind::Ack
+            }
+            Ok(Acceptance::Unusable) => {
+                workers.end_job(id);
+                record_failure();
+                tracing::info!(job = %id, %worker, "result not acceptable: the job is queued again");
+                AckKind::Ack
+            }
+            Ok(Acceptance::LeaseLost) => {
+                tracing::info!(job = %id, %worker, "lease lost; result ignored");
+                AckKind::Ack
+            }
+            Ok(Acceptance::Rejected(difference)) => match self.ban(&worker, &difference).await {
+                retry @ AckKind::Nak(_) => return retry,
+                acknowledgement => acknowledgement,
+            },
+            Ok(Acceptance::FilesPending) => return AckKind::Nak(Some(FILES_RETRY_AFTER)),
+            Err(error) => {
+                tracing::error!(job = %id, %worker, cause = format!("{error:#}"), "a result could not be stored; trying again");
+                return AckKind::Nak(Some(RETRY_AFTER));
+            }
+        };
+        // Results that are delivered again (the early returns above) stay pending.
+        self.pending_results.remove(nonce);
+        workers.forget_files(nonce);
+        acknowledgement
+    }
+
+    /// Checks and stores a result. Meanwhile its lease is renewed, and NATS gets notices that the message is being processed.
+    async fn check_and_store(
+        &self,
+        message: &jetstream::Message,
+        grant: Grant,
+        result: ResultMessage,
+    ) -> anyhow::Result<Acceptance> {
+        let (server, checks, lease) = (
+            self.server.clone(),
+            self.remote.checks(),
+            result.lease.clone(),
+        );
+        let (episodes_done, bucket) = (grant.episodes(), self.bucket.clone());
+        let mut storing = tokio::spawn(async move {
+            let bucket = bucket.filter(|_| matches!(result.end, JobEnd::Done { .. }));
+            if let Some(bucket) = &bucket
+                && server.store.is_leased(grant.job_id, grant.nonce).await?
+            {
+                bucket.fetch_files(&grant, server.store.artifacts()).await?;
+            }
+            let job_grant = grant.clone();
+            let stored = tokio::task::spawn_blocking(move || store_result(&server, &checks, &job_grant, result))
+                .await??;
+            if let Some(bucket) = &bucket {
+                bucket.delete_files(&grant).await;
+            }
+            anyhow::Ok(stored)
+        });
+        let interval = self.server.renewal_interval(&lease);
+        loop {
+            tokio::select! {
+                stored = &mut storing => return stored.map_err(anyhow::Error::from).flatten(),
+                () = tokio::time::sleep(interval) => {}
+            }
+            let server = self.server.clone();
+            let lease_copy = lease.clone();
+            let renewed = tokio::task::spawn_blocking(move || server.renew(&lease_copy, episodes_done)).await;
+            if let Err(error) = renewed.map_err(anyhow::Error::from).flatten() {
+                tracing::warn!(job = %lease.job_id, cause = format!("{error:#}"), "the lease of a result under check could not be renewed");
+            }
+            // If this fails, NATS delivers the message again, which has no effect.
+            let _ = message.ack_with(AckKind::Progress).await;
+        }
+    }
+
+    /// Bans a worker: its results are ignored, and its jobs are queued again.
+    async fn ban(&self, worker: &WorkerName, difference: &str) -> AckKind {
+        let reason = format!("its recording differs from the simulation: {difference}");
+        let (store, now) = (&self.server.store, self.server.clock.now());
+        match store.ban_worker(Actor::Server, worker, &reason, now).await {
+            Ok(requeued) => {
+                tracing::error!(
+                    %worker,
+                    difference,
+                    requeued,
+                    "a worker is banned: its recording differs from the simulation"
+                );
+                AckKind::Ack
+            }
+            // Another of its results has caused the ban at the same time.
+            Err(StoreError::Conflict(_)) => AckKind::Ack,
+            Err(error) => {
+                tracing::error!(%worker, %error, difference, "a worker could not be banned; trying again");
+                AckKind::Nak(Some(RETRY_AFTER))
+            }
+        }
+    }
+}
+
+/// The result of a spawned check.
+fn join_result(done: Option<Result<anyhow::Result<()>, JoinError>>) -> anyhow::Result<()> {
+    done.map_or(Ok(()), |done| done?)
+}

@@ -1,0 +1,170 @@
+//! Grants for remote jobs, and the acceptance of results within their grant.
+
+use super::result_checks::ResultChecks;
+use crate::{
+    local::LocalServer,
+    server::{ReleaseReason, LeaseStatus, JobServer},
+};
+use faceoff_store::StoreError;
+use faceoff_wire::{
+    grant::{Grant, GrantKey, ExpectedRecording, WriteScope},
+    remote::{JobEnd, ResultMessage},
+    job::{JobPayload, OutputFiles, Lease, JobSpec, JobReport},
+};
+
+/// The grant for a job that this program issues.
+pub(super) fn grant_for(job: &JobSpec, program: &str) -> Grant {
+    let (bundles, write_scope, expected_recording) = match &job.payload {
+        JobPayload::Shard {
+            agent, output, spec, ..
+        } => {
+            let (write_scope, expected_recording) = match output {
+                OutputFiles::None => (WriteScope::None, ExpectedRecording::None),
+                OutputFiles::Clips(key) => (WriteScope::File(key.clone()), ExpectedRecording::None),
+                OutputFiles::Recording(key) => (WriteScope::Folder(key.clone()), ExpectedRecording::Shard(spec.clone())),
+            };
+            (vec![agent.bundle.clone()], write_scope, expected_recording)
+        }
+        JobPayload::Game {
+            agents,
+            recording,
+            spec,
+            ..
+        } => {
+            let bundles = agents.each_ref().map(|agent| agent.bundle.clone());
+            let (write_scope, expected_recording) = match recording {
+                Some(key) => (WriteScope::Folder(key.clone()), ExpectedRecording::Game(spec.clone())),
+                None => (WriteScope::None, ExpectedRecording::None),
+            };
+            (bundles.into(), write_scope, expected_recording)
+        }
+        JobPayload::Validation { .. } | JobPayload::Scoring { .. } => {
+            (Vec::new(), WriteScope::None, ExpectedRecording::None)
+        }
+    };
+    Grant {
+        job_id: job.lease.job_id,
+        nonce: job.lease.nonce,
+        bundles,
+        write_scope,
+        expected_recording,
+        program: program.to_owned(),
+    }
+}
+
+/// The outcome of processing a result message.
+pub(super) enum Acceptance {
+    Accepted,
+    /// The worker does not have the lease.
+    LeaseLost,
+    /// It does not match its job, which is released as after a platform fault.
+    Unusable,
+    /// It differs from what the simulator computes; the text is for organisers.
+    Rejected(String),
+    /// Some of its files are still being uploaded.
+    FilesPending,
+}
+
+impl From<LeaseStatus> for Acceptance {
+    fn from(status: LeaseStatus) -> Self {
+        match status {
+            LeaseStatus::Held => Self::Accepted,
+            LeaseStatus::Lost => Self::LeaseLost,
+        }
+    }
+}
+
+/// The grant of a result message, if it is valid and matches the lease.
+pub(super) fn open_grant(message: &ResultMessage, key: &GrantKey) -> Option<Grant> {
+    let lease = &message.lease;
+    Grant::open(&message.grant, key)
+        .filter(|grant| grant.job_id == lease.job_id && grant.nonce == lease.nonce)
+}
+
+/// Stores a result within its grant, if it passes the checks. A result that does not match its job is handled as a
+/// platform fault and affects no other job.
+pub(super) fn store_result(
+    server: &LocalServer,
+    checks: &ResultChecks,
+    grant: &Grant,
+    message: ResultMessage,
+) -> anyhow::Result<Acceptance> {
+    let ResultMessage { lease, end, .. } = message;
+    let released = match end {
+        JobEnd::Done { report } => return store_report(server, checks, grant, &lease, *report),
+        JobEnd::Shutdown => server.release(&lease, ReleaseReason::Shutdown),
+        JobEnd::FullDisk => server.release(&lease, ReleaseReason::FullDisk),
+        JobEnd::PlatformFault { reason } => {
+            server.release(&lease, ReleaseReason::PlatformFault(&reason))
+        }
+    };
+    released.map(|()| Acceptance::Accepted)
+}
+
+fn store_report(
+    server: &LocalServer,
+    checks: &ResultChecks,
+    grant: &Grant,
+    lease: &Lease,
+    report: JobReport,
+) -> anyhow::Result<Acceptance> {
+    if !matches_grant(&report, grant) {
+        tracing::error!(job = %lease.job_id, slot = lease.slot, "a worker's report does not match its job");
+        let reason = ReleaseReason::PlatformFault("a worker's report did not match its job");
+        server.release(lease, reason)?;
+        return Ok(Acceptance::Unusable);
+    }
+    // A result that is already stored, or whose lease is lost, is not checked; its files may be gone.
+    if server.is_held(lease)? {
+        if !server.store.workers().close_files(lease.nonce) {
+            return Ok(Acceptance::FilesPending);
+        }
+        if let Some(difference) = checks.find_difference(grant, &report, server.store.artifacts())? {
+            return Ok(Acceptance::Rejected(difference));
+        }
+    }
+    match server.commit(lease, report) {
+        Ok(status) => Ok(status.into()),
+        // A retry would be refused again.
+        Err(error) if matches!(error.downcast_ref(), Some(StoreError::Conflict(_))) => {
+            tracing::error!(job = %lease.job_id, slot = lease.slot, %error, "a worker's report is not acceptable");
+            let reason = "a worker's report does not match its job";
+            server.release(lease, ReleaseReason::PlatformFault(reason))?;
+            Ok(Acceptance::Unusable)
+        }
+        Err(error) => Err(error),
+    }
+}
+
+/// Does the report name only files that its grant allows?
+fn matches_grant(report: &JobReport, grant: &Grant) -> bool {
+    match (report, &grant.write_scope) {
+        (
+            JobReport::Shard {
+                recording: Some(key),
+                ..
+            },
+            WriteScope::Folder(grants),
+        ) => key == grants,
+        (
+            JobReport::Shard {
+                recording: None, ..
+            },
+            WriteScope::None | WriteScope::File(_),
+        ) => true,
+        (
+            JobReport::Game {
+                recording: Some(stored),
+                ..
+            },
+            WriteScope::Folder(grants),
+        ) => stored.key == *grants,
+        (
+            JobReport::Game {
+                recording: None, ..
+            },
+            WriteScope::None,
+        ) => true,
+        _ => false,
+    }
+}

@@ -1,0 +1,167 @@
+//! Receiving jobs on a remote slot: it requests a job, receives one, and asks the server to start it.
+
+use super::{
+    connection::REQUEST_TIMEOUT,
+    server_client::ServerClient,
+    worker_link::with_timeout,
+    names::{self, JOBS_CONSUMER},
+};
+use anyhow::Context as _;
+use async_nats::jetstream::{Message, consumer::PullConsumer};
+use faceoff_wire::remote::{WorkerResponse, WorkerRequest, JobEnd, RemoteJob};
+use futures::StreamExt as _;
+use std::{
+    sync::PoisonError,
+    time::{Duration, Instant},
+};
+
+/// How long a request for a job stays open before it is repeated, since a request may die silently. With this short time no
+/// NATS heartbeats are needed: a `Batch` of async-nats (0.51) that has read a heartbeat is not woken by the next message,
+/// so the job would be lost.
+const REQUEST_OPEN_FOR: Duration = Duration::from_secs(5);
+/// How long a registration lasts before it is repeated.
+const REGISTRATION_VALIDITY: Duration = Duration::from_secs(5);
+/// Number of attempts to start a job. A response may get lost; a repeated request of the same slot is accepted again.
+const START_ATTEMPTS: u32 = 3;
+
+impl ServerClient {
+    /// Registers this worker; whether it gets jobs. Changes are logged. A recent registration need not be repeated: a job
+    /// names its program version, and the server decides at its start whether the worker may run it.
+    pub(super) async fn register(&self) -> anyhow::Result<bool> {
+        let registered_at = || {
+            let at = self.link.registered_at.lock();
+            at.unwrap_or_else(PoisonError::into_inner)
+        };
+        if registered_at().is_some_and(|at| at.elapsed() < REGISTRATION_VALIDITY) {
+            return Ok(true);
+        }
+        let response = self.link.request(&WorkerRequest::Register(self.link.capabilities.clone())).await?;
+        let reason = match response {
+            WorkerResponse::Accepted => None,
+            WorkerResponse::Refused { reason } => Some(reason),
+            WorkerResponse::Unknown => return Ok(false),
+        };
+        let mut refused = self
+            .link
+            .refused
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner);
+        if *refused != reason {
+            match &reason {
+                Some(reason) => tracing::error!(reason, "the server gives this worker no jobs"),
+                None => tracing::info!("the server gives this worker jobs"),
+            }
+            refused.clone_from(&reason);
+        }
+        *registered_at() = reason.is_none().then(Instant::now);
+        Ok(reason.is_none())
+    }
+
+    /// The consumer of jobs. It is looked up again after a failure, since the stream may have been recreated.
+    async fn consumer(&self) -> anyhow::Result<PullConsumer> {
+        let cached = || self.consumer.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(consumer) = cached().clone() {
+            return Ok(consumer);
+        }
+        let stream = self.link.names.jobs_stream();
+        let found = self
+            .jetstream
+            .get_consumer_from_stream(JOBS_CONSUMER, stream);
+        let found: PullConsumer = with_timeout(found).await.context("looking up the consumer of jobs")?;
+        *cached() = Some(found.clone());
+        Ok(found)
+    }
+
+    /// Waits for a job and starts it; `None` if there is none, or it cannot be started.
+    pub(super) async fn next_job(&self, slot: &str) -> anyhow::Result<Option<RemoteJob>> {
+        let link = &self.link;
+        let consumer = self.consumer().await?;
+        let jobs = consumer.batch().max_messages(1).expires(REQUEST_OPEN_FOR);
+        let mut jobs = with_timeout(jobs.messages())
+            .await
+            .context("requesting a job")?;
+        let free = link.names.free_slots(link.worker.as_str());
+        with_timeout(link.client.publish(free, Default::default()))
+            .await
+            .context("requesting a job")?;
+        let message = tokio::select! {
+            // A job that arrives now is not started, and goes back to the queue.
+            () = link.shutdown.cancelled() => return Ok(None),
+            message = jobs.next() => message,
+        };
+        let Some(message) = message else {
+            return Ok(None);
+        };
+        let message = message.map_err(|error| anyhow::anyhow!("waiting for a job: {error}"))?;
+        // Each job is delivered once; the lease, not NATS, decides which slot runs it.
+        let acknowledged = async { message.ack().await.map_err(|error| anyhow::anyhow!(error)) };
+        with_timeout(acknowledged)
+            .await
+            .context("acknowledging a job")?;
+        let Some(mut job) = self.read(&message) else {
+            return Ok(None);
+        };
+        job.job.lease.slot = names::slot(&link.worker, slot);
+        Ok(self.start(&job, slot).await.then_some(job))
+    }
+
+    /// Reads a job, if this worker can run it. Another one is not started, so the server requeues it, and this worker
+    /// registers again to learn the reason.
+    fn read(&self, message: &Message) -> Option<RemoteJob> {
+        let link = &self.link;
+        let mut logged = link.unreadable.lock().unwrap_or_else(PoisonError::into_inner);
+        match serde_json::from_slice::<RemoteJob>(&message.payload) {
+            Ok(job) => {
+                logged.clear();
+                if job.program == link.capabilities.program {
+                    return Some(job);
+                }
+            }
+            Err(error) => {
+                let cause = error.to_string();
+                if *logged != cause {
+                    tracing::warn!(
+                        cause,
+                        "a job cannot be read and is not started; it may be from another version"
+                    );
+                    *logged = cause;
+                }
+            }
+        }
+        link.invalidate_registration();
+        None
+    }
+
+    /// Starts the job; whether this slot now has its lease. Without a response the slot may have it nevertheless; then the
+    /// job is released, so that it need not wait for the expiry.
+    async fn start(&self, job: &RemoteJob, slot: &str) -> bool {
+        let link = &self.link;
+        let (lease, id) = (&job.job.lease, job.job.lease.job_id);
+        let request = WorkerRequest::StartJob {
+            lease: lease.clone(),
+            slot: slot.to_owned(),
+        };
+        let mut cause = String::new();
+        for attempt in 0..START_ATTEMPTS {
+            if attempt > 0 {
+                self.pause().await;
+                if link.shutdown.is_cancelled() {
+                    break;
+                }
+            }
+            cause = match link.request(&request).await {
+                Ok(WorkerResponse::Accepted) => return true,
+                Ok(WorkerResponse::Refused { .. }) => return false,
+                Ok(WorkerResponse::Unknown) => "the server cannot answer now".to_owned(),
+                Err(error) => format!("{error:#}"),
+            };
+        }
+        tracing::warn!(job = %id, cause, "no response to the start of a job: it is released");
+        let sent = self.send_result(lease, &job.grant, JobEnd::Shutdown);
+        let sent = tokio::time::timeout(REQUEST_TIMEOUT, sent).await;
+        if let Err(error) = sent.map_err(anyhow::Error::from).flatten() {
+            tracing::warn!(job = %id, cause = format!("{error:#}"), "the job could not be released; its lease will expire");
+        }
+        false
+    }
+}

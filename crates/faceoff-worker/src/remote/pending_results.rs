@@ -1,0 +1,128 @@
+//! Results that are stored in NATS and not yet accepted by the server. Their slots run other jobs by now, so the server renews the leases.
+
+use faceoff_wire::job::Lease;
+use std::{
+    collections::{HashMap, HashSet},
+    sync::{Mutex, MutexGuard, PoisonError},
+    time::{Duration, Instant},
+};
+use uuid::Uuid;
+
+/// A result that is accepted sooner needs no renewal.
+const RENEW_AFTER: Duration = Duration::from_secs(2);
+
+/// All pending results, by the nonces of their leases.
+#[derive(Debug, Default)]
+pub(super) struct PendingResults {
+    pending: Mutex<HashMap<Uuid, PendingResult>>,
+    /// Results that are being processed.
+    processing: Mutex<HashSet<Uuid>>,
+}
+
+/// Marks a result as being processed until it is dropped.
+#[derive(Debug)]
+pub(super) struct ProcessingGuard<'a> {
+    all: &'a PendingResults,
+    nonce: Uuid,
+}
+
+impl Drop for ProcessingGuard<'_> {
+    fn drop(&mut self) {
+        self.all.processing().remove(&self.nonce);
+    }
+}
+
+/// A result that has not been accepted.
+#[derive(Debug, Clone)]
+pub(super) struct PendingResult {
+    pub(super) lease: Lease,
+    pub(super) episodes_done: u32,
+    /// Sequence number in the stream of results.
+    pub(super) sequence: u64,
+    pub(super) since: Instant,
+}
+
+impl PendingResults {
+    pub(super) fn add(&self, lease: Lease, episodes_done: u32, sequence: u64, now: Instant) {
+        let result = PendingResult {
+            lease,
+            episodes_done,
+            sequence,
+            since: now,
+        };
+        self.all().insert(result.lease.nonce, result);
+    }
+
+    /// Removes a result that was accepted, or whose lease is lost.
+    pub(super) fn remove(&self, nonce: Uuid) {
+        self.all().remove(&nonce);
+    }
+
+    /// Marks a result as being processed, so that its absence from the stream is no loss.
+    pub(super) fn start_processing(&self, nonce: Uuid) -> ProcessingGuard<'_> {
+        self.processing().insert(nonce);
+        ProcessingGuard { all: self, nonce }
+    }
+
+    /// Is the result being processed, or was it processed?
+    pub(super) fn is_processed(&self, nonce: Uuid) -> bool {
+        self.processing().contains(&nonce) || !self.all().contains_key(&nonce)
+    }
+
+    /// All results that have been pending for a while.
+    pub(super) fn overdue(&self, now: Instant) -> Vec<PendingResult> {
+        let all = self.all();
+        let is_overdue = |result: &&PendingResult| now.duration_since(result.since) >= RENEW_AFTER;
+        all.values().filter(is_overdue).cloned().collect()
+    }
+
+    /// A panic while the lock is held leaves every entry intact.
+    fn all(&self) -> MutexGuard<'_, HashMap<Uuid, PendingResult>> {
+        self.pending.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn processing(&self) -> MutexGuard<'_, HashSet<Uuid>> {
+        self.processing.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use jiff::Timestamp;
+
+    #[test]
+    fn pending_results_remain_until_they_are_accepted() {
+        let (all, start) = (PendingResults::default(), Instant::now());
+        let lease = |nonce| Lease {
+            job_id: Uuid::from_u128(9),
+            nonce: Uuid::from_u128(nonce),
+            slot: "remote/a/slot-0".into(),
+            expires_at: Timestamp::UNIX_EPOCH,
+            duration_s: 30,
+        };
+        all.add(lease(1), 50, 7, start);
+        all.add(lease(2), 50, 8, start + Duration::from_secs(1));
+        assert!(all.overdue(start + Duration::from_secs(1)).is_empty());
+        let overdue = all.overdue(start + RENEW_AFTER);
+        assert_eq!(overdue.len(), 1);
+        assert_eq!(
+            (
+                overdue[0].lease.nonce,
+                overdue[0].episodes_done,
+                overdue[0].sequence
+            ),
+            (Uuid::from_u128(1), 50, 7)
+        );
+        let nonce = Uuid::from_u128(1);
+        assert!(!all.is_processed(nonce));
+        let guard = all.start_processing(nonce);
+        assert!(all.is_processed(nonce), "it is being processed");
+        drop(guard);
+        assert!(!all.is_processed(nonce), "it is pending again");
+        all.remove(nonce);
+        assert!(all.is_processed(nonce), "it was processed");
+        all.remove(Uuid::from_u128(3));
+        assert_eq!(all.overdue(start + Duration::from_secs(60)).len(), 1);
+    }
+}

@@ -1,0 +1,350 @@
+//! Answers requests of remote workers, and forwards their live updates of games.
+
+use super::{
+    pending_results::PendingResults,
+    compatibility::incompatibility,
+    names::{self, ALL, Names, UNCLAIMED},
+    streams::Streams,
+    published_jobs::PublishedJobs,
+};
+use async_nats::{Client, Message};
+use faceoff_store::{JobClaim, Store, StoreError, SlotReport, WorkerInfo, WorkerName};
+use faceoff_types::{Clock, escape_unprintable};
+use faceoff_wire::{
+    remote::{WorkerResponse, WorkerRequest, WorkerCapabilities, LiveGameMessage, LiveGameUpdate},
+    job::Lease,
+};
+use futures::StreamExt as _;
+use std::{
+    collections::HashMap,
+    sync::{Arc, Mutex, PoisonError},
+    time::{Duration, Instant},
+};
+use tokio_util::sync::CancellationToken;
+use uuid::Uuid;
+
+/// Answers requests until the shutdown.
+pub(super) struct RequestHandler {
+    pub(super) client: Client,
+    pub(super) names: Names,
+    pub(super) store: Store,
+    pub(super) clock: Clock,
+    pub(super) lease_s: u32,
+    /// Program and runtimes that workers must have.
+    pub(super) required: WorkerCapabilities,
+    pub(super) published_jobs: Arc<PublishedJobs>,
+    pub(super) pending_results: Arc<PendingResults>,
+    pub(super) streams: Arc<Streams>,
+}
+
+/// Maximum number of requests handled at a time.
+const MAX_CONCURRENT: usize = 64;
+
+/// Maximum length of a worker's problem description, in characters.
+const MAX_PROBLEM_CHARS: usize = 300;
+
+/// Minimum interval between writes of progress, since each is a transaction that waits for the disk.
+const PROGRESS_INTERVAL: Duration = Duration::from_secs(2);
+
+/// For each lease, the time and progress of the last renewal in the database. Workers renew more often than the database
+/// needs to know.
+#[derive(Debug, Default)]
+struct Renewals(Mutex<HashMap<Uuid, (Instant, u32)>>);
+
+impl Renewals {
+    /// Must this renewal be written? If it is new, shows progress, or the last write is `every` ago.
+    fn is_due(&self, nonce: Uuid, done: u32, every: Duration, now: Instant) -> bool {
+        let all = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        all.get(&nonce).is_none_or(|(at, before)| {
+            let ago = now.duration_since(*at);
+            ago >= every || (*before != done && ago >= PROGRESS_INTERVAL)
+        })
+    }
+
+    /// Records a write. Entries of old leases are removed.
+    fn record_write(&self, nonce: Uuid, done: u32, every: Duration, now: Instant) {
+        let mut all = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        if all.insert(nonce, (now, done)).is_none() {
+            all.retain(|_, (at, _)| now.duration_since(*at) < 10 * every);
+        }
+    }
+}
+
+impl RequestHandler {
+    pub(super) async fn run(&self, shutdown: &CancellationToken) -> anyhow::Result<()> {
+        let requests = self.client.subscribe(self.names.requests(ALL)).await?;
+        let renewals = Renewals::default();
+        // Requests are handled concurrently, so that none waits for another's database write.
+        requests.take_until(shutdown.cancelled())
+            .for_each_concurrent(MAX_CONCURRENT, |request| self.reply_to(request, &renewals))
+            .await;
+        anyhow::ensure!(shutdown.is_cancelled(), "the connection to NATS has ended");
+        Ok(())
+    }
+
+    async fn reply_to(&self, message: Message, renewals: &Renewals) {
+        let Some(reply) = message.reply.clone() else {
+            return;
+        };
+        // If the streams belong to another server, so does the worker.
+        if !self.streams.are_owned() {
+            return;
+        }
+        // A worker may name any subject for the reply, and this server may publish to most of them.
+        let worker = names::worker_of(&message.subject);
+        if !worker.is_some_and(|worker| self.names.is_inbox_of(&worker, &reply)) {
+            tracing::warn!(subject = %message.subject, %reply, "a worker requested a reply on a foreign subject; not answered");
+            return;
+        }
+        let response = self.response_to(&message, renewals).await;
+        let sent = async {
+            let response = serde_json::to_vec(&response)?;
+            anyhow::Ok(self.client.publish(reply, response.into()).await?)
+        };
+        if let Err(error) = sent.await {
+            // The worker will ask again.
+            tracing::debug!(%error, "a worker's request could not be answered");
+        }
+    }
+
+    async fn response_to(&self, message: &Message, renewals: &Renewals) -> WorkerResponse {
+        let refused = |reason: &str| WorkerResponse::Refused {
+            reason: reason.to_owned(),
+        };
+        let Some(worker) = names::worker_of(&message.subject) else {
+            return refused("the subject does not name a worker");
+        };
+        let request: WorkerRequest = match serde_json::from_slice(&message.payload) {
+            Ok(request) => request,
+            Err(error) => {
+                tracing::warn!(%worker, %error, "a worker sent an unknown request");
+                return refused(&format!("the server does not know this request: {error}"));
+            }
+        };
+        let ban = self.store.workers().ban_reason(worker.as_str());
+        let ban = ban.map(|reason| format!("the server accepts no results of this worker: {reason}"));
+        if let (WorkerRequest::StartJob { .. } | WorkerRequest::RenewLease { .. } | WorkerRequest::ResultPending { .. }, Some(reason)) =
+            (&request, &ban)
+        {
+            return refused(reason);
+        }
+        let now = self.clock.now();
+        let backoff = || self.store.workers().backoff_reason(worker.as_str(), now);
+        let granted = match request {
+            WorkerRequest::Register(capabilities) => {
+                let reason = ban.or_else(|| incompatibility(&capabilities, &self.required)).or_else(backoff);
+                let info = info(&capabilities);
+                let workers = self.store.workers();
+                workers.record_poll(worker.as_str(), info, reason.as_deref(), now);
+                return response_for(reason);
+            }
+            WorkerRequest::CheckRegistration(capabilities) => {
+                return response_for(ban.or_else(|| incompatibility(&capabilities, &self.required)).or_else(backoff));
+            }
+            WorkerRequest::StartJob { lease, slot } if names::is_subject_token(&slot) => {
+                if let Some(reason) = backoff() {
+                    return refused(&reason);
+                }
+                self.start_job(&worker, &lease, &slot).await
+            }
+            WorkerRequest::StartJob { .. } => return refused("the slot's name is invalid"),
+            WorkerRequest::RenewLease {
+                lease,
+                episodes_done,
+                trouble,
+            } => {
+                let trouble = trouble.map(|problem| -> String {
+                    escape_unprintable(&problem).chars().take(MAX_PROBLEM_CHARS).collect()
+                });
+                let held = self.renew(&worker, &lease, episodes_done, renewals).await;
+                self.record_renewal(&worker, &lease, held, trouble.as_deref())
+            }
+            WorkerRequest::ResultPending {
+                lease,
+                episodes_done,
+                sequence,
+            } => {
+                let held = self.store.is_leased_by(&worker, lease.job_id, lease.nonce).await;
+                if matches!(held, Ok(true)) {
+                    let now = Instant::now();
+                    self.pending_results.add(lease, episodes_done, sequence, now);
+                }
+                held
+            }
+        };
+        match granted {
+            Ok(true) => WorkerResponse::Accepted,
+            Ok(false) => refused("this worker does not have the lease"),
+            Err(error) => {
+                tracing::warn!(%worker, %error, "the queue could not be read for a worker's request");
+                WorkerResponse::Unknown
+            }
+        }
+    }
+
+    /// Transfers the lease of a published job to the worker's slot.
+    async fn start_job(
+        &self,
+        worker: &WorkerName,
+        lease: &Lease,
+        slot: &str,
+    ) -> Result<bool, StoreError> {
+        let claim = claim(lease, UNCLAIMED);
+        let now = self.clock.now();
+        let holder = names::slot(worker, slot);
+        let is_started = self
+            .store
+            .transfer_lease(&claim, &holder, self.lease_s, now)
+            .await?;
+        if is_started {
+            let published = self.published_jobs.take(lease.nonce);
+            let description = published.map(|job| job.description);
+            let report = SlotReport {
+                description: description.as_deref(),
+                problem: None,
+            };
+            let workers = self.store.workers();
+            workers.record_job(worker.as_str(), slot, lease.job_id, report, now);
+        }
+        Ok(is_started)
+    }
+
+    async fn renew(
+        &self,
+        worker: &WorkerName,
+        lease: &Lease,
+        done: u32,
+        renewals: &Renewals,
+    ) -> Result<bool, StoreError> {
+        let every = Duration::from_secs(self.lease_s.into()) / 3;
+        if !self.store.is_leased_by(worker, lease.job_id, lease.nonce).await? {
+            return Ok(false);
+        }
+        if !renewals.is_due(lease.nonce, done, every, Instant::now()) {
+            return Ok(true);
+        }
+        let is_its_slot = lease.slot.starts_with(&names::slot(worker, ""));
+        let claim = claim(lease, if is_its_slot { &lease.slot } else { worker.as_str() });
+        let now = self.clock.now();
+        let renewed = self.store.heartbeat(&claim, done, self.lease_s, now);
+        let held = renewed.await?;
+        if held {
+            renewals.record_write(lease.nonce, done, every, Instant::now());
+        }
+        Ok(held)
+    }
+
+    /// Updates the state of the slot that organisers see.
+    fn record_renewal(
+        &self,
+        worker: &WorkerName,
+        lease: &Lease,
+        held: Result<bool, StoreError>,
+        trouble: Option<&str>,
+    ) -> Result<bool, StoreError> {
+        let workers = self.store.workers();
+        match (&held, lease.slot.strip_prefix(&names::slot(worker, ""))) {
+            (Ok(true), Some(slot)) => {
+                let report = SlotReport {
+                    description: None,
+                    problem: trouble,
+                };
+                workers.record_job(worker.as_str(), slot, lease.job_id, report, self.clock.now());
+            }
+            (Ok(false), _) => workers.end_job(lease.job_id),
+            _ => {}
+        }
+        held
+    }
+
+    /// Forwards live updates of games from remote workers to viewers.
+    pub(super) async fn relay_games(&self, shutdown: &CancellationToken) -> anyhow::Result<()> {
+        let mut updates = self.client.subscribe(self.names.live_games(ALL)).await?;
+        loop {
+            let message = tokio::select! {
+                () = shutdown.cancelled() => return Ok(()),
+                message = updates.next() => message,
+            };
+            let message = message.ok_or_else(|| anyhow::anyhow!("the connection to NATS has ended"))?;
+            let Ok(update) = serde_json::from_slice::<LiveGameMessage>(&message.payload) else {
+                continue;
+            };
+            // Only the holder of a lease may send updates. Whether the game is that of the lease is not checked, since updates
+            // have no influence on results.
+            let Some(worker) = names::worker_of(&message.subject) else {
+                continue;
+            };
+            let (job_id, nonce) = (update.lease.job_id, update.lease.nonce);
+            let has_lease = self.store.is_leased_by(&worker, job_id, nonce).await;
+            if self.streams.are_owned() && has_lease.unwrap_or_default() {
+                let live = self.store.live_games();
+                match update.update {
+                    LiveGameUpdate::Started { steps } => live.begin(update.game, update.attempt, steps),
+                    LiveGameUpdate::Progress {
+                        events,
+                        position,
+                    } => live.advance(update.game, update.attempt, events, Some(position)),
+                    LiveGameUpdate::Ended => live.end_attempt(update.game, update.attempt),
+                }
+            }
+        }
+    }
+}
+
+pub(super) fn claim(lease: &Lease, holder: &str) -> JobClaim {
+    JobClaim {
+        job: lease.job_id,
+        nonce: lease.nonce,
+        worker: holder.to_owned(),
+        lease_until: lease.expires_at,
+    }
+}
+
+fn response_for(reason: Option<String>) -> WorkerResponse {
+    match reason {
+        Some(reason) => WorkerResponse::Refused { reason },
+        None => WorkerResponse::Accepted,
+    }
+}
+
+/// The description of a worker for organisers, with a limited number of labels.
+fn info(capabilities: &WorkerCapabilities) -> WorkerInfo {
+    let labels = capabilities.labels.iter().take(WorkerCapabilities::MAX_LABELS);
+    WorkerInfo {
+        version: capabilities.version.clone(),
+        slots: capabilities.slots,
+        labels: labels
+            .map(|label| {
+                escape_unprintable(label)
+                    .chars()
+                    .take(WorkerCapabilities::MAX_LABEL_CHARS)
+                    .collect()
+            })
+            .collect(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn renewals_are_written_after_progress_or_time() {
+        let renewals = Renewals::default();
+        let (nonce, start, every) = (Uuid::from_u128(1), Instant::now(), Duration::from_secs(10));
+        let is_due = |done, after_s| {
+            let now = start + Duration::from_secs(after_s);
+            let is_due = renewals.is_due(nonce, done, every, now);
+            if is_due {
+                renewals.record_write(nonce, done, every, now);
+            }
+            is_due
+        };
+        assert!(is_due(0, 0));
+        assert!(!is_due(0, 1));
+        assert!(!is_due(1, 1), "an episode more, but soon after");
+        assert!(is_due(1, 2), "an episode more");
+        assert!(!is_due(1, 11));
+        assert!(is_due(1, 12));
+    }
+}

@@ -1,0 +1,94 @@
+//! Sending results of jobs to the server.
+
+use super::server_client::{RETRY_INTERVAL, ServerClient};
+use anyhow::Context as _;
+use async_nats::HeaderMap;
+use faceoff_wire::{
+    remote::{JobEnd, ResultMessage},
+    job::Lease,
+};
+use std::time::{Duration, Instant};
+
+/// Upper bound of the size of a result's headers, which count as part of the message.
+const MAX_HEADER_BYTES: usize = 256;
+/// Timeout for the acknowledgement of a message by NATS.
+const PUBLISH_TIMEOUT: Duration = Duration::from_secs(10);
+
+impl ServerClient {
+    /// Sends the result of a job, with retries until NATS has stored it; its sequence number in the stream of results. For a
+    /// completed job it gives up when the lease is lost, and returns `None`. For a message that is too large it gives up
+    /// after the duration of a lease, so that the server learns of it.
+    pub(super) async fn send_result(
+        &self,
+        lease: &Lease,
+        grant: &str,
+        end: JobEnd,
+    ) -> anyhow::Result<Option<u64>> {
+        let is_done = matches!(end, JobEnd::Done { .. });
+        let message = ResultMessage {
+            lease: lease.clone(),
+            grant: grant.to_owned(),
+            end,
+        };
+        let mut headers = HeaderMap::new();
+        headers.insert("Nats-Msg-Id", message.id());
+        let payload = serde_json::to_vec(&message)?;
+        let began = Instant::now();
+        let give_up_after = Duration::from_secs(lease.duration_s.into());
+        let subject = self.link.names.results(self.link.worker.as_str());
+        // Only changes of the cause are logged.
+        let mut logged = String::new();
+        loop {
+            let sent = async {
+                // The limit may change when NATS restarts.
+                let largest = self.link.client.max_payload();
+                if payload.len() + MAX_HEADER_BYTES > largest {
+                    return Err(anyhow::Error::from(TooLarge {
+                        bytes: payload.len(),
+                        largest,
+                    }));
+                }
+                let published = self.jetstream.publish_with_headers(
+                    subject.clone(),
+                    headers.clone(),
+                    payload.clone().into(),
+                );
+                let stored = async { anyhow::Ok(published.await?.await?) };
+                let stored = tokio::time::timeout(PUBLISH_TIMEOUT, stored).await;
+                stored.context("NATS has not answered in time")?
+            };
+            let error = match sent.await {
+                Ok(stored) => return Ok(Some(stored.sequence)),
+                Err(error) => error,
+            };
+            if is_done && self.has_ended() {
+                return Ok(None);
+            }
+            if error.is::<TooLarge>() && began.elapsed() >= give_up_after {
+                return Err(error).context("sending the result");
+            }
+            let cause = format!("{error:#}");
+            if cause != logged {
+                tracing::warn!(job = %lease.job_id, cause, "the result is not stored by NATS yet; trying again");
+                self.set_send_problem(&cause);
+                logged = cause;
+            }
+            if is_done {
+                self.pause().await;
+            } else {
+                // A release is also tried again during the shutdown.
+                tokio::time::sleep(RETRY_INTERVAL).await;
+            }
+        }
+    }
+}
+
+/// The result exceeds the maximum message size of NATS.
+#[derive(Debug, thiserror::Error)]
+#[error(
+    "the result has {bytes} bytes, but NATS accepts messages of at most {largest}: raise its max_payload"
+)]
+pub(crate) struct TooLarge {
+    bytes: usize,
+    largest: usize,
+}

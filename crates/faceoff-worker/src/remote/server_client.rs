@@ -1,0 +1,300 @@
+//! The server as a remote slot sees it. Jobs, requests and results go over NATS, files over the server's HTTP or a bucket.
+
+use super::{connection::REQUEST_TIMEOUT, worker_link::WorkerLink, job_files::JobFiles};
+use crate::{
+    full_disk,
+    server::{ClaimResult, GameUpdate, ReleaseReason, LeaseStatus, QueueVersion, JobServer},
+};
+use anyhow::Context as _;
+use async_nats::jetstream::{self, consumer::PullConsumer};
+use faceoff_dataset::CLIPS_FILE;
+use faceoff_types::{BundleRef, GameId};
+use faceoff_wire::{
+    remote::{WorkerResponse, WorkerRequest, JobEnd, RemoteJob, LiveGameMessage, LiveGameUpdate},
+    job::{Lease, JobReport},
+};
+use std::{
+    path::Path,
+    sync::{Arc, Mutex, MutexGuard, PoisonError},
+    time::{Duration, Instant},
+};
+use tokio_util::sync::CancellationToken;
+
+/// Pause after a refusal or a failure.
+pub(super) const RETRY_INTERVAL: Duration = Duration::from_secs(2);
+/// How long a worker with a full disk claims no job. Each job that it releases waits for a while, so it would delay the
+/// whole queue.
+const FULL_DISK_PAUSE: Duration = Duration::from_secs(10);
+
+/// The connection of one slot to the server.
+pub(super) struct ServerClient {
+    pub(super) link: Arc<WorkerLink>,
+    pub(super) jetstream: jetstream::Context,
+    /// The consumer of jobs, cached until a failure.
+    pub(super) consumer: Mutex<Option<PullConsumer>>,
+    current: Mutex<CurrentJob>,
+    /// When the disk was last full.
+    full_at: Mutex<Option<Instant>>,
+}
+
+/// The job that the slot runs.
+#[derive(Debug, Default)]
+struct CurrentJob {
+    files: Arc<JobFiles>,
+    /// When the lease was last confirmed by the server.
+    held_at: Option<Instant>,
+    /// Is the lease lost?
+    is_lost: bool,
+    /// The problem that prevents sending the result.
+    send_problem: Option<String>,
+}
+
+impl ServerClient {
+    pub(super) fn new(link: Arc<WorkerLink>) -> Self {
+        Self {
+            jetstream: jetstream::new(link.client.clone()),
+            link,
+            consumer: Mutex::default(),
+            current: Mutex::default(),
+            full_at: Mutex::default(),
+        }
+    }
+
+    /// Was the disk full recently?
+    fn had_full_disk(&self) -> bool {
+        let full_at = self.full_at.lock().unwrap_or_else(PoisonError::into_inner);
+        full_at.is_some_and(|at| at.elapsed() < FULL_DISK_PAUSE)
+    }
+
+    fn current(&self) -> MutexGuard<'_, CurrentJob> {
+        self.current.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Must the slot stop its job, because of a lost lease or the shutdown?
+    pub(super) fn has_ended(&self) -> bool {
+        self.current().is_lost || self.link.shutdown.is_cancelled()
+    }
+
+    /// Records why the result cannot be sent; the next renewal reports it to the server.
+    pub(super) fn set_send_problem(&self, cause: &str) {
+        self.current().send_problem = Some(cause.to_owned());
+    }
+
+    /// The files of the current job.
+    fn files(&self) -> Arc<JobFiles> {
+        Arc::clone(&self.current().files)
+    }
+
+    async fn store(&self, name: &str, file: &Path) -> anyhow::Result<()> {
+        let (files, transfer) = (self.files(), &self.link.file_transfer);
+        files.store(transfer, name, file, || self.has_ended()).await
+    }
+
+    pub(super) async fn pause(&self) {
+        tokio::select! {
+            () = self.link.shutdown.cancelled() => {}
+            () = tokio::time::sleep(RETRY_INTERVAL) => {}
+        }
+    }
+}
+
+impl JobServer for ServerClient {
+    fn claim(&self, slot: &str) -> anyhow::Result<ClaimResult> {
+        // The version is not used: NATS wakes slots that wait for a job.
+        let queue = QueueVersion(0);
+        self.link.runtime.block_on(async {
+            if self.had_full_disk() {
+                self.pause().await;
+                return Ok(ClaimResult::Empty { queue });
+            }
+            match self.register().await {
+                Ok(true) => {}
+                Ok(false) => {
+                    self.pause().await;
+                    return Ok(ClaimResult::Empty { queue });
+                }
+                Err(error) => {
+                    self.pause().await;
+                    return Err(error);
+                }
+            }
+            let job = match self.next_job(slot).await {
+                Ok(job) => job,
+                Err(error) => {
+                    *self.consumer.lock().unwrap_or_else(PoisonError::into_inner) = None;
+                    self.pause().await;
+                    return Err(error);
+                }
+            };
+            let Some(RemoteJob {
+                job,
+                grant,
+                files_url,
+                objects,
+                ..
+            }) = job
+            else {
+                return Ok(ClaimResult::Empty { queue });
+            };
+            self.link.mark_busy();
+            *self.current() = CurrentJob {
+                files: Arc::new(JobFiles {
+                    grant,
+                    files_url,
+                    objects,
+                }),
+                held_at: Some(Instant::now()),
+                is_lost: false,
+                send_problem: None,
+            };
+            Ok(ClaimResult::Job(Box::new(job)))
+        })
+    }
+
+    fn renew(&self, lease: &Lease, episodes_done: u32) -> anyhow::Result<LeaseStatus> {
+        self.link.mark_busy();
+        let request = WorkerRequest::RenewLease {
+            lease: lease.clone(),
+            episodes_done,
+            trouble: self.current().send_problem.clone(),
+        };
+        let response = self.link.runtime.block_on(self.link.request(&request));
+        match response {
+            Ok(WorkerResponse::Accepted) => {
+                self.current().held_at = Some(Instant::now());
+                Ok(LeaseStatus::Held)
+            }
+            Ok(WorkerResponse::Refused { .. }) => {
+                self.current().is_lost = true;
+                Ok(LeaseStatus::Lost)
+            }
+            Ok(WorkerResponse::Unknown) | Err(_) => {
+                let held_at = self.current().held_at;
+                let timeout = Duration::from_secs(lease.duration_s.into());
+                if held_at.is_some_and(|at| at.elapsed() > timeout) {
+                    tracing::error!(job = %lease.job_id, "no contact to the server for the duration of the lease: the job is stopped");
+                    self.current().is_lost = true;
+                    return Ok(LeaseStatus::Lost);
+                }
+                response
+                    .map(|_| LeaseStatus::Held)
+                    .and_then(|_| anyhow::bail!("the server cannot answer now"))
+            }
+        }
+    }
+
+    fn renewal_interval(&self, _: &Lease) -> Duration {
+        // A short interval, so that a worker soon learns of a lost lease.
+        Duration::from_millis(500)
+    }
+
+    fn publish_game(&self, lease: &Lease, (game, attempt): (GameId, u32), update: GameUpdate) {
+        let update = match update {
+            GameUpdate::Started { steps } => LiveGameUpdate::Started { steps },
+            GameUpdate::Progress {
+                events,
+                position,
+            } => LiveGameUpdate::Progress {
+                events,
+                position,
+            },
+            GameUpdate::Ended => LiveGameUpdate::Ended,
+        };
+        let message = LiveGameMessage {
+            lease: lease.clone(),
+            game,
+            attempt,
+            update,
+        };
+        self.link.runtime.block_on(self.link.publish_game(&message));
+    }
+
+    fn commit(&self, lease: &Lease, report: JobReport) -> anyhow::Result<LeaseStatus> {
+        let (report, files) = (Box::new(report), self.files());
+        let episodes_done = report.episodes();
+        let status = self.link.runtime.block_on(async {
+            let sent = self.send_result(lease, &files.grant, JobEnd::Done { report });
+            let Some(sequence) = sent.await? else {
+                return anyhow::Ok(LeaseStatus::Lost);
+            };
+            let request = WorkerRequest::ResultPending {
+                lease: lease.clone(),
+                episodes_done,
+                sequence,
+            };
+            // From now on the server renews the lease. If the request fails, it does so only until the lease expires.
+            if let Err(error) = self.link.request(&request).await {
+                tracing::debug!(%error, "the server could not be informed of the pending result");
+            }
+            anyhow::Ok(LeaseStatus::Held)
+        })?;
+        self.link.mark_busy();
+        Ok(status)
+    }
+
+    fn release(&self, lease: &Lease, reason: ReleaseReason<'_>) -> anyhow::Result<()> {
+        let end = match reason {
+            ReleaseReason::Shutdown => JobEnd::Shutdown,
+            ReleaseReason::FullDisk => {
+                let mut full_at = self.full_at.lock().unwrap_or_else(PoisonError::into_inner);
+                *full_at = Some(Instant::now());
+                JobEnd::FullDisk
+            }
+            ReleaseReason::PlatformFault(summary) => JobEnd::PlatformFault {
+                reason: summary.to_owned(),
+            },
+        };
+        let files = self.files();
+        self.link.runtime.block_on(async {
+            let sent = tokio::time::timeout(REQUEST_TIMEOUT, self.send_result(lease, &files.grant, end));
+            sent.await.context("informing the server")?.map(drop)
+        })
+    }
+
+    fn is_full_disk(&self, error: &anyhow::Error) -> bool {
+        full_disk::is_cause_of(error)
+    }
+
+    fn wait(&self, stop: &CancellationToken, at_most: Duration, queue: Option<QueueVersion>) {
+        // A request for a job has already waited.
+        if queue.is_some() {
+            return;
+        }
+        self.link.runtime.block_on(async {
+            tokio::select! {
+                () = stop.cancelled() => {}
+                () = tokio::time::sleep(at_most) => {}
+            }
+        });
+    }
+
+    fn fetch_bundle(&self, bundle: &BundleRef, archive: &Path) -> anyhow::Result<()> {
+        let (files, transfer) = (self.files(), &self.link.file_transfer);
+        let fetched = files.fetch_bundle(transfer, bundle, archive, || self.has_ended());
+        self.link.runtime.block_on(fetched)
+    }
+
+    fn fetch_recording(&self, key: &str, _: &Path) -> anyhow::Result<()> {
+        anyhow::bail!("no remote job fetches a recording, got {key}")
+    }
+
+    fn store_recording(&self, _: &str, folder: &Path) -> anyhow::Result<()> {
+        self.link.runtime.block_on(async {
+            let mut entries = tokio::fs::read_dir(folder).await?;
+            while let Some(entry) = entries.next_entry().await? {
+                let name = entry.file_name();
+                let name = name.to_str().context("a recording's file without a name")?;
+                self.store(name, &entry.path()).await?;
+            }
+            Ok(())
+        })
+    }
+
+    fn store_clips(&self, _: &str, clips: &Path) -> anyhow::Result<()> {
+        self.link.runtime.block_on(self.store(CLIPS_FILE, clips))
+    }
+
+    fn store_dataset(&self, key: &str, _: &Path, _: Option<&Path>) -> anyhow::Result<()> {
+        anyhow::bail!("no remote job stores a dataset, got {key}")
+    }
+}

@@ -1,0 +1,90 @@
+//! A job server whose calls a test can intercept.
+
+use crate::{
+    local::LocalServer,
+    server::{ClaimResult, GameUpdate, ReleaseReason, LeaseStatus, QueueVersion, JobServer},
+};
+use faceoff_types::{BundleRef, GameId};
+use faceoff_wire::job::{Lease, JobReport};
+use std::{path::Path, sync::Arc, time::Duration};
+use tokio_util::sync::CancellationToken;
+
+/// A call that a test can observe, and fail with an error.
+pub(super) enum Interception<'a> {
+    /// The server has stored this report; the slot does not know yet.
+    Committed(&'a JobReport),
+    /// A job is about to be released.
+    Releasing,
+}
+
+type Interceptor = dyn Fn(Interception<'_>) -> anyhow::Result<()> + Send + Sync;
+
+pub(super) struct InterceptedServer {
+    server: LocalServer,
+    intercept: Box<Interceptor>,
+}
+
+impl InterceptedServer {
+    pub(super) fn new(
+        server: LocalServer,
+        intercept: impl Fn(Interception<'_>) -> anyhow::Result<()> + Send + Sync + 'static,
+    ) -> Arc<dyn JobServer> {
+        Arc::new(Self {
+            server,
+            intercept: Box::new(intercept),
+        })
+    }
+}
+
+impl JobServer for InterceptedServer {
+    fn claim(&self, slot: &str) -> anyhow::Result<ClaimResult> {
+        self.server.claim(slot)
+    }
+
+    fn renew(&self, lease: &Lease, episodes_done: u32) -> anyhow::Result<LeaseStatus> {
+        self.server.renew(lease, episodes_done)
+    }
+
+    fn publish_game(&self, lease: &Lease, attempt: (GameId, u32), update: GameUpdate) {
+        self.server.publish_game(lease, attempt, update);
+    }
+
+    fn commit(&self, lease: &Lease, report: JobReport) -> anyhow::Result<LeaseStatus> {
+        let status = self.server.commit(lease, report.clone())?;
+        (self.intercept)(Interception::Committed(&report))?;
+        Ok(status)
+    }
+
+    fn release(&self, lease: &Lease, reason: ReleaseReason<'_>) -> anyhow::Result<()> {
+        (self.intercept)(Interception::Releasing)?;
+        self.server.release(lease, reason)
+    }
+
+    fn is_full_disk(&self, error: &anyhow::Error) -> bool {
+        self.server.is_full_disk(error)
+    }
+
+    fn wait(&self, stop: &CancellationToken, at_most: Duration, queue: Option<QueueVersion>) {
+        self.server.wait(stop, at_most, queue);
+    }
+
+    fn fetch_bundle(&self, bundle: &BundleRef, archive: &Path) -> anyhow::Result<()> {
+        self.server.fetch_bundle(bundle, archive)
+    }
+
+    fn fetch_recording(&self, key: &str, folder: &Path) -> anyhow::Result<()> {
+        self.server.fetch_recording(key, folder)
+    }
+
+    fn store_recording(&self, key: &str, folder: &Path) -> anyhow::Result<()> {
+        self.server.store_recording(key, folder)
+    }
+
+    fn store_clips(&self, key: &str, clips: &Path) -> anyhow::Result<()> {
+        self.server.store_clips(key, clips)
+    }
+
+    fn store_dataset(&self, key: &str, archive: &Path, clips: Option<&Path>) -> anyhow::Result<()> {
+        self.server.store_dataset(key, archive, clips)
+    }
+}

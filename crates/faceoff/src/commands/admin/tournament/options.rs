@@ -1,0 +1,189 @@
+use anyhow::Context;
+use clap::{Args, ValueEnum};
+use faceoff_types::{Profile, Publication};
+use serde_json::{Map, Value, json};
+
+/// Rules and settings of a tournament. Options that are left out do not change, or are those of the original challenge.
+#[derive(Debug, Args)]
+pub(in crate::commands::admin) struct TournamentOptions {
+    /// Pairing: round robin; drawn groups and a final of their best teams; Swiss system
+    #[arg(long, value_name = "FORMAT")]
+    format: Option<Format>,
+    /// Number of rounds, of round-robin (default 2) and swiss
+    #[arg(long, value_name = "N", requires = "format")]
+    rounds: Option<u32>,
+    /// Number of groups
+    #[arg(long, value_name = "N", requires = "format")]
+    groups: Option<u32>,
+    /// Teams of each group that reach the final (default 1)
+    #[arg(long, value_name = "N", requires = "format")]
+    advance: Option<u32>,
+    /// Control steps per game; 45000 are 15 minutes
+    #[arg(long, value_name = "N")]
+    steps: Option<u32>,
+    /// Perturbation profile
+    #[arg(long)]
+    profile: Option<Profile>,
+    /// Play each meeting as a mirrored pair: two games on one seed with swapped sides
+    #[arg(long, value_name = "true|false")]
+    mirrored: Option<bool>,
+    /// Further rules in the API's format, e.g. '{"game_limits":{"max_faults":5}}'
+    #[arg(long, value_name = "JSON", value_parser = object)]
+    rules: Option<Map<String, Value>>,
+    /// Friendly and test games that a team may request per UTC day
+    #[arg(long, value_name = "N")]
+    free_games: Option<u32>,
+    /// When the recordings of games are published: never, at_close or at_release (of their round)
+    #[arg(long, value_name = "TIME")]
+    publishes: Option<Publication>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Format {
+    RoundRobin,
+    Groups,
+    Swiss,
+}
+
+impl TournamentOptions {
+    /// The rules that the options set.
+    pub(super) fn rules(&self) -> anyhow::Result<Option<Map<String, Value>>> {
+        let mut rules = self.rules.clone().unwrap_or_default();
+        let given = [
+            ("format", self.format()?),
+            ("steps", self.steps.map(|steps| json!(steps))),
+            ("profile", self.profile.map(|profile| json!(profile))),
+            ("mirrored", self.mirrored.map(|mirrored| json!(mirrored))),
+        ];
+        for (name, value) in given {
+            if let Some(value) = value {
+                rules.insert(name.to_owned(), value);
+            }
+        }
+        Ok(Some(rules).filter(|rules| !rules.is_empty()))
+    }
+
+    fn format(&self) -> anyhow::Result<Option<Value>> {
+        let Some(format) = self.format else {
+            return Ok(None);
+        };
+        let refused = |given: Option<u32>, option: &str| match given {
+            Some(_) => anyhow::bail!("--{option} does not apply to this --format; leave it out"),
+            None => Ok(()),
+        };
+        Ok(Some(match format {
+            Format::Groups => {
+                refused(self.rounds, "rounds")?;
+                let groups = self.groups.context("--format groups needs --groups N")?;
+                let advance = self.advance.unwrap_or(1);
+                json!({"kind": "groups", "groups": groups, "advance": advance})
+            }
+            Format::RoundRobin | Format::Swiss => {
+                refused(self.groups, "groups")?;
+                refused(self.advance, "advance")?;
+                if format == Format::RoundRobin {
+                    json!({"kind": "round_robin", "rounds": self.rounds.unwrap_or(2)})
+                } else {
+                    let rounds = self.rounds.context("--format swiss needs --rounds N")?;
+                    json!({"kind": "swiss", "rounds": rounds})
+                }
+            }
+        }))
+    }
+
+    /// The settings that the options set.
+    pub(super) fn settings(&self) -> Option<Map<String, Value>> {
+        let given = [
+            (
+                "free_games_per_day",
+                self.free_games.map(|games| json!(games)),
+            ),
+            ("publishes", self.publishes.map(|when| json!(when))),
+        ];
+        let settings: Map<String, Value> = given
+            .into_iter()
+            .filter_map(|(name, value)| Some((name.to_owned(), value?)))
+            .collect();
+        Some(settings).filter(|settings| !settings.is_empty())
+    }
+}
+
+fn object(text: &str) -> Result<Map<String, Value>, String> {
+    serde_json::from_str(text).map_err(|error| format!("expected a JSON object: {error}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::Parser;
+
+    #[derive(Debug, Parser)]
+    struct Line {
+        #[command(flatten)]
+        options: TournamentOptions,
+    }
+
+    fn options(args: &[&str]) -> TournamentOptions {
+        let args = ["open"].iter().chain(args);
+        Line::try_parse_from(args).unwrap().options
+    }
+
+    #[test]
+    fn options_become_valid_rules_and_settings() {
+        let rules = |args: &[&str]| options(args).rules().unwrap().unwrap();
+        let all = rules(&[
+            "--format",
+            "groups",
+            "--groups",
+            "2",
+            "--steps",
+            "1500",
+            "--mirrored",
+            "true",
+            "--rules",
+            r#"{"game_limits":{"max_faults":5},"steps":7}"#,
+        ]);
+        assert_eq!(
+            Value::Object(all.clone()),
+            json!({"format": {"kind": "groups", "groups": 2, "advance": 1}, "steps": 1500, "mirrored": true,
+                   "game_limits": {"max_faults": 5}})
+        );
+        for rules in [
+            all,
+            rules(&["--format", "round-robin"]),
+            rules(&["--format", "swiss", "--rounds", "3", "--profile", "ideal"]),
+        ] {
+            let rules: faceoff_types::TournamentRules =
+                serde_json::from_value(Value::Object(rules)).unwrap();
+            assert_eq!(rules.check(), Ok(()));
+        }
+        assert_eq!(options(&[]).rules().unwrap(), None);
+        assert_eq!(options(&[]).settings(), None);
+        let settings = options(&["--free-games", "2", "--publishes", "at_release"]);
+        let settings = Value::Object(settings.settings().unwrap());
+        let read: faceoff_types::TournamentSettings =
+            serde_json::from_value(settings.clone()).unwrap();
+        assert_eq!(json!(read), settings);
+    }
+
+    #[test]
+    fn missing_or_inapplicable_option_is_named() {
+        for (args, expected) in [
+            (&["--format", "groups"][..], "--groups N"),
+            (&["--format", "swiss"], "--rounds N"),
+            (
+                &["--format", "swiss", "--groups", "2"],
+                "--groups does not apply",
+            ),
+            (
+                &["--format", "groups", "--groups", "2", "--rounds", "2"],
+                "--rounds does not apply",
+            ),
+        ] {
+            let error = options(args).rules().unwrap_err().to_string();
+            assert!(error.contains(expected), "{error}");
+        }
+        assert!(Line::try_parse_from(["open", "--rules", "[]"]).is_err());
+        assert!(Line::try_parse_from(["open", "--rounds", "2"]).is_err());
+    }
+}

@@ -1,0 +1,88 @@
+//! Text output of `faceoff doctor`.
+
+use super::{LayerReport, Findings};
+use faceoff_sandbox::HostFeature;
+use std::io::Write;
+
+impl LayerReport {
+    const fn mark(&self) -> &'static str {
+        match (self.host.available, self.given_up) {
+            (_, true) => "given up",
+            (true, false) => "ok",
+            (false, false) => "MISSING",
+        }
+    }
+}
+
+impl Findings {
+    pub(super) fn print(&self, out: &mut impl Write) -> std::io::Result<()> {
+        writeln!(out, "Sandbox")?;
+        let mut features = self.features.iter().peekable();
+        while let Some(feature) = features.next() {
+            let HostFeature {
+                layer, found, cure, ..
+            } = &feature.host;
+            writeln!(
+                out,
+                "  {:<9} {:<14} {found}",
+                feature.mark(),
+                layer.as_str()
+            )?;
+            // A cure of several layers in a row is printed once, below the last.
+            if features.peek().is_none_or(|next| next.host.cure != *cure) {
+                print_cure(out, cure.as_deref())?;
+            }
+        }
+        writeln!(out, "Runtimes")?;
+        for runtime in &self.runtimes {
+            let mark = if runtime.available { "ok" } else { "none" };
+            writeln!(out, "  {mark:<9} {:<14} {}", runtime.name, runtime.found)?;
+            print_cure(out, runtime.cure.as_deref())?;
+        }
+        let memory = &self.in_memory;
+        let mark = if memory.available { "ok" } else { "none" };
+        writeln!(out, "  {mark:<9} {:<14} {}", "in memory", memory.found)?;
+        print_cure(out, memory.cure.as_deref())?;
+        let cpus = &self.cpus;
+        writeln!(out, "CPUs")?;
+        let bound = match cpus.agent_cpus.as_slice() {
+            [] if cpus.usable >= 2 * cpus.slots => "separate CPUs for each slot".to_owned(),
+            [] => "all CPUs of the service".to_owned(),
+            list => format!("CPUs {list:?}"),
+        };
+        writeln!(
+            out,
+            "  {} usable, {} worker slot(s), agents on: {bound}",
+            cpus.usable, cpus.slots
+        )?;
+        print_cure(out, cpus.advice.as_deref())?;
+        writeln!(out, "Descriptors")?;
+        writeln!(out, "  {}", self.descriptors.found)?;
+        print_cure(out, self.descriptors.cure.as_deref())?;
+        writeln!(out, "Disks")?;
+        for disk in &self.disks {
+            writeln!(out, "  {}: {}", disk.folder.display(), disk.found)?;
+            print_cure(out, disk.cure.as_deref())?;
+        }
+        writeln!(out, "Host")?;
+        for checked in &self.host {
+            writeln!(out, "  {}: {}", checked.name, checked.found)?;
+            print_cure(out, checked.cure.as_deref())?;
+        }
+        if !self.nats.is_empty() {
+            writeln!(out, "Remote worker")?;
+        }
+        for checked in &self.nats {
+            writeln!(out, "  {}: {}", checked.name, checked.found)?;
+            print_cure(out, checked.cure.as_deref())?;
+        }
+        Ok(())
+    }
+}
+
+fn print_cure(out: &mut impl Write, cure: Option<&str>) -> std::io::Result<()> {
+    match cure {
+        Some(cure) => writeln!(out, "  {:<9} -> {cure}", ""),
+        None => Ok(()),
+    }
+}

@@ -1,0 +1,14 @@
+use faceoff_runner::PlatformFault;
+
+/// Adds advice to a platform fault.
+pub(super) fn with_advice(fault: PlatformFault) -> anyhow::Error {
+    let host_busy = matches!(fault, PlatformFault::HostBusy(_));
+    let error = anyhow::Error::new(fault);
+    if host_busy {
+        error.context(
+            "the game failed by a platform fault, not by an agent: play it again when the machine is less busy",
+        )
+    } else {
+        error.context("the game failed by a platform fault, not by an agent")
+    }
+}

@@ -1,0 +1,239 @@
+//! The data folder: its lock and its secrets.
+
+use super::super::atomic_folder::create_private;
+use anyhow::{Context, bail};
+use faceoff_api::token::{Secret, SecretKind, hash_token};
+use faceoff_http::LinkKey;
+use faceoff_store::Store;
+use jiff::Timestamp;
+use std::{
+    fs::{self, File, OpenOptions, TryLockError},
+    io::{Read as _, Seek as _, Write as _},
+    os::unix::fs::{MetadataExt, OpenOptionsExt},
+    path::Path,
+    thread,
+    time::{Duration, Instant},
+};
+
+/// Name of the file with the host's organiser token.
+pub const ADMIN_TOKEN_FILE: &str = "admin-token";
+
+/// Name of the file with the key that signs links. Backups do not contain it.
+const LINK_KEY_FILE: &str = "links.key";
+
+/// Name of the lock file, which is inside the data folder so that it moves with it.
+const LOCK_FILE: &str = "serving.lock";
+
+/// How long the lock of a dead process may remain: until a child that it has forked calls exec.
+const MAX_LOCK_AFTERLIFE: Duration = Duration::from_secs(10);
+
+/// Locks the data folder for this process, until the file is dropped or the process ends. The holder of the lock may
+/// remove what other processes have left.
+///
+/// # Errors
+/// If another process has the lock. Nothing has been changed then.
+pub fn lock(data_dir: &Path) -> anyhow::Result<File> {
+    let path = data_dir.join(LOCK_FILE);
+    let context = || format!("locking the data folder with {}", path.display());
+    let mut file = OpenOptions::new()
+        .read(true)
+        .write(true)
+        .create(true)
+        .truncate(false)
+        .mode(0o600)
+        .open(&path)
+        .with_context(context)?;
+    let begun = Instant::now();
+    loop {
+        match file.try_lock() {
+            Ok(()) => break,
+            Err(TryLockError::Error(error)) => {
+                let context = context();
+                return Err(error).context(format!("{context}; does its file system support locks?"));
+            }
+            Err(TryLockError::WouldBlock) => {
+                let holder = read_holder(&mut file);
+                if holder.is_some_and(is_alive) || begun.elapsed() > MAX_LOCK_AFTERLIFE {
+                    let holder = holder.map_or_else(
+                        || "another process".to_owned(),
+                        |id| format!("process {id}"),
+                    );
+                    bail!(
+                        "the data folder {} is in use by {holder}: stop it first, or name another folder with \
+                        --data-dir",
+                        data_dir.display()
+                    );
+                }
+                thread::sleep(Duration::from_millis(50));
+            }
+        }
+    }
+    // A restore may have renamed the folder in between.
+    let (locked, named) = (
+        file.metadata().with_context(context)?,
+        fs::metadata(&path).with_context(context)?,
+    );
+    if (locked.dev(), locked.ino()) != (named.dev(), named.ino()) {
+        bail!(
+            "the data folder {} has just been replaced; start again",
+            data_dir.display()
+        );
+    }
+    file.set_len(0)
+        .and_then(|()| file.rewind())
+        .and_then(|()| writeln!(file, "{}", std::process::id()))
+        .with_context(context)?;
+    Ok(file)
+}
+
+/// The process id in the lock file. It only serves error messages; the lock itself is the file lock.
+fn read_holder(file: &mut File) -> Option<i32> {
+    let mut text = String::new();
+    file.rewind().ok()?;
+    file.read_to_string(&mut text).ok()?;
+    text.trim().parse().ok()
+}
+
+fn is_alive(id: i32) -> bool {
+    use rustix::{
+        io::Errno,
+        process::{Pid, test_kill_process},
+    };
+    Pid::from_raw(id).is_some_and(|id| test_kill_process(id) != Err(Errno::SRCH))
+}
+
+/// Creates an empty private folder, or empties it.
+///
+/// # Errors
+/// If the folder cannot be emptied or created.
+pub fn empty_folder(folder: &Path) -> anyhow::Result<()> {
+    match fs::remove_dir_all(folder) {
+        Ok(()) => {}
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => {}
+        Err(error) => {
+            return Err(error).with_context(|| format!("emptying {}", folder.display()));
+        }
+    }
+    create_private(folder)
+}
+
+/// The hash of the host's token, which is created at the first start.
+fn admin_token(data_dir: &Path) -> anyhow::Result<[u8; 32]> {
+    let file = data_dir.join(ADMIN_TOKEN_FILE);
+    match fs::read_to_string(&file) {
+        Ok(token) if token.trim().is_empty() => bail!(
+            "{} is empty; remove it, and the next start creates a new token",
+            file.display()
+        ),
+        Ok(token) => return Ok(hash_token(token.trim())),
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => {}
+        Err(error) => return Err(error).with_context(|| format!("reading {}", file.display())),
+    }
+    let token = Secret::generate(SecretKind::Admin).context("generating the organiser's token")?;
+    write_secret(&file, token.as_str())?;
+    tracing::info!(file = %file.display(), "created the organiser's token; keep the file secret");
+    Ok(token.hash())
+}
+
+/// Writes a private file under a temporary name and renames it, so that a crash cannot leave half a secret.
+fn write_secret(file: &Path, secret: &str) -> anyhow::Result<()> {
+    let fresh = file.with_extension("new");
+    let write = || -> std::io::Result<()> {
+        let mut writer = OpenOptions::new()
+            .write(true)
+            .create(true)
+            .truncate(true)
+            .mode(0o600)
+            .open(&fresh)?;
+        writeln!(writer, "{secret}")?;
+        writer.sync_all()?;
+        fs::rename(&fresh, file)
+    };
+    write().with_context(|| format!("writing {}", file.display()))
+}
+
+/// Reads the key that signs links, or creates it at the first start. If the key is lost, existing links become invalid.
+///
+/// # Errors
+/// If the key cannot be read or written, or is invalid.
+pub fn link_key(data_dir: &Path) -> anyhow::Result<LinkKey> {
+    let file = data_dir.join(LINK_KEY_FILE);
+    match fs::read_to_string(&file) {
+        Ok(text) => LinkKey::from_hex(text.trim()).with_context(|| {
+            format!(
+                "{}: expected 64 hexadecimal digits; remove it, and the next start creates a new key",
+                file.display()
+            )
+        }),
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
+            let key = LinkKey::generate().context("generating the key of links")?;
+            write_secret(&file, &key.to_hex())?;
+            Ok(key)
+        }
+        Err(error) => Err(error).with_context(|| format!("reading {}", file.display())),
+    }
+}
+
+/// Registers the token of the file in the store, or a new one if it has been revoked.
+///
+/// # Errors
+/// If the file or the database cannot be read or written.
+pub async fn set_admin_token(store: &Store, data_dir: &Path, now: Timestamp) -> anyhow::Result<()> {
+    if !store.set_host_token(admin_token(data_dir)?, now).await? {
+        let file = data_dir.join(ADMIN_TOKEN_FILE);
+        tracing::warn!(file = %file.display(), "the token in the file was revoked; creating a new one");
+        fs::remove_file(&file).with_context(|| format!("removing {}", file.display()))?;
+        store.set_host_token(admin_token(data_dir)?, now).await?;
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::os::unix::fs::PermissionsExt;
+
+    #[test]
+    fn data_folder_has_one_lock_holder_at_a_time() {
+        let folder = tempfile::tempdir().unwrap();
+        let held = lock(folder.path()).unwrap();
+        let refused = lock(folder.path()).unwrap_err().to_string();
+        let own = format!("in use by process {}", std::process::id());
+        assert!(refused.contains(&own), "{refused}");
+        drop(held);
+        // The id of a process that has ended, and invalid content.
+        for content in ["999999999", "", "words"] {
+            fs::write(folder.path().join(LOCK_FILE), content).unwrap();
+            drop(lock(folder.path()).unwrap());
+        }
+    }
+
+    #[test]
+    fn link_key_is_created_once_and_private() {
+        let folder = tempfile::tempdir().unwrap();
+        let first = link_key(folder.path()).unwrap().to_hex();
+        assert_eq!(link_key(folder.path()).unwrap().to_hex(), first);
+        let file = folder.path().join(LINK_KEY_FILE);
+        assert_eq!(file.metadata().unwrap().permissions().mode() & 0o777, 0o600);
+        fs::write(&file, "no key\n").unwrap();
+        let refused = link_key(folder.path()).unwrap_err().to_string();
+        assert!(refused.contains("64 hexadecimal digits"), "{refused}");
+    }
+
+    #[test]
+    fn host_token_is_created_once_and_private() {
+        let folder = tempfile::tempdir().unwrap();
+        let first = admin_token(folder.path()).unwrap();
+        assert_eq!(admin_token(folder.path()).unwrap(), first);
+        let file = folder.path().join(ADMIN_TOKEN_FILE);
+        assert_eq!(file.metadata().unwrap().permissions().mode() & 0o777, 0o600);
+        let token = fs::read_to_string(&file).unwrap();
+        assert!(token.starts_with("fo_admin_"));
+        assert_eq!(hash_token(token.trim()), first);
+        fs::write(&file, "\n").unwrap();
+        assert!(
+            admin_token(folder.path()).is_err(),
+            "an empty token must not be accepted"
+        );
+    }
+}

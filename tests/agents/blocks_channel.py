@@ -1,0 +1,165 @@
+"""Blocks or misuses the channels that it shares with the service.
+
+It prints `ready`, then acts as KIND says: blocks in system calls on its standard input, output or error (`splice-…`,
+`fault-…`), stops itself, closes or shuts down one direction, fills it, writes single bytes, or sends out-of-band data or
+file descriptors. Most kinds echo lines afterwards.
+"""
+import array
+import ctypes
+import mmap
+import os
+import select
+import signal
+import socket
+import sys
+import threading
+import time
+
+KIND = sys.argv[2]
+libc = ctypes.CDLL(None, use_errno=True)
+references = []
+
+
+def thread(body):
+    references.append(threading.Thread(target=body, daemon=True))
+    references[-1].start()
+
+
+def full_socket():
+    """A socket with a full buffer that is never read."""
+    pair = socket.socketpair()
+    references.extend(pair)
+    pair[0].setblocking(False)
+    try:
+        while True:
+            pair[0].send(b"x" * 4096)
+    except BlockingIOError:
+        pair[0].setblocking(True)
+    return pair[0].fileno()
+
+
+def empty_socket():
+    pair = socket.socketpair()
+    references.extend(pair)
+    return pair[0].fileno()
+
+
+def splice(source, target):
+    def body():
+        while True:
+            try:
+                os.splice(source, target, 1 << 16)
+            except OSError as error:
+                print("splice:", error.strerror, file=sys.stderr, flush=True)
+                return
+    thread(body)
+
+
+def slow_memory():
+    """Memory whose page faults block: they need a lock that a starved thread holds."""
+    cpu = max(os.sched_getaffinity(0))
+    os.sched_setaffinity(0, {cpu})
+    size = 96 << 20
+    region = mmap.mmap(-1, size, flags=mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS)
+    region[::4096] = bytes(size // 4096)
+    references.append(region)
+    address = ctypes.addressof(ctypes.c_char.from_buffer(region))
+
+    def change_protection():
+        os.sched_setscheduler(0, os.SCHED_IDLE, os.sched_param(0))
+        while True:
+            libc.mprotect(ctypes.c_void_p(address), ctypes.c_size_t(size), 1)
+            libc.mprotect(ctypes.c_void_p(address), ctypes.c_size_t(size), 3)
+
+    thread(change_protection)
+    for _ in range(3):
+        if os.fork() == 0:
+            while True:
+                pass
+    return address, size
+
+
+def faults(call):
+    address, size = slow_memory()
+
+    def body():
+        at = 0
+        while True:
+            call(ctypes.c_void_p(address + at), ctypes.c_size_t(4096))
+            at = (at + 4096) % size
+    thread(body)
+
+
+def send(data, flags=0, files=()):
+    with socket.socket(fileno=os.dup(1)) as line:
+        rights = [(socket.SOL_SOCKET, socket.SCM_RIGHTS, array.array("i", files))] if files else []
+        try:
+            line.sendmsg([data], rights, flags)
+        except OSError as error:
+            print("sendmsg:", error.strerror, file=sys.stderr, flush=True)
+
+
+def shut(fd, how):
+    with socket.socket(fileno=os.dup(fd)) as line:
+        line.shutdown(how)
+
+
+def block():
+    if KIND == "splice-output":
+        splice(empty_socket(), 1)
+    elif KIND == "splice-log":
+        splice(empty_socket(), 2)
+    elif KIND == "splice-input":
+        splice(0, full_socket())
+    elif KIND == "fault-output":
+        faults(lambda memory, size: libc.write(1, memory, size))
+    elif KIND == "fault-log":
+        faults(lambda memory, size: libc.write(2, memory, size))
+    elif KIND == "fault-input":
+        faults(lambda memory, size: libc.read(0, memory, size))
+    elif KIND == "shut-input":
+        shut(0, socket.SHUT_RD)
+    elif KIND == "shut-output":
+        shut(1, socket.SHUT_WR)
+    elif KIND == "close-input":
+        os.close(0)
+    elif KIND == "close-output":
+        os.close(1)
+    elif KIND == "fills":
+        thread(lambda: [os.write(1, b"x" * 9999 + b"\n") for _ in iter(int, 1)])
+        thread(lambda: [os.write(2, b"x" * 9999) for _ in iter(int, 1)])
+    elif KIND == "dribbles":
+        thread(lambda: [(os.write(1, b"x"), os.write(2, b"x"), time.sleep(0.0005)) for _ in iter(int, 1)])
+    elif KIND == "watches":
+        # Reading one byte wakes all of these.
+        for fd in (1, 2):
+            ends = [os.dup(fd) for _ in range(100)]
+            for _ in range(100):
+                references.append(select.epoll())
+                for end in ends:
+                    references[-1].register(end, select.EPOLLOUT | select.EPOLLET)
+        thread(lambda: [(os.write(1, b"x"), os.write(2, b"x")) for _ in iter(int, 1)])
+    elif KIND == "out-of-band":
+        send(b"x", socket.MSG_OOB)
+        send(b"yz", socket.MSG_OOB)
+    elif KIND == "passes-files":
+        for _ in range(50):
+            send(b"x", 0, [0, 1, 2])
+    elif KIND == "spins":
+        thread(lambda: [None for _ in iter(int, 1)])
+    elif KIND == "stops":
+        os.kill(os.getpid(), signal.SIGSTOP)
+
+
+if KIND == "stops" and os.fork():
+    # The first process of a namespace cannot be stopped from inside, so a child stops itself.
+    os.wait()
+    sys.exit()
+print("ready", flush=True)
+block()
+if not KIND.endswith("input"):
+    for line in sys.stdin:
+        if not KIND.endswith("output"):
+            sys.stdout.write(line)
+            sys.stdout.flush()
+signal.pause()

@@ -1,0 +1,39 @@
+"""Tries to connect to the outside. Arguments: a TCP port of the host, a socket path of the host, an abstract socket name."""
+import json
+import socket
+import sys
+
+port, path, abstract = int(sys.argv[2]), sys.argv[3], sys.argv[4]
+
+
+def attempt(family, kind, address, protocol=0):
+    try:
+        with socket.socket(family, kind, protocol) as line:
+            line.settimeout(60)
+            line.connect(address)
+            line.send(b"hello")
+            return "reached"
+    except OSError as error:
+        return error.strerror or str(error)
+
+
+def pair():
+    left, right = socket.socketpair()
+    left.send(b"x")
+    return right.recv(1).decode()
+
+
+AF_NETLINK, AF_PACKET, AF_ALG, AF_VSOCK = 16, 17, 38, 40
+print(json.dumps({
+    "tcp": attempt(socket.AF_INET, socket.SOCK_STREAM, ("127.0.0.1", port)),
+    "tcp6": attempt(socket.AF_INET6, socket.SOCK_STREAM, ("::1", port)),
+    "udp": attempt(socket.AF_INET, socket.SOCK_DGRAM, ("127.0.0.1", port)),
+    "raw": attempt(socket.AF_INET, socket.SOCK_RAW, ("127.0.0.1", port), 1),
+    "netlink": attempt(AF_NETLINK, socket.SOCK_RAW, (0, 0)),
+    "packet": attempt(AF_PACKET, socket.SOCK_RAW, ("lo", 0)),
+    "alg": attempt(AF_ALG, socket.SOCK_SEQPACKET, ("hash", "sha256")),
+    "vsock": attempt(AF_VSOCK, socket.SOCK_STREAM, (2, port)),
+    "unix_path": attempt(socket.AF_UNIX, socket.SOCK_STREAM, path),
+    "unix_abstract": attempt(socket.AF_UNIX, socket.SOCK_STREAM, "\0" + abstract),
+    "own_pair": pair(),
+}), flush=True)

@@ -1,0 +1,65 @@
+"""Tries to reopen its standard input and output by each of their names in `/proc`, in this process and in a child. Also
+tries to shrink the input and to enlarge the buffer of its log. Reports each error's name, or `ok`.
+"""
+import errno
+import fcntl
+import json
+import os
+import socket
+import threading
+
+SHRINK = 1031
+
+
+def attempt(action):
+    try:
+        action()
+        return "ok"
+    except OSError as error:
+        return errno.errorcode[error.errno]
+
+
+def names(process, threads):
+    yield from (f"/proc/{process}/fd/{fd}" for fd in (0, 1))
+    yield from (f"/proc/{process}/task/{thread}/fd/{fd}" for thread in threads for fd in (0, 1))
+
+
+def tries(label, process):
+    threads = os.listdir(f"/proc/{process}/task")
+    for name in names(process, threads):
+        for way, flags in (("read", os.O_RDONLY), ("write", os.O_WRONLY), ("both", os.O_RDWR)):
+            found[f"{label} {name} {way}"] = attempt(lambda: os.open(name, flags | os.O_NONBLOCK))
+
+
+found = {}
+stop = threading.Event()
+other = threading.Thread(target=stop.wait)
+other.start()
+tries("own", "self")
+tries("own", os.getpid())
+for name in ("/dev/stdin", "/dev/stdout", "/dev/fd/0", "/dev/fd/1", "/proc/thread-self/fd/0"):
+    found[name] = attempt(lambda: os.open(name, os.O_RDWR | os.O_NONBLOCK))
+read_end, write_end = os.pipe()
+child = os.fork()
+if child == 0:
+    os.close(write_end)
+    os.read(read_end, 1)
+    os._exit(0)
+tries("child", child)
+os.close(write_end)
+os.waitpid(child, 0)
+# Sockets may have any mode.
+mode = attempt(lambda: os.fchmod(0, 0o666))
+if os.fstat(0).st_mode & 0o170000 == 0o010000:
+    found["shrink mode"] = mode
+copy = os.dup(0)
+for label, fd in (("input", 0), ("output", 1), ("copy", copy)):
+    found[f"shrink {label}"] = attempt(lambda: fcntl.fcntl(fd, SHRINK, 4096))
+with socket.socket(fileno=os.dup(2)) as log:
+    before = log.getsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF)
+    found["send_buffer"] = attempt(lambda: log.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 4 * before))
+    if log.getsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF) == before:
+        found["send_buffer"] = "stays"
+stop.set()
+other.join()
+print(json.dumps(found), flush=True)

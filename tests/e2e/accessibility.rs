@@ -1,0 +1,127 @@
+//! Accessibility of the public pages and of both dashboards: axe reports no violation, no page is wider than its window,
+//! and no script fails.
+
+use crate::{
+    axe::{axe, faults},
+    commands::admin,
+    dashboards::{InvitedUser, sign_in},
+    replay::released_evaluation,
+};
+use faceoff_tests::{
+    browser::{Browser, Page, View},
+    server::Server,
+};
+use serde_json::{Value, json};
+
+/// Opens a page and returns its faults.
+fn check_page(page: &Page, server: &Server, axe: &str, path: &str) -> Vec<String> {
+    page.set_view(View::DESKTOP);
+    page.go_to(&format!("{}{path}", server.url));
+    let has_heading = page.evaluate("document.querySelector('h1') !== null");
+    assert_eq!(has_heading, true, "{path} has a heading");
+    page.wait_until(
+        "[...document.querySelectorAll('.replay')].every(replay => replay.dataset.state == 'ready')",
+    );
+    faults(page, axe, path)
+}
+
+#[test]
+fn public_pages_follow_accessibility_rules() {
+    let axe = axe();
+    let scratch = tempfile::tempdir().expect("a scratch folder can be made");
+    let (server, evaluation) = released_evaluation(scratch.path());
+    let browser = Browser::start(scratch.path());
+    let board: Value = server
+        .get("/api/v1/board", None)
+        .json()
+        .expect("the API speaks JSON");
+    let team = board["rows"][0]["team_id"].as_str();
+    let team = format!("/teams/{}", team.expect("a row names its team"));
+    let episodes = format!("{evaluation}/episodes");
+    let replay = format!("{evaluation}/episodes/defend/0");
+    let embedded = format!("{replay}/embed");
+    let mut found = Vec::new();
+    let page = browser.open(&format!("{}/", server.url));
+    for path in [
+        "/",
+        "/tasks/defend",
+        &team,
+        &evaluation,
+        &episodes,
+        &replay,
+        &embedded,
+        "/season",
+        "/announcements",
+        "/help",
+        "/problems",
+        "/docs",
+        "/docs/rules",
+        "/docs/api-reference",
+        "/sign-in",
+        "/register",
+    ] {
+        found.extend(check_page(&page, &server, &axe, path));
+    }
+    assert!(found.is_empty(), "{}", found.join("\n"));
+}
+
+#[test]
+fn dashboards_follow_accessibility_rules() {
+    let axe = axe();
+    let scratch = tempfile::tempdir().expect("a scratch folder can be made");
+    let (server, evaluation) = released_evaluation(scratch.path());
+    let id = evaluation.rsplit('/').next().expect("the path ends with the id");
+    let view: Value = server
+        .get(
+            &format!("/api/v1/evaluations/{id}"),
+            Some(&server.admin_token),
+        )
+        .json()
+        .expect("the API speaks JSON");
+    let field = |name: &str| {
+        view[name]
+            .as_str()
+            .expect("an evaluation has this field")
+            .to_owned()
+    };
+    let (team, submission) = (field("team"), field("submission"));
+    let announced = server.post(
+        "/api/v1/announcements",
+        &server.admin_token,
+        &json!({ "title": "Hello", "text": "The season has begun." }),
+    );
+    assert_eq!(announced.status(), 201);
+    admin(&server, &["order-ablation", &submission, "--episodes", "1"]).expect_success();
+    let browser = Browser::start(scratch.path());
+    let mut found = Vec::new();
+    let member = sign_in(&browser, &server, InvitedUser::member("Ada", &team));
+    for path in [
+        "/desk",
+        &format!("/desk/submissions/{submission}"),
+        "/desk/questions",
+        "/desk/access",
+        "/account",
+    ] {
+        found.extend(check_page(&member, &server, &axe, path));
+    }
+    let organiser = sign_in(&browser, &server, InvitedUser::organiser("Grace"));
+    let stage = view["stage"].as_str().expect("an evaluation has a stage");
+    for path in [
+        "/organiser",
+        "/organiser/day",
+        "/organiser/teams",
+        "/organiser/stages",
+        &format!("/organiser/stages/{stage}"),
+        "/organiser/messages",
+        "/organiser/storage",
+        "/organiser/workers",
+        "/organiser/access",
+        "/organiser/log",
+        "/organiser/decide/pause",
+        &format!("/organiser/decide/void/{id}"),
+        &format!("/submissions/{submission}/ablation"),
+    ] {
+        found.extend(check_page(&organiser, &server, &axe, path));
+    }
+    assert!(found.is_empty(), "{}", found.join("\n"));
+}

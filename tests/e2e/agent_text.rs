@@ -1,0 +1,228 @@
+//! Text from agents is shown without control characters, and bundles reveal nothing about the host's files.
+
+use crate::{CONFIG, Team};
+use faceoff_tests::{
+    bundle::{pack, python_agent, python_bundle},
+    program,
+    server::Server,
+};
+use serde_json::{Value, json};
+use std::{
+    fs,
+    os::unix::fs::{PermissionsExt, symlink},
+    path::Path,
+    process::Command,
+};
+
+fn text(value: &Value) -> &str {
+    value
+        .as_str()
+        .unwrap_or_else(|| panic!("{value} is no text"))
+}
+
+/// Asserts that a text has no control characters, and none that change the writing direction or are invisible.
+fn assert_harmless(name: &str, text: &str) {
+    let bad = text.chars().find(|c| {
+        (c.is_control() && !"\n\t\r".contains(*c))
+            || matches!(c, '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
+    });
+    assert_eq!(bad, None, "{name}: {text:?}");
+}
+
+#[test]
+fn agent_toml_that_is_no_file_makes_bundle_invalid() {
+    let scratch = tempfile::tempdir().expect("a scratch folder can be made");
+    let server = Server::start(&scratch.path().join("data"), CONFIG);
+    let team = Team::create(&server, "Folder");
+    let bundle = |name: &str, make: &dyn Fn(&Path)| {
+        let folder = python_bundle(scratch.path(), name, "pass");
+        fs::remove_file(folder.join("agent.toml")).expect("it was just written");
+        make(&folder.join("agent.toml"));
+        folder
+    };
+    // The same below a top folder of the archive.
+    let top = scratch.path().join("with-top");
+    fs::create_dir_all(top.join("striker/agent.toml")).expect("a scratch folder");
+    let folder = bundle("folder", &|path| {
+        fs::create_dir(path).expect("a scratch folder")
+    });
+    let full = bundle("full", &|path| {
+        fs::create_dir(path).expect("a scratch folder");
+        fs::write(path.join("agent.toml"), "name = \"x\"").expect("a scratch file");
+    });
+    let linked = |name, target: &'static str| {
+        let folder = bundle(name, &|path| symlink(target, path).expect("a scratch link"));
+        packed_with_links(&folder)
+    };
+    for (name, archive, word) in [
+        ("folder", pack(&folder), "agent.toml is a folder"),
+        (
+            "a folder that holds one",
+            pack(&full),
+            "agent.toml is a folder",
+        ),
+        ("below a top folder", pack(&top), "agent.toml is a folder"),
+        (
+            "link to a file",
+            linked("link", "agent.py"),
+            "agent.toml is a link",
+        ),
+        (
+            "link to nothing",
+            linked("dangling", "missing"),
+            "agent.toml is a link",
+        ),
+        ("link to itself", linked("circle", "agent.toml"), "circle"),
+        (
+            "link to the host",
+            linked("host", "/etc/passwd"),
+            "leaves the bundle",
+        ),
+    ] {
+        let id = team.upload(&server, archive);
+        let verdict = team.verdict(&server, &id);
+        assert_eq!(verdict["state"], "invalid", "{name}: {verdict:#}");
+        let reason = text(&verdict["reason"]);
+        assert!(reason.contains(word), "{name}: {word:?} is not in {reason}");
+    }
+}
+
+/// Like [`pack`], but keeps symbolic links.
+fn packed_with_links(folder: &Path) -> Vec<u8> {
+    let mut archive = tar::Builder::new(flate2::write::GzEncoder::new(
+        Vec::new(),
+        flate2::Compression::fast(),
+    ));
+    archive.follow_symlinks(false);
+    archive
+        .append_dir_all(".", folder)
+        .expect("the bundle's folder can be read");
+    let encoder = archive
+        .into_inner()
+        .expect("writing to memory does not fail");
+    encoder.finish().expect("writing to memory does not fail")
+}
+
+#[test]
+fn command_path_reveals_nothing_about_host_files() {
+    let scratch = tempfile::tempdir().expect("a scratch folder can be made");
+    let data_dir = scratch.path().join("data");
+    let server = Server::start(&data_dir, CONFIG);
+    let team = Team::create(&server, "Curious");
+    // An existing file that is not executable, compared with a missing one.
+    let secret = scratch.path().join("secret");
+    fs::write(&secret, "x").expect("a scratch file");
+    fs::set_permissions(&secret, fs::Permissions::from_mode(0o640)).expect("a scratch file");
+    let up = "../".repeat(12);
+    let folder = scratch.path().display().to_string();
+    for (number, directory) in [
+        format!("{up}{folder}/"),
+        format!("./{up}{folder}/"),
+        format!("deep/../{up}{folder}/"),
+        format!("/agent/{up}{folder}/"),
+        format!("/agent/{folder}/"),
+        format!("{folder}/"),
+        "../../etc/".to_owned(),
+        "/etc/".to_owned(),
+    ]
+    .into_iter()
+    .enumerate()
+    {
+        let answers = ["secret", "shadow", "no-such-file"].map(|name| {
+            let folder = python_bundle(scratch.path(), &format!("agent-{number}-{name}"), "pass");
+            let manifest =
+                format!("name = \"x\"\ncommand = [\"{directory}{name}\"]\nruntime = \"python3\"\n");
+            fs::write(folder.join("agent.toml"), manifest).expect("a scratch file");
+            let verdict = team.submit(&server, &folder);
+            assert_eq!(verdict["state"], "invalid", "{directory}{name}: {verdict:#}");
+            format!("{} {}", verdict["reason"], verdict["log"]).replace(name, "NAME")
+        });
+        assert_eq!(answers[0], answers[2], "{directory}");
+        assert_eq!(answers[1], answers[2], "{directory}");
+    }
+}
+
+#[test]
+fn agent_output_and_names_contain_no_control_characters() {
+    let scratch = tempfile::tempdir().expect("a scratch folder can be made");
+    let server = Server::start(&scratch.path().join("data"), CONFIG);
+    let team = Team::create(&server, "Painter");
+    for (number, (name, on_step, expected)) in [
+        (
+            "log",
+            "sys.stderr.write('\\x1b[2J\\x1b]0;owned\\x07 a\\u202eb \\x9b31m\\n'); sys.exit(3)",
+            "\\u001b[2J",
+        ),
+        (
+            "line",
+            "sys.stdout.write('\\u2066x\\u200f\\x1b[31m\\n'); sys.stdout.flush()",
+            "\\u2066x\\u200f\\u001b[31m",
+        ),
+        (
+            "type",
+            "say({'type': '\\u202etca\\x1b[0m', 'step': message['step']})",
+            "\\u202etca",
+        ),
+        (
+            "key",
+            "sys.stdout.write('{\"\\u202e\":1,\"\\u202e\":2}\\n'); sys.stdout.flush()",
+            "202e",
+        ),
+    ]
+    .into_iter()
+    .enumerate()
+    {
+        // Python must write UTF-8, whatever the sandbox's locale.
+        let source = python_agent(on_step).replace(
+            "held = None\nfor line",
+            "sys.stdout.reconfigure(encoding='utf-8')\nsys.stderr.reconfigure(encoding='utf-8')\n\
+             held = None\nfor line",
+        );
+        let folder = python_bundle(scratch.path(), &format!("agent-{number}"), &source);
+        let verdict = team.submit(&server, &folder);
+        assert_eq!(verdict["state"], "invalid", "{name}: {verdict:#}");
+        let shown_text = format!("{}\n{}", text(&verdict["reason"]), text(&verdict["log"]));
+        assert_harmless(name, &shown_text);
+        assert!(
+            shown_text.contains(expected),
+            "{name}: {expected:?} is not in {shown_text}"
+        );
+
+        // The same agent in a local evaluation: its log and faults are printed to a terminal.
+        let evaluated = Command::new(program("faceoff"))
+            .arg("eval")
+            .arg(&folder)
+            .args(["--task", "prepare", "--episodes", "1", "--seed", "1"])
+            .arg("--out")
+            .arg(scratch.path().join(format!("out-{number}")))
+            .output()
+            .expect("the program starts");
+        for output in [&evaluated.stdout, &evaluated.stderr] {
+            assert_harmless(name, &String::from_utf8_lossy(output));
+        }
+    }
+    for (name, chars) in [
+        ("escape", "a\\u001b[31m"),
+        ("override", "\\u202eredro"),
+        ("invisible", "a\\u200bb"),
+    ] {
+        let folder = python_bundle(scratch.path(), name, "pass");
+        let manifest = format!(
+            "name = \"{chars}\"\ncommand = [\"python3\", \"agent.py\"]\nruntime = \"python3\"\n"
+        );
+        fs::write(folder.join("agent.toml"), manifest).expect("a scratch file");
+        let verdict = team.submit(&server, &folder);
+        assert_eq!(verdict["state"], "invalid", "{name}: {verdict:#}");
+        let reason = text(&verdict["reason"]);
+        assert!(reason.contains("name must have"), "{reason}");
+        assert_harmless(name, reason);
+    }
+    for name in ["a\u{202e}b", "a\u{1b}[31m", "a\u{200f}", "\u{3164}"] {
+        let answer = server.post(
+            "/api/v1/teams",
+            &server.admin_token,
+            &json!({ "name": name }),
+        );
+        assert_eq!(answer.status(), 422, "{name:?}");
+    }
+}

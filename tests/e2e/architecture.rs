@@ -1,0 +1,133 @@
+//! The architecture in `ARCHITECTURE.md`: each crate uses only the crates that its table lists, and files have no import
+//! cycles.
+
+mod crate_table;
+mod import_cycles;
+mod imports;
+
+use faceoff_tests::repository;
+use import_cycles::find_cycles;
+use std::{collections::BTreeSet, fs, path::Path};
+
+/// Dependencies that only one crate may use, with that crate and the reason.
+const EXCLUSIVE: [(&str, &str); 4] = [
+    ("rapier3d-f64", "faceoff-sim"), // the contact finder is part of the ruleset
+    ("sqlx", "faceoff-store"),       // SQL lives in one crate
+    ("seccompiler", "faceoff-sandbox"), // the confinement of agents lives in one crate
+    ("libc", "faceoff-sandbox"),
+];
+
+#[test]
+fn crates_use_only_dependencies_of_the_table() {
+    let members = crate_table::members();
+    let allowed = crate_table::allowed();
+    let known: BTreeSet<&str> = members.iter().map(|member| member.name.as_str()).collect();
+    let listed: BTreeSet<&str> = allowed.keys().map(String::as_str).collect();
+    assert_eq!(
+        listed, known,
+        "the table of ARCHITECTURE.md names each crate once"
+    );
+    let mut wrong = Vec::new();
+    for member in &members {
+        for dependency in &member.dependencies {
+            let is_member = known.contains(dependency.as_str());
+            if is_member && !allowed[&member.name].permits(dependency) {
+                wrong.push(format!("{} uses {dependency}", member.name));
+            }
+            if let Some((_, owner)) = EXCLUSIVE.iter().find(|(name, _)| name == dependency)
+                && *owner != member.name
+            {
+                wrong.push(format!(
+                    "{} uses {dependency}, which only {owner} may use",
+                    member.name
+                ));
+            }
+        }
+    }
+    assert!(
+        wrong.is_empty(),
+        "not allowed by the table of ARCHITECTURE.md: {wrong:#?}"
+    );
+}
+
+#[test]
+fn source_files_have_no_import_cycles() {
+    let mut found = Vec::new();
+    for member in crate_table::members() {
+        found.extend(find_cycles(&member.folder.join("src")));
+    }
+    assert!(
+        found.is_empty(),
+        "import cycles: move the shared items to a separate file\n{}",
+        found.join("\n")
+    );
+}
+
+/// Writes a crate and returns its import cycles.
+fn cycles_of(files: &[(&str, &str)]) -> Vec<String> {
+    let scratch = tempfile::tempdir().expect("a scratch folder can be made");
+    for (name, text) in files {
+        let path = scratch.path().join(name);
+        fs::create_dir_all(path.parent().unwrap_or(Path::new(""))).expect("a scratch folder");
+        fs::write(path, text).expect("a scratch file");
+    }
+    find_cycles(scratch.path())
+}
+
+#[test]
+fn import_cycle_is_found() {
+    let root = ("lib.rs", "mod a; mod b; mod c; pub use a::A; pub use b::B;");
+    let direct = cycles_of(&[
+        root,
+        ("a.rs", "use crate::b::B; pub struct A(B);"),
+        ("b.rs", "use super::a::A; pub struct B(Option<Box<A>>);"),
+        ("c.rs", "use crate::A; pub fn c(_: A) {}"),
+    ]);
+    assert_eq!(direct.len(), 1, "{direct:?}");
+    assert!(
+        direct[0].contains("a.rs") && direct[0].contains("b.rs"),
+        "{direct:?}"
+    );
+    assert!(!direct[0].contains("c.rs"), "{direct:?}");
+
+    let through_root = cycles_of(&[
+        root,
+        ("a.rs", "pub struct A(crate::B);"),
+        (
+            "b.rs",
+            "use crate::a; pub struct B; pub fn b() -> a::A { a::A(B) }",
+        ),
+        ("c.rs", ""),
+    ]);
+    assert_eq!(through_root.len(), 1, "{through_root:?}");
+
+    let parent_and_child = cycles_of(&[
+        ("lib.rs", "mod parent;"),
+        (
+            "parent.rs",
+            "mod child; pub struct Shared; pub fn run() { child::work(Shared) }",
+        ),
+        (
+            "parent/child.rs",
+            "use super::Shared; pub fn work(_: Shared) {}",
+        ),
+    ]);
+    assert_eq!(parent_and_child.len(), 1, "{parent_and_child:?}");
+}
+
+#[test]
+fn re_exports_and_tests_are_no_import_cycle() {
+    let none = cycles_of(&[
+        ("main.rs", "mod parent; fn main() { parent::run(); }"),
+        // a parent that only re-exports items of its children
+        ("parent/mod.rs", "mod one; mod two; pub use one::run; pub(crate) use two::Two;"),
+        ("parent/one.rs", "use super::Two; pub fn run() { let _ = Two::new(); }"),
+        (
+            "parent/two.rs",
+            "pub struct Two; impl Two { pub fn new() -> Self { Self } }
+             #[cfg(test)] mod tests { use super::*; use crate::parent::run; #[test] fn t() { run() } }",
+        ),
+    ]);
+    assert!(none.is_empty(), "{none:?}");
+    assert!(repository().join("crates").is_dir());
+}

@@ -1,0 +1,130 @@
+//! Both dashboards in a real browser: accepting an invitation, uploading by drag and drop, starting a day by a button.
+
+use crate::{CONFIG, Team};
+use base64::{Engine, engine::general_purpose::STANDARD};
+use faceoff_tests::{
+    browser::{Browser, Page},
+    bundle, repository,
+    server::Server,
+};
+use serde_json::{Value, json};
+
+/// A user who is invited.
+pub struct InvitedUser<'a> {
+    name: &'a str,
+    invitation: Value,
+}
+
+impl<'a> InvitedUser<'a> {
+    pub fn organiser(name: &'a str) -> Self {
+        Self {
+            name,
+            invitation: json!({ "role": "organiser", "note": name }),
+        }
+    }
+
+    pub fn member(name: &'a str, team: &str) -> Self {
+        Self {
+            name,
+            invitation: json!({ "role": "member", "note": name, "team": team }),
+        }
+    }
+}
+
+/// A page of a user who has accepted an invitation.
+pub fn sign_in<'a>(browser: &'a Browser, server: &Server, user: InvitedUser<'_>) -> Page<'a> {
+    let invited = server.post(
+        "/api/v1/invitations",
+        &server.admin_token,
+        &user.invitation,
+    );
+    let invited: Value = invited.json().expect("the API speaks JSON");
+    let code = invited["code"].as_str().expect("an invitation has a code");
+    let page = browser.open(&format!("{}/join/{code}", server.url));
+    let fields = [("name", user.name), ("password", "correct horse battery")];
+    page.send_form("main form", &fields);
+    assert!(
+        !page.html().contains("Become an organiser") && !page.html().contains("Join the team"),
+        "{}",
+        page.text("main")
+    );
+    page
+}
+
+/// Drops a file onto the upload form.
+fn drop_file(page: &Page, name: &str, bytes: &[u8]) {
+    let _ = page.evaluate(&format!(
+        "(() => {{
+            const bytes = Uint8Array.from(atob({}), letter => letter.charCodeAt(0));
+            const dataTransfer = new DataTransfer();
+            dataTransfer.items.add(new File([bytes], {}));
+            const form = document.querySelector('form[data-upload]');
+            form.dispatchEvent(new DragEvent('drop', {{ dataTransfer, cancelable: true }}));
+        }})()",
+        json!(STANDARD.encode(bytes)),
+        json!(name)
+    ));
+}
+
+#[test]
+fn dashboards_suffice_to_join_upload_and_start_a_day() {
+    let scratch = tempfile::tempdir().expect("a scratch folder can be made");
+    let server = Server::start(&scratch.path().join("data"), CONFIG);
+    let _alpha = Team::create(&server, "Alpha");
+    let teams: Value = server
+        .get("/api/v1/teams", Some(&server.admin_token))
+        .json()
+        .expect("the API speaks JSON");
+    let teams = teams.as_array().or_else(|| teams["teams"].as_array());
+    let team = &teams.expect("a list of teams")[0]["id"];
+    let browser = Browser::start(scratch.path());
+
+    let ada = sign_in(
+        &browser,
+        &server,
+        InvitedUser::member("Ada", team.as_str().expect("an id is text")),
+    );
+    ada.go_to(&format!("{}/desk", server.url));
+    // A file that is no bundle is refused on the page, which is not reloaded.
+    drop_file(&ada, "agent.zip", b"no archive at all");
+    ada.wait_for(".refused");
+    assert!(
+        ada.text(".refused").contains("archive"),
+        "{}",
+        ada.text(".refused")
+    );
+    assert_eq!(ada.text("form[data-upload] [role=status]"), "Upload failed.");
+    let hold = bundle::pack(&repository().join("agents/hold"));
+    drop_file(&ada, "hold.tar.gz", &hold);
+    ada.wait_for(".done");
+    assert!(
+        ada.text(".done").contains("Uploaded"),
+        "{}",
+        ada.text(".done")
+    );
+    // The verdict appears without a reload.
+    ada.wait_until(
+        "document.querySelector('#submissions').parentElement.textContent.includes('active at the next cutoff')",
+    );
+    ada.wait_until("document.querySelector('.state.good') !== null");
+
+    let grace = sign_in(&browser, &server, InvitedUser::organiser("Grace"));
+    grace.go_to(&format!("{}/organiser/day", server.url));
+    grace.navigate_by("document.querySelector('a[href^=\"/organiser/decide/start-day\"]').click()");
+    assert!(grace.text("h1").starts_with("Start the evaluation day"));
+    grace.send_form("main form", &[]);
+    assert_eq!(grace.text(".done"), "The evaluation day has started.");
+    // The page follows the day until it is finished.
+    grace.wait_until("document.body.textContent.includes('finished')");
+
+    ada.go_to(&format!("{}/desk", server.url));
+    ada.wait_until("[...document.querySelectorAll('a')].some(link => link.pathname.startsWith('/evaluations/'))");
+    for page in [&ada, &grace] {
+        let errors = page.console_errors();
+        // The browser logs the refused upload as an error, too.
+        let unexpected = errors
+            .iter()
+            .filter(|error| !error.contains("/desk/upload"));
+        assert_eq!(unexpected.count(), 0, "{errors:?}");
+    }
+}

@@ -1,0 +1,223 @@
+//! Actions that could break the simulation: each is an agent fault or is simulated, never a platform fault that would
+//! give the agent another try.
+
+use crate::{CONFIG, Team};
+use faceoff_tests::{
+    bundle::{pack, python_agent, python_bundle},
+    program,
+    server::Server,
+};
+use std::{fs, path::Path, process::Command};
+
+/// Interpolation orders with the shape of their actions; Python's None is JSON's null.
+const SHAPES: [(&str, &str); 7] = [
+    ("1", "[N] * 7"),
+    ("2", "[N] * 7"),
+    ("3", "[[N] * 7] * 2"),
+    ("4", "[[N] * 7] * 2"),
+    ("5", "[[N] * 7] * 3"),
+    ("-1", "[[N] * 7] * 2"),
+    ("None", "[[[N] * 7] * 3] * 20"),
+];
+
+/// Refused lines: name, text, and a word of the verdict. `STEP` is the step, `ROW` seven numbers, `DIGITS` 5000 digits.
+const LINES: [(&str, &str, &str); 10] = [
+    (
+        "out of range",
+        r#"{"type":"act","step":STEP,"action":[ROW,[0,0,0,1e999,0,0,0]]}"#,
+        "not finite",
+    ),
+    (
+        "minus out of range",
+        r#"{"type":"act","step":STEP,"action":[ROW,[0,0,0,0,0,0,-1e309]]}"#,
+        "not finite",
+    ),
+    (
+        "thousands of digits",
+        r#"{"type":"act","step":STEP,"action":[ROW,[DIGITS,0,0,0,0,0,0]]}"#,
+        "not finite",
+    ),
+    (
+        "huge integer",
+        r#"{"type":"act","step":STEP,"action":[ROW,[123456789012345678901234567890,0,0,0,0,0,0]]}"#,
+        "action[1][0]",
+    ),
+    (
+        "just too large",
+        r#"{"type":"act","step":STEP,"action":[ROW,[0,0,10000.001,0,0,0,0]]}"#,
+        "action[1][2]",
+    ),
+    (
+        "one too large",
+        r#"{"type":"act","step":STEP,"action":[[-1e5,0,0,0,0,0,0],ROW]}"#,
+        "action[0][0]",
+    ),
+    (
+        "key twice",
+        r#"{"type":"act","step":STEP,"step":STEP,"action":[ROW,ROW]}"#,
+        "twice",
+    ),
+    (
+        "unknown key twice",
+        r#"{"type":"act","step":STEP,"x":1,"x":2,"action":[ROW,ROW]}"#,
+        "twice",
+    ),
+    (
+        "nested key twice",
+        r#"{"type":"act","step":STEP,"x":[{"y":{"a":1,"b":2,"a":3}}],"action":[ROW,ROW]}"#,
+        "twice",
+    ),
+    (
+        "escaped key twice",
+        r#"{"type":"act","step":STEP,"x":{"a":1,"\u0061":2},"action":[ROW,ROW]}"#,
+        "twice",
+    ),
+];
+
+/// An agent with this interpolation.
+fn agent(interpolation: &str, on_step: &str) -> String {
+    let greeting = format!("\"interpolation\": {interpolation}}}");
+    python_agent(on_step).replace("\"interpolation\": 3}", &greeting)
+}
+
+/// Asserts that validation finds each agent invalid, with this word in the reason.
+fn assert_invalid(agents: &[(String, String, &str)]) {
+    let scratch = tempfile::tempdir().expect("a scratch folder can be made");
+    let server = Server::start(&scratch.path().join("data"), CONFIG);
+    let uploads: Vec<_> = agents
+        .iter()
+        .enumerate()
+        .map(|(number, (name, source, word))| {
+            let folder = python_bundle(scratch.path(), &format!("agent-{number}"), source);
+            let team = Team::create(&server, &format!("Team {number}"));
+            let id = team.upload(&server, pack(&folder));
+            (name, word, team, id)
+        })
+        .collect();
+    for (name, word, team, id) in uploads {
+        let verdict = team.verdict(&server, &id);
+        assert_eq!(verdict["state"], "invalid", "{name}: {verdict:#}");
+        let reason = verdict["reason"].as_str().expect("a verdict has a reason");
+        assert!(reason.contains(word), "{name}: {word:?} is not in {reason}");
+    }
+}
+
+#[test]
+fn largest_numbers_are_refused_in_all_interpolations() {
+    let agents: Vec<_> = SHAPES
+        .into_iter()
+        .flat_map(|(interpolation, shape)| {
+            ["1.7e308", "-1.7e308"].map(|number| {
+                let action = shape.replace('N', number);
+                let on_step =
+                    format!("say({{'type': 'act', 'step': message['step'], 'action': {action}}})");
+                let name = format!("{number} in interpolation {interpolation}");
+                (
+                    name,
+                    agent(interpolation, &on_step),
+                    "numbers between -10000 and 10000",
+                )
+            })
+        })
+        .collect();
+    assert_invalid(&agents);
+}
+
+#[test]
+fn duplicate_keys_and_non_finite_numbers_are_refused() {
+    let agents: Vec<_> = LINES
+        .into_iter()
+        .map(|(name, line, word)| {
+            let on_step = format!(
+                "line = {line:?}.replace('STEP', str(message['step']))\n\
+                 line = line.replace('ROW', json.dumps(held)).replace('DIGITS', '9' * 5000)\n\
+                 sys.stdout.write(line + '\\n'); sys.stdout.flush()"
+            );
+            (name.to_owned(), python_agent(&on_step), word)
+        })
+        .collect();
+    assert_invalid(&agents);
+}
+
+/// Extreme actions within the bounds: name, interpolation, and action from the second episode of `prepare` on.
+const EXTREME_ACTIONS: [(&str, &str, &str); 7] = [
+    (
+        "along-its-velocity",
+        "None",
+        "[[[1e4 if v > 0 else -1e4 for v in message['obs'][13:20]]] * 3] * 20",
+    ),
+    (
+        "all-drives-at-their-limit",
+        "None",
+        "[[[0.0] * 7, [0.0] * 7, [1e4] * 7]] * 20",
+    ),
+    (
+        "swinging",
+        "None",
+        "[[[s] * 7, [s] * 7, [s] * 7] for _ in range(20)]",
+    ),
+    ("accelerations-only", "5", "[held, [0.0] * 7, [s] * 7]"),
+    ("velocities-only", "3", "[held, [s] * 7]"),
+    ("positions-only", "1", "[s] * 7"),
+    ("denormal", "4", "[[5e-324] * 7, [-0.0] * 7]"),
+];
+
+/// Downloads a dataset and verifies it with `faceoff verify`.
+fn verify(server: &Server, evaluation: &str, token: &str, folder: &Path) {
+    let answer = server.get(&format!("{evaluation}/dataset"), Some(token));
+    assert_eq!(answer.status(), 200, "the dataset of {evaluation}");
+    let file = folder.join("dataset.zip");
+    fs::write(&file, answer.bytes().expect("the download completes")).expect("a scratch file");
+    let verified = Command::new(program("faceoff"))
+        .arg("verify")
+        .arg(&file)
+        .output()
+        .expect("the program starts");
+    let errors = String::from_utf8_lossy(&verified.stderr);
+    assert!(verified.status.success(), "{evaluation}: {errors}");
+}
+
+#[test]
+fn extreme_valid_actions_are_simulated_and_verified() {
+    for (name, interpolation, action) in EXTREME_ACTIONS {
+        let scratch = tempfile::tempdir().expect("a scratch folder can be made");
+        let server = Server::start(&scratch.path().join("data"), CONFIG);
+        let team = Team::create(&server, "Alpha");
+        // The agent holds still during the validation run.
+        let held = match interpolation {
+            "None" => "[[held, [0.0] * 7, [0.0] * 7]] * 20",
+            "5" => "[held, [0.0] * 7, [0.0] * 7]",
+            "1" => "held",
+            _ => "[held, [0.0] * 7]",
+        };
+        let on_step = format!(
+            "s = 1e4 if message['step'] % 2 else -1e4\n\
+             hold['action'] = {action} if task == 'prepare' and resets > 1 else {held}\n\
+             say(hold)"
+        );
+        let source = agent(interpolation, &on_step)
+            .replace(
+                "    if kind == \"hello\":\n",
+                "    if kind == \"hello\":\n        task, resets = message[\"task\"], 0\n",
+            )
+            .replace(
+                "    elif kind == \"reset\":\n",
+                "    elif kind == \"reset\":\n        resets += 1\n",
+            );
+        let folder = python_bundle(scratch.path(), name, &source);
+        let submission = team.submit(&server, &folder);
+        assert_eq!(submission["state"], "valid", "{name}: {submission:#}");
+        let evaluation = team.evaluate(&server, &submission);
+        let done = team.wait_until_finished(&server, &evaluation);
+        assert_eq!(done["state"], "finished", "{name}: {done:#}");
+        let timing = &done["result"]["timing"];
+        assert!(timing.is_object(), "{name}: {done:#}");
+        assert_eq!(
+            timing["platform_retries"],
+            serde_json::Value::Null,
+            "{name}"
+        );
+        assert_eq!(done["result"]["tasks"]["prepare"]["episodes"], 4, "{name}");
+        verify(&server, &evaluation, &team.token, scratch.path());
+    }
+}

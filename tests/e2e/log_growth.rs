@@ -1,0 +1,137 @@
+//! The database's write-ahead log stays bounded, whatever clients read.
+
+use faceoff_tests::server::{TIMEOUT, Server};
+use serde_json::json;
+use std::{
+    fs,
+    io::{BufRead as _, BufReader},
+    path::Path,
+    process::{Command, Stdio},
+    sync::atomic::{AtomicBool, Ordering},
+    thread,
+    time::{Duration, Instant},
+};
+
+/// The server's limit for the log, plus what may be written while it truncates the log.
+pub(crate) const LOG_LIMIT_BYTES: u64 = (16 + 4) << 20;
+
+/// Number of writes that exceed the limit more than twice: each takes about 20 KB of log.
+const TEAMS: u32 = 2000;
+
+const CONFIG: &str = concat!(
+    include_str!("../patient.toml"),
+    "[workers]\nslots = 1\n[season]\nname = \"Growth\"\n"
+);
+
+fn log_bytes(data_dir: &Path) -> u64 {
+    fs::metadata(data_dir.join("faceoff.sqlite3-wal")).map_or(0, |file| file.len())
+}
+
+/// One write: a team and its event.
+fn create_team(server: &Server, number: u32) {
+    let new = json!({ "name": format!("Team {number}") });
+    loop {
+        let answer = server.post("/api/v1/teams", &server.admin_token, &new);
+        // On a busy machine the server may time out with 503; a client tries again.
+        match answer.status().as_u16() {
+            503 => thread::sleep(Duration::from_millis(200)),
+            status => {
+                let text = answer.text().unwrap_or_default();
+                return assert_eq!(status, 201, "{text}");
+            }
+        }
+    }
+}
+
+/// Stops the readers, even if the test fails.
+struct StopGuard<'a>(&'a AtomicBool);
+
+impl Drop for StopGuard<'_> {
+    fn drop(&mut self) {
+        self.0.store(true, Ordering::Relaxed);
+    }
+}
+
+#[test]
+fn log_stays_bounded_under_continuous_reads() {
+    let scratch = tempfile::tempdir().expect("a scratch folder can be made");
+    let data_dir = scratch.path().join("data");
+    let server = Server::start(&data_dir, CONFIG);
+    let stop = AtomicBool::new(false);
+    let longest = thread::scope(|scope| {
+        let _guard = StopGuard(&stop);
+        for path in ["/", "/season", "/api/v1/evaluations", "/api/v1/board"] {
+            let (server, stop) = (&server, &stop);
+            scope.spawn(move || {
+                while !stop.load(Ordering::Relaxed) {
+                    let answer = server.get(path, Some(&server.admin_token));
+                    assert_eq!(answer.status(), 200, "{path}");
+                }
+            });
+        }
+        let after_each = (0..TEAMS).map(|number| {
+            create_team(&server, number);
+            log_bytes(&data_dir)
+        });
+        after_each.max()
+    });
+    let longest = longest.expect("there are teams");
+    assert!(longest < LOG_LIMIT_BYTES, "{longest} bytes");
+}
+
+/// Reads the database in one long transaction, until its standard input ends.
+const LONG_READER: &str = r#"import sqlite3, sys
+database = sqlite3.connect(f"file:{sys.argv[1]}?mode=ro", uri=True, isolation_level=None)
+database.execute("BEGIN")
+database.execute("SELECT COUNT(*) FROM events").fetchall()
+print("reading", flush=True)
+sys.stdin.read()
+"#;
+
+#[test]
+fn long_read_delays_no_write_and_log_shrinks_afterwards() {
+    let scratch = tempfile::tempdir().expect("a scratch folder can be made");
+    let data_dir = scratch.path().join("data");
+    let server = Server::start(&data_dir, CONFIG);
+    create_team(&server, u32::MAX);
+    let mut reader = Command::new("python3")
+        .args(["-c", LONG_READER])
+        .arg(data_dir.join("faceoff.sqlite3"))
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .spawn()
+        .expect("Python is installed, as agents need it");
+    let mut line = String::new();
+    let stdout = reader.stdout.take().expect("it is piped");
+    BufReader::new(stdout)
+        .read_line(&mut line)
+        .expect("a pipe can be read");
+    assert_eq!(line.trim(), "reading");
+
+    let mut number = 0;
+    while log_bytes(&data_dir) <= LOG_LIMIT_BYTES {
+        create_team(&server, number);
+        number += 1;
+        assert!(number < 20 * TEAMS, "the reader holds the log");
+    }
+    assert_eq!(
+        server.log().matches("log cannot be emptied").count(),
+        1,
+        "logged once: {}",
+        server.log()
+    );
+    drop(reader.stdin.take());
+    assert!(reader.wait().expect("a child can be reaped").success());
+
+    let started = Instant::now();
+    while log_bytes(&data_dir) > LOG_LIMIT_BYTES {
+        assert!(
+            started.elapsed() < TIMEOUT,
+            "{} bytes",
+            log_bytes(&data_dir)
+        );
+        create_team(&server, number);
+        number += 1;
+    }
+    server.wait_for_log("log is emptied", 1);
+}

@@ -1,0 +1,75 @@
+//! The reference result for an evaluation under disturbances: the local evaluator repeats it.
+
+use crate::{Team, without_times};
+use faceoff_tests::{program, repository, server::Server};
+use serde_json::Value;
+use std::{fs, io::Cursor, path::Path, process::Command};
+
+/// A short evaluation of one task.
+pub const CONFIG: &str = concat!(
+    include_str!("../patient.toml"),
+    r#"
+[evaluation]
+tasks = ["hit"]
+episodes_per_task = 6
+episodes_per_shard = 2
+[workers]
+slots = 1
+"#
+);
+
+/// Asserts that the evaluation of `bundle`, with [`CONFIG`], finishes at the first try and with the result of a local
+/// evaluation. Writes to the folder `scratch`.
+pub fn assert_undisturbed(
+    server: &Server,
+    team: &Team,
+    evaluation: &str,
+    bundle: &Path,
+    scratch: &Path,
+) {
+    let done = team.wait_until_finished(server, evaluation);
+    assert_eq!(done["state"], "finished", "{done:#}");
+    assert!(done["rerun_of"].is_null(), "{done:#}");
+    let answer = server.get(&format!("{evaluation}/dataset"), Some(&team.token));
+    assert_eq!(answer.status(), 200);
+    let bytes = answer.bytes().expect("the download completes");
+    let mut archive = zip::ZipArchive::new(Cursor::new(bytes)).expect("a dataset is a zip");
+    let manifest = archive.by_name("manifest.json");
+    let manifest: Value = serde_json::from_reader(manifest.expect("a dataset has a manifest"))
+        .expect("a manifest is JSON");
+    let seed = |name: &str| {
+        manifest[name]
+            .as_str()
+            .expect("the manifest names its seeds")
+    };
+    let out = scratch.join("undisturbed");
+    let local = Command::new(program("faceoff"))
+        .arg("eval")
+        .arg(bundle)
+        .args([
+            "--task",
+            "hit",
+            "--episodes",
+            "6",
+            "--profile",
+            "evaluation",
+        ])
+        .args(["--seed", seed("seed")])
+        .args(["--mismatch-seed", seed("mismatch_seed")])
+        .args(["--workers", "1"])
+        .arg("--config")
+        .arg(repository().join("tests/patient.toml"))
+        .arg("--out")
+        .arg(&out)
+        .output()
+        .expect("the program can be started");
+    let errors = String::from_utf8_lossy(&local.stderr);
+    assert!(local.status.success(), "{errors}");
+    let local = fs::read(out.join("results.json")).expect("the evaluator writes its result");
+    let local: Value = serde_json::from_slice(&local).expect("a result is JSON");
+    // Visible since the download released the day.
+    let done = team.wait_until_finished(server, evaluation);
+    let retries = &done["result"]["timing"]["platform_retries"];
+    assert!(retries.is_null() || *retries == 0, "{done:#}");
+    assert_eq!(without_times(&done["result"]), without_times(&local));
+}

@@ -1,0 +1,150 @@
+//! Remote workers with a real NATS server: equal results, network faults, kills, and workers that send false results.
+
+mod ablation;
+mod bucket;
+mod equal_results;
+mod false_results;
+mod incompatible_workers;
+mod interruptions;
+mod kills;
+mod nats_permissions;
+mod nats_problems;
+mod shutdown;
+
+use crate::{
+    Team,
+    kills::{Archive, assert_same, copy_folder, outcome},
+    evaluation_path, start_day,
+};
+use faceoff_tests::{bundle, nats::Nats, relay::Relay, server::Server};
+use serde_json::{Value, json};
+use std::{
+    net::SocketAddr,
+    path::{Path, PathBuf},
+};
+
+/// Episodes of each task; each is a shard.
+const EPISODES: u32 = 4;
+/// Episodes of each task in tests that need many shards: see [`many_shards`].
+const MANY_EPISODES: u32 = 10;
+
+const COMMON: &str = concat!(
+    include_str!("../patient.toml"),
+    r#"
+[evaluation]
+episodes_per_task = 4
+episodes_per_shard = 1
+[sandbox]
+resident_bytes = 0
+"#
+);
+
+/// Configuration of a server that runs all jobs in its own slot.
+fn local_config() -> String {
+    format!("{COMMON}[workers]\nslots = 1\n")
+}
+
+/// The configuration with this number of episodes per task and per shard.
+fn with_episodes(config: &str, per_task: u32, per_shard: u32) -> String {
+    let default = format!("episodes_per_task = {EPISODES}\nepisodes_per_shard = 1\n");
+    assert!(config.contains(&default), "{config}");
+    let changed = format!("episodes_per_task = {per_task}\nepisodes_per_shard = {per_shard}\n");
+    config.replace(&default, &changed)
+}
+
+/// The configuration with [`MANY_EPISODES`] of each task.
+fn many_shards(config: &str) -> String {
+    with_episodes(config, MANY_EPISODES, 1)
+}
+
+/// Configuration of a server that runs no jobs itself; remote workers transfer files at `files`.
+fn server_config(nats: &Nats, files: SocketAddr) -> String {
+    format!(
+        "{COMMON}[workers]\nslots = 1\nplay = false\nlease_s = 10\n[nats]\nurl = \"{}\"\nfiles_url = \"http://{files}\"\n",
+        nats.url()
+    )
+}
+
+/// Configuration of a worker that connects to NATS at this address.
+fn worker_config(nats: SocketAddr, slots: usize) -> String {
+    format!("{COMMON}[workers]\nslots = {slots}\n[nats]\nurl = \"nats://{nats}\"\n")
+}
+
+/// Creates a data folder with a queued evaluation of striker that has not started; returns its path and the team.
+fn queue_evaluation(data: &Path, scratch: &Path, config: &str) -> (String, Team) {
+    let server = Server::start(data, config);
+    let team = Team::create(&server, "Phoenix");
+    let submission = team.submit(&server, &bundle::reference("striker", scratch));
+    assert_eq!(submission["state"], "valid", "{submission:#}");
+    let pause = json!({ "reason": "Until the workers are connected" });
+    let paused = server.post("/api/v1/queue/pause", &server.admin_token, &pause);
+    assert!(paused.status().is_success(), "{}", paused.status());
+    let path = evaluation_path(&start_day(&server), &submission);
+    (path, team)
+}
+
+fn resume(server: &Server) {
+    let resumed = server.post("/api/v1/queue/resume", &server.admin_token, &json!({}));
+    assert!(resumed.status().is_success(), "{}", resumed.status());
+}
+
+/// An evaluation for remote workers, and its result from a local slot.
+struct ReferenceRun {
+    /// The data folder of a server on which the evaluation is queued.
+    data: PathBuf,
+    evaluation: String,
+    team: Team,
+    expected: (Value, Archive),
+    episodes: usize,
+}
+
+impl ReferenceRun {
+    fn prepare(scratch: &Path) -> Self {
+        Self::prepare_with(scratch, &local_config(), 3 * EPISODES as usize)
+    }
+
+    fn prepare_many_shards(scratch: &Path) -> Self {
+        Self::prepare_with(scratch, &many_shards(&local_config()), 3 * MANY_EPISODES as usize)
+    }
+
+    fn prepare_with(scratch: &Path, config: &str, episodes: usize) -> Self {
+        let [data, local_data] = ["data", "local"].map(|name| scratch.join(name));
+        let (evaluation, team) = queue_evaluation(&data, scratch, config);
+        copy_folder(&data, &local_data);
+        let local_server = Server::start(&local_data, config);
+        resume(&local_server);
+        let expected = outcome(&local_server, &team, &evaluation);
+        local_server.kill();
+        Self {
+            data,
+            evaluation,
+            team,
+            expected,
+            episodes,
+        }
+    }
+
+    /// Waits for the end of the evaluation, and asserts that result and dataset equal the reference.
+    fn assert_equal_result(&self, server: &Server) {
+        let found = outcome(server, &self.team, &self.evaluation);
+        let evaluation = server.poll(&self.evaluation, &self.team.token, |_| true);
+        let submission = evaluation["submission"].as_str().expect("an evaluation names its submission");
+        let submission = self.team.submission(server, submission);
+        assert_eq!(submission["state"], "valid", "{submission:#}");
+        assert_eq!(assert_same(found, self.expected.clone()), self.episodes);
+    }
+}
+
+/// Starts a server on the data of a reference run, with `files` connected to it.
+fn start_server(reference_run: &ReferenceRun, config: &str, files: &Relay) -> Server {
+    let server = Server::start(&reference_run.data, config);
+    files.set_target(server.address().into());
+    server
+}
+
+/// Waits until the server lists this number of workers.
+fn wait_for_workers(server: &Server, workers: usize) {
+    let _ = server.poll("/api/v1/workers", &server.admin_token, |view| {
+        view["workers"].as_array().map_or(0, Vec::len) == workers
+    });
+}

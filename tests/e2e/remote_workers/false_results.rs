@@ -1,0 +1,469 @@
+//! False results from a remote worker: it takes jobs like any other worker and reports results that it never computed.
+
+use super::{ReferenceRun, EPISODES, local_config, server_config, queue_evaluation, resume, start_server, worker_config};
+use crate::{Team, commands::admin};
+use async_nats::{
+    Client, HeaderMap,
+    jetstream::{self, consumer::PullConsumer},
+};
+use faceoff_tests::{
+    nats::Nats,
+    relay::Relay,
+    repository,
+    server::{Server, http},
+    worker::Worker,
+};
+use futures::StreamExt as _;
+use serde_json::{Value, json};
+use std::{collections::BTreeSet, fs, path::Path, time::Duration};
+use tokio::runtime::Runtime;
+
+/// A client that speaks the workers' protocol and runs no jobs.
+struct FakeWorker {
+    client: Client,
+}
+
+impl FakeWorker {
+    /// Connects with the inbox prefix of a worker named `liar`, to which the server answers.
+    async fn connect(nats: &Nats) -> Self {
+        let options = async_nats::ConnectOptions::new().custom_inbox_prefix("_INBOX.faceoff.liar");
+        let client = options.connect(nats.url()).await;
+        Self {
+            client: client.expect("NATS is there"),
+        }
+    }
+
+    async fn request(&self, request: &Value) -> Value {
+        let payload = serde_json::to_vec(request).expect("it is JSON");
+        let answer = self.client.request("faceoff.asks.liar", payload.into()).await;
+        let answer = answer.expect("the server answers");
+        serde_json::from_slice(&answer.payload).expect("an answer is JSON")
+    }
+
+    /// Takes a job and its lease.
+    async fn take_job(&self) -> Value {
+        let jetstream = jetstream::new(self.client.clone());
+        loop {
+            let consumer: Result<PullConsumer, _> = jetstream
+                .get_consumer_from_stream("workers", "faceoff-orders")
+                .await;
+            let Ok(consumer) = consumer else {
+                // The server has not created it yet.
+                tokio::time::sleep(std::time::Duration::from_millis(100)).await;
+                continue;
+            };
+            let jobs = consumer.batch().max_messages(1).messages().await;
+            let Some(Ok(job)) = jobs.expect("NATS is there").next().await else {
+                continue;
+            };
+            job.ack().await.expect("NATS is there");
+            let job: Value = serde_json::from_slice(&job.payload).expect("a job is JSON");
+            let begin =
+                json!({ "kind": "begin", "lease": job["order"]["lease"], "slot": "slot-0" });
+            if self.request(&begin).await["kind"] == "yes" {
+                return job;
+            }
+        }
+    }
+
+    /// Reports a successful episode that was never run.
+    async fn report_shard(&self, job: &Value) {
+        let assignment = &job["order"]["assignment"];
+        let spec = &assignment["spec"];
+        let outcome = json!({
+            "task": spec["task"], "episode": spec["episodes"]["start"], "steps": 20, "end": "horizon", "success": true,
+            "violations": { "ee": false, "link": false, "joint_pos": false, "joint_vel": false },
+            "computation_time": { "mean_s": 0.001, "max_s": 0.002 }, "fault": null
+        });
+        let report = json!({
+            "kind": "play", "outcomes": [outcome], "log": "", "stopped_by_faults": false,
+            "recording": assignment["keeps"]["recording"],
+        });
+        self.send_report(job, report).await;
+    }
+
+    /// Reports the result of a game that was never run.
+    async fn report_game(&self, job: &Value) {
+        let hash = "0".repeat(64);
+        let report = json!({
+            "kind": "game", "score": { "winner": "first" }, "logs": ["", ""],
+            "recording": {
+                "key": job["order"]["assignment"]["recording"], "game_blake3": hash, "side_blake3": [hash, hash],
+            },
+        });
+        self.send_report(job, report).await;
+    }
+
+    /// Sends a worker's result message again: as that worker, as another worker, with a changed result, and with a forged lease.
+    async fn repeat_result(&self, result: &Value, when: &str) {
+        let mut stolen = result.clone();
+        let success = &mut stolen["outcome"]["report"]["outcomes"][0]["success"];
+        *success = json!(!success.as_bool().unwrap_or_default());
+        let mut forged = result.clone();
+        forged["lease"]["nonce"] = json!("00000000-0000-4000-8000-000000000000");
+        let nonce = result["lease"]["nonce"].as_str().expect("a lease has a nonce");
+        for (subject, message, variant) in [
+            ("faceoff.outcomes.honest", result, "again"),
+            ("faceoff.outcomes.thief", result, "as a thief"),
+            ("faceoff.outcomes.thief", &stolen, "changed"),
+            ("faceoff.outcomes.honest", &forged, "forged"),
+        ] {
+            // NATS would not store two messages with the same id.
+            self.publish(subject, &format!("{nonce} {variant} {when}"), message)
+                .await;
+        }
+    }
+
+    async fn send_report(&self, job: &Value, report: Value) {
+        let lease = &job["order"]["lease"];
+        let message = json!({
+            "lease": lease, "grant": job["grant"], "outcome": { "kind": "done", "report": report },
+        });
+        let id = [&lease["unit"], &lease["nonce"]].map(|id| id.as_str().expect("an id is a text"));
+        self.publish("faceoff.outcomes.liar", &id.join("/"), &message)
+            .await;
+    }
+
+    async fn publish(&self, subject: &'static str, id: &str, message: &Value) {
+        let mut headers = HeaderMap::new();
+        headers.insert("Nats-Msg-Id", id);
+        let payload = serde_json::to_vec(message).expect("it is JSON");
+        let sent = jetstream::new(self.client.clone())
+            .publish_with_headers(subject, headers, payload.into())
+            .await;
+        sent.expect("NATS is there")
+            .await
+            .expect("NATS stores results");
+    }
+}
+
+/// A real worker's first result, in a season with another secret and so with other episodes.
+struct OtherSeasonResult {
+    message: Value,
+    files: Vec<(String, Vec<u8>)>,
+}
+
+impl OtherSeasonResult {
+    fn compute(folder: &Path) -> Self {
+        fs::create_dir_all(folder).expect("a scratch folder can be made");
+        let data = folder.join("data");
+        let _ = queue_evaluation(&data, folder, &local_config());
+        let nats = Nats::start(&folder.join("nats"));
+        let files = Relay::start();
+        let server = Server::start(&data, &server_config(&nats, files.address()));
+        files.set_target(server.address().into());
+        let runtime = Runtime::new().expect("a runtime starts");
+        let mut messages = runtime.block_on(async {
+            let client = async_nats::connect(nats.url()).await;
+            let messages = client
+                .expect("NATS is there")
+                .subscribe("faceoff.outcomes.>")
+                .await;
+            messages.expect("the test may subscribe")
+        });
+        let _worker = Worker::start(folder, "honest", &worker_config(nats.address(), 1));
+        resume(&server);
+        let message = loop {
+            let message = runtime.block_on(messages.next()).expect("NATS is there");
+            let message: Value = serde_json::from_slice(&message.payload).expect("it is JSON");
+            if message["outcome"]["kind"] == "done" {
+                break message;
+            }
+        };
+        // Files are stored before the result is sent, and stay until all shards are complete.
+        server.kill();
+        let key = message["outcome"]["report"]["recording"].as_str();
+        let stored = data
+            .join("artifacts")
+            .join(key.expect("a shard is recorded"));
+        let files = fs::read_dir(stored).expect("the recording is there");
+        let files = files.map(|file| {
+            let file = file.expect("a folder can be read");
+            let name = file.file_name().into_string().expect("names are text");
+            (name, fs::read(file.path()).expect("a file can be read"))
+        });
+        Self {
+            message,
+            files: files.collect(),
+        }
+    }
+
+    /// Whether a job is for the same episodes of the same task.
+    fn fits(&self, job: &Value) -> bool {
+        let spec = &job["order"]["assignment"]["spec"];
+        let played = &self.message["outcome"]["report"]["outcomes"][0];
+        played["task"] == spec["task"] && played["episode"] == spec["episodes"]["start"]
+    }
+
+    /// Report and recording, adapted to this job.
+    fn adapted_to(&self, job: &Value) -> (Value, Vec<(String, Vec<u8>)>) {
+        let assignment = &job["order"]["assignment"];
+        let mut report = self.message["outcome"]["report"].clone();
+        report["recording"] = assignment["keeps"]["recording"].clone();
+        let files = self.files.iter().map(|(name, bytes)| {
+            if name != "shard.json" {
+                return (name.clone(), bytes.clone());
+            }
+            let mut shard: Value = serde_json::from_slice(bytes).expect("it is JSON");
+            shard["spec"] = assignment["spec"].clone();
+            (name.clone(), shard.to_string().into_bytes())
+        });
+        (report, files.collect())
+    }
+}
+
+/// Uploads a file of a job as its worker does.
+fn upload_file(job: &Value, name: &str, bytes: Vec<u8>) {
+    let text = |field: &str| job[field].as_str().expect("a job has this field").to_owned();
+    let client = http().build().expect("a client needs nothing");
+    let stored = client
+        .put(format!("{}/work/files/{name}", text("files")))
+        .header("authorization", format!("Grant {}", text("grant")))
+        .body(bytes)
+        .send()
+        .expect("the server answers");
+    assert_eq!(stored.status(), 204, "{name}");
+}
+
+#[test]
+fn recording_of_other_episodes_is_rejected_and_worker_banned() {
+    let scratch = tempfile::tempdir().expect("a scratch folder can be made");
+    let reference_run = ReferenceRun::prepare(scratch.path());
+    let other_result = OtherSeasonResult::compute(&scratch.path().join("another"));
+    let nats = Nats::start(&scratch.path().join("nats"));
+    let files = Relay::start();
+    let server = start_server(&reference_run, &server_config(&nats, files.address()), &files);
+    resume(&server);
+    let runtime = Runtime::new().expect("a runtime starts");
+    let fake = runtime.block_on(FakeWorker::connect(&nats));
+    let job = loop {
+        let job = runtime.block_on(fake.take_job());
+        if other_result.fits(&job) {
+            break job;
+        }
+    };
+    let (report, recording) = other_result.adapted_to(&job);
+    for (name, bytes) in recording {
+        upload_file(&job, &name, bytes);
+    }
+    runtime.block_on(fake.send_report(&job, report));
+    server.wait_for_log("a worker is banned", 1);
+    let view = server.get("/api/v1/workers", Some(&server.admin_token));
+    let view: Value = view.json().expect("the API speaks JSON");
+    let reason = view["bans"][0]["reason"].as_str().unwrap_or_default();
+    // The recording is complete and consistent; only the simulation shows the difference.
+    assert!(
+        reason.contains("steps.parquet, ") && reason.contains(", expected "),
+        "{view:#}"
+    );
+    let other = Worker::start(scratch.path(), "other", &worker_config(nats.address(), 1));
+    reference_run.assert_equal_result(&server);
+    other.stop();
+}
+
+#[test]
+fn missing_result_message_requeues_job() {
+    let scratch = tempfile::tempdir().expect("a scratch folder can be made");
+    let reference_run = ReferenceRun::prepare(scratch.path());
+    let nats = Nats::start(&scratch.path().join("nats"));
+    let files = Relay::start();
+    let server = start_server(&reference_run, &server_config(&nats, files.address()), &files);
+    resume(&server);
+    let runtime = Runtime::new().expect("a runtime starts");
+    let fake = runtime.block_on(FakeWorker::connect(&nats));
+    let job = runtime.block_on(fake.take_job());
+    // A false message and a loss in NATS look the same: the server finds no result.
+    let sent = json!({
+        "kind": "handed_in", "lease": job["order"]["lease"], "episodes_done": 1, "sequence": 1_000_000,
+    });
+    assert_eq!(runtime.block_on(fake.request(&sent))["kind"], "yes");
+    server.wait_for_log("NATS has lost a result: the job is queued again", 1);
+    let other = Worker::start(scratch.path(), "other", &worker_config(nats.address(), 1));
+    reference_run.assert_equal_result(&server);
+    other.stop();
+}
+
+#[test]
+fn repeated_late_stolen_and_forged_results_change_nothing() {
+    let scratch = tempfile::tempdir().expect("a scratch folder can be made");
+    let reference_run = ReferenceRun::prepare(scratch.path());
+    let nats = Nats::start(&scratch.path().join("nats"));
+    let files = Relay::start();
+    let server = start_server(&reference_run, &server_config(&nats, files.address()), &files);
+    let runtime = Runtime::new().expect("a runtime starts");
+    let (fake, mut messages) = runtime.block_on(async {
+        let client = async_nats::connect(nats.url()).await;
+        let client = client.expect("NATS is there");
+        let messages = client.subscribe("faceoff.outcomes.honest").await;
+        (
+            FakeWorker {
+                client: client.clone(),
+            },
+            messages.expect("the test may subscribe"),
+        )
+    });
+    let honest = Worker::start(scratch.path(), "honest", &worker_config(nats.address(), 1));
+    resume(&server);
+    let shards = 3 * EPISODES as usize;
+    let mut all = Vec::new();
+    runtime.block_on(async {
+        // The subscription delivers the copies, too.
+        let mut seen = BTreeSet::new();
+        while seen.len() < shards {
+            let message = messages.next().await.expect("NATS is there");
+            let result: Value = serde_json::from_slice(&message.payload).expect("it is JSON");
+            if result["outcome"]["kind"] != "done" || !seen.insert(result["lease"]["nonce"].to_string())
+            {
+                continue;
+            }
+            fake.repeat_result(&result, "at once").await;
+            all.push(result);
+        }
+    });
+    reference_run.assert_equal_result(&server);
+    runtime.block_on(async {
+        for result in &all {
+            fake.repeat_result(result, "late").await;
+        }
+    });
+    // All messages are processed, and none of them counts.
+    server.wait_for_log("without a valid grant", 2 * shards);
+    runtime.block_on(async {
+        let jetstream = jetstream::new(fake.client.clone());
+        loop {
+            let stream = jetstream.get_stream("faceoff-outcomes").await;
+            if stream.expect("the stream exists").cached_info().state.messages == 0 {
+                return;
+            }
+            // NATS sends no event when a stream is empty.
+            tokio::time::sleep(Duration::from_millis(50)).await;
+        }
+    });
+    let log = server.log();
+    let counts = |line: &str| line.contains("result accepted job=") && line.contains("worker=thief");
+    assert!(!log.lines().any(counts), "{log}");
+    assert!(log.contains("over already"), "{log}");
+    let view = server.get("/api/v1/workers", Some(&server.admin_token));
+    let view: Value = view.json().expect("the API speaks JSON");
+    assert_eq!(view["bans"], json!([]), "{view:#}");
+    reference_run.assert_equal_result(&server);
+    honest.stop();
+}
+
+#[test]
+fn false_result_bans_worker_and_requeues_its_jobs() {
+    let scratch = tempfile::tempdir().expect("a scratch folder can be made");
+    let reference_run = ReferenceRun::prepare(scratch.path());
+    let nats = Nats::start(&scratch.path().join("nats"));
+    let files = Relay::start();
+    let config = server_config(&nats, files.address());
+    let server = Server::start(&reference_run.data, &config);
+    files.set_target(server.address().into());
+    resume(&server);
+    let runtime = Runtime::new().expect("a runtime starts");
+    let may_work = json!({
+        "kind": "may_work", "program": "0".repeat(64), "version": "1", "runtimes": [], "slots": 1,
+    });
+    let fake = runtime.block_on(async {
+        let fake = FakeWorker::connect(&nats).await;
+        let (reported, open) = (fake.take_job().await, fake.take_job().await);
+        fake.report_shard(&reported).await;
+        server.wait_for_log("a worker is banned", 1);
+        // Its other lease is lost, and it gets no more jobs.
+        let lease = &open["order"]["lease"];
+        let renew = json!({ "kind": "renew", "lease": lease, "episodes_done": 0 });
+        assert_eq!(fake.request(&renew).await["kind"], "no");
+        let answer = fake.request(&may_work).await;
+        let reason = answer["reason"].as_str().expect("a refusal has a reason");
+        assert!(
+            reason.contains("accepts no results of this worker"),
+            "{answer:#}"
+        );
+        fake
+    });
+    let view = server.get("/api/v1/workers", Some(&server.admin_token));
+    let banned: Value = view.json().expect("the API speaks JSON");
+    assert_eq!(banned["bans"][0]["worker"], "liar", "{banned:#}");
+    let reason = banned["bans"][0]["reason"].as_str().unwrap_or_default();
+    assert!(
+        reason.contains("differs from the simulation") && reason.contains("damaged or incomplete"),
+        "{reason}"
+    );
+
+    // The ban survives a restart.
+    server.kill();
+    let server = Server::start(&reference_run.data, &config);
+    files.set_target(server.address().into());
+    let honest = Worker::start(scratch.path(), "honest", &worker_config(nats.address(), 1));
+    reference_run.assert_equal_result(&server);
+    let answer = runtime.block_on(fake.request(&may_work));
+    assert_eq!(answer["kind"], "no", "{answer:#}");
+    let listed = admin(&server, &["worker", "list"]).expect_success();
+    assert!(
+        listed.contains("liar") && listed.contains("banned since") && listed.contains("honest"),
+        "{listed}"
+    );
+    let readmitted = admin(&server, &["worker", "readmit", "liar"]).expect_success();
+    assert_eq!(readmitted.trim(), "liar is readmitted");
+    let answer = runtime.block_on(fake.request(&may_work));
+    let reason = answer["reason"].as_str().unwrap_or_default();
+    assert!(
+        reason.contains("another program"),
+        "it is checked like any other worker: {answer:#}"
+    );
+    honest.stop();
+}
+
+#[test]
+fn false_game_result_bans_worker_and_real_one_is_accepted() {
+    let scratch = tempfile::tempdir().expect("a scratch folder can be made");
+    let nats = Nats::start(&scratch.path().join("nats"));
+    let files = Relay::start();
+    let server = Server::start(
+        &scratch.path().join("data"),
+        &server_config(&nats, files.address()),
+    );
+    files.set_target(server.address().into());
+    for name in ["Ada", "Bob"] {
+        let team = Team::create(&server, name);
+        let submission = team.submit(&server, &repository().join("agents/hold"));
+        assert_eq!(submission["state"], "valid", "{submission:#}");
+    }
+    let rules = [
+        "--format",
+        "round-robin",
+        "--rounds",
+        "1",
+        "--steps",
+        "1500",
+    ];
+    let open = ["tournament", "open", "Cup", "--teams", "Ada,Bob", "--json"];
+    let cup = admin(&server, &[&open[..], &rules].concat()).json();
+    let round = admin(&server, &["tournament", "start-round", "Cup"]);
+    let _ = round.expect_success();
+
+    let runtime = Runtime::new().expect("a runtime starts");
+    runtime.block_on(async {
+        let fake = FakeWorker::connect(&nats).await;
+        let job = fake.take_job().await;
+        assert_eq!(job["order"]["assignment"]["kind"], "game", "{job:#}");
+        fake.report_game(&job).await;
+        server.wait_for_log("a worker is banned", 1);
+    });
+    let view = server.get("/api/v1/workers", Some(&server.admin_token));
+    let view: Value = view.json().expect("the API speaks JSON");
+    let reason = view["bans"][0]["reason"].as_str().unwrap_or_default();
+    assert!(reason.contains("game.zip was not stored"), "{view:#}");
+
+    let honest = Worker::start(scratch.path(), "honest", &worker_config(nats.address(), 1));
+    let path = cup["id"].as_str().expect("a tournament has an id");
+    let path = format!("/api/v1/tournaments/{path}");
+    let _ = server.poll(&path, &server.admin_token, |view| view["phase"] == "played");
+    let games = server.get(&format!("{path}/games"), Some(&server.admin_token));
+    let games: Value = games.json().expect("the API speaks JSON");
+    assert!(games.to_string().contains("\"steps\":1500"), "{games:#}");
+    let view = server.get("/api/v1/workers", Some(&server.admin_token));
+    let view: Value = view.json().expect("the API speaks JSON");
+    assert_eq!(view["bans"].as_array().map(Vec::len), Some(1), "{view:#}");
+    honest.stop();
+}

@@ -1,0 +1,165 @@
+//! Interruptions of remote workers: cut and slow links, full disks, wrong clocks. Each run ends with the result of a local
+//! slot, and no agent gets a fault.
+
+use super::{ReferenceRun, server_config, resume, start_server, worker_config, wait_for_workers};
+use crate::{dataset, entry};
+use faceoff_tests::{
+    nats::Nats,
+    program,
+    relay::{ConnectionBreaks, Relay},
+    small_disk::{FilledDisk, MountedDisk},
+    worker::Worker,
+};
+use jiff::Timestamp;
+use std::{fs, path::PathBuf, process::Command, time::Duration};
+
+const SCRATCH_BYTES: u64 = 64 << 20;
+/// With this seed the first file connection breaks within 300 kB, inside a bundle of more than a megabyte.
+const SEED_BREAKING_BUNDLE: u64 = 65;
+
+#[test]
+fn disconnected_worker_stops_and_another_gets_its_job() {
+    let scratch = tempfile::tempdir().expect("a scratch folder can be made");
+    let reference_run = ReferenceRun::prepare(scratch.path());
+    let nats = Nats::start(&scratch.path().join("nats"));
+    let (files, link) = (Relay::start(), Relay::start());
+    link.set_target(nats.address());
+    let server = start_server(&reference_run, &server_config(&nats, files.address()), &files);
+    let disconnected = Worker::start(scratch.path(), "disconnected", &worker_config(link.address(), 1));
+    resume(&server);
+    disconnected.wait_for_log("committed", 1);
+    disconnected.wait_for_log("started job=", 2);
+    // The worker cannot send the result of its current job in time.
+    link.disconnect();
+    let other = Worker::start(scratch.path(), "other", &worker_config(nats.address(), 1));
+    reference_run.assert_equal_result(&server);
+    link.set_target(nats.address());
+    other.stop();
+    disconnected.stop();
+}
+
+#[test]
+fn slow_and_breaking_links_lose_no_result() {
+    let scratch = tempfile::tempdir().expect("a scratch folder can be made");
+    let reference_run = ReferenceRun::prepare(scratch.path());
+    let nats = Nats::start(&scratch.path().join("nats"));
+    let files = Relay::start();
+    let server = start_server(&reference_run, &server_config(&nats, files.address()), &files);
+    let links = [Relay::start(), Relay::start()];
+    for (seed, link) in (0..).zip(&links) {
+        link.set_target(nats.address());
+        link.set_breaks(ConnectionBreaks {
+            seed,
+            refused_percent: 5,
+            max_bytes: 64 << 10,
+        });
+        link.set_delay(Duration::from_millis(200));
+    }
+    files.set_breaks(ConnectionBreaks {
+        seed: SEED_BREAKING_BUNDLE,
+        refused_percent: 5,
+        max_bytes: 16 << 20,
+    });
+    files.set_delay(Duration::from_millis(200));
+    let workers = [0, 1].map(|index: usize| {
+        let name = format!("worker-{index}");
+        Worker::start(scratch.path(), &name, &worker_config(links[index].address(), 1))
+    });
+    resume(&server);
+    reference_run.assert_equal_result(&server);
+    for link in links.iter().chain([&files]) {
+        assert!(link.broken_connections() > 0, "a link had no broken connection");
+    }
+    for worker in workers {
+        let log = worker.log();
+        assert!(log.contains("committed"), "a worker has run no job:\n{log}");
+    }
+}
+
+#[test]
+fn worker_with_full_disk_releases_jobs_until_it_has_space() {
+    let scratch = tempfile::tempdir().expect("a scratch folder can be made");
+    let reference_run = ReferenceRun::prepare(scratch.path());
+    let nats = Nats::start(&scratch.path().join("nats"));
+    let files = Relay::start();
+    let server = start_server(&reference_run, &server_config(&nats, files.address()), &files);
+    let disk = MountedDisk::at(&scratch.path().join("full/scratch"), SCRATCH_BYTES);
+    let mut command = disk.namespace_command();
+    command.arg(program("faceoff"));
+    let config = worker_config(nats.address(), 1);
+    let full = Worker::start_with_command(command, scratch.path(), "full", &config, &[]);
+    wait_for_workers(&server, 1);
+    let filled = FilledDisk::fill(&disk.outside_path());
+    resume(&server);
+    full.wait_for_log("disk full: job released", 3);
+    let other = Worker::start(scratch.path(), "other", &config);
+    other.wait_for_log("committed", 2);
+    assert!(!full.log().contains("committed"), "{}", full.log());
+    other.stop();
+    drop(filled);
+    full.wait_for_log("committed", 1);
+
+    let (evaluation, token) = (reference_run.evaluation.clone(), reference_run.team.token.clone());
+    reference_run.assert_equal_result(&server);
+    let shards = entry(
+        &mut dataset(&server, &evaluation, &token),
+        "calibration.json",
+    );
+    for shard in shards["shards"].as_array().expect("it lists the shards") {
+        assert_eq!(
+            shard.get("platform_retries"),
+            None,
+            "a full disk counts as no failure: {shards:#}"
+        );
+    }
+}
+
+/// The library that gives a program a wrong clock when it is preloaded.
+fn faketime_library() -> PathBuf {
+    let folders = fs::read_dir("/usr/lib").expect("/usr/lib can be read");
+    folders
+        .flatten()
+        .map(|folder| folder.path().join("faketime/libfaketime.so.1"))
+        .find(|library| library.exists())
+        .expect("libfaketime is installed; `make setup-test` installs it")
+}
+
+#[test]
+fn workers_with_wrong_clocks_run_jobs_normally() {
+    let scratch = tempfile::tempdir().expect("a scratch folder can be made");
+    let reference_run = ReferenceRun::prepare(scratch.path());
+    let nats = Nats::start(&scratch.path().join("nats"));
+    let files = Relay::start();
+    let server = start_server(&reference_run, &server_config(&nats, files.address()), &files);
+    let began = Timestamp::now();
+    let workers = [("early", "-3600"), ("late", "+3600")].map(|(name, offset)| {
+        let mut command = Command::new(program("faceoff"));
+        command
+            .env("LD_PRELOAD", faketime_library())
+            .env("FAKETIME", offset)
+            // Only the wall clock is wrong; the monotonic clock is right.
+            .env("FAKETIME_DONT_FAKE_MONOTONIC", "1")
+            .env("DONT_FAKE_MONOTONIC", "1")
+            .env("FAKETIME_DISABLE_SHM", "1");
+        Worker::start_with_command(
+            command,
+            scratch.path(),
+            name,
+            &worker_config(nats.address(), 1),
+            &[],
+        )
+    });
+    wait_for_workers(&server, workers.len());
+    resume(&server);
+    reference_run.assert_equal_result(&server);
+    for (worker, hours) in workers.into_iter().zip([-1.0, 1.0]) {
+        let log = worker.log();
+        assert!(log.contains("committed"), "a worker has run no job:\n{log}");
+        assert!(!log.contains("lease lost"), "{log}");
+        // A log line begins with its time.
+        let time = log.split_whitespace().next().expect("the log has a line");
+        let time: Timestamp = time.parse().expect("a log line begins with its time");
+        let off = (time.as_second() - began.as_second()) as f64 / 3600.0;
+        assert!((off - hours).abs() < 0.5, "its clock is not {hours} h off:\n{log}");
+    }
+}

@@ -1,0 +1,338 @@
+//! Problems of NATS: full streams, payload limits, TLS, changed streams, a missing server. Each is reported, and jobs
+//! continue once it is fixed.
+
+use super::{COMMON, ReferenceRun, server_config, resume, start_server, with_episodes, worker_config, wait_for_workers};
+use crate::Team;
+use async_nats::jetstream::{
+    self,
+    stream::{Config, RetentionPolicy},
+};
+use faceoff_tests::{
+    bundle,
+    nats::Nats,
+    relay::Relay,
+    repository,
+    server::{TIMEOUT, Server},
+    worker::Worker,
+};
+use rcgen::{BasicConstraints, CertificateParams, CertifiedIssuer, DnType, IsCa, KeyPair};
+use serde_json::json;
+use std::{
+    fs,
+    path::Path,
+    thread,
+    time::{Duration, Instant},
+};
+use tokio::runtime::Runtime;
+
+/// Waits until the server reports a problem with this text to organisers.
+fn wait_for_problem(server: &Server, text: &str) {
+    let _ = server.poll("/api/v1/workers", &server.admin_token, |view| {
+        let problems = view["troubles"].as_array().expect("a list of problems");
+        problems
+            .iter()
+            .any(|problem| problem.as_str().is_some_and(|found| found.contains(text)))
+    });
+}
+
+fn wait_for_no_problem(server: &Server) {
+    let _ = server.poll("/api/v1/workers", &server.admin_token, |view| {
+        view["troubles"] == json!([])
+    });
+}
+
+/// A client that may change streams.
+struct Administrator {
+    runtime: Runtime,
+    jetstream: jetstream::Context,
+}
+
+impl Administrator {
+    fn connect(nats: &Nats) -> Self {
+        let runtime = Runtime::new().expect("a runtime starts");
+        let jetstream = runtime.block_on(async {
+            let client = async_nats::connect(nats.url()).await;
+            jetstream::new(client.expect("NATS is there"))
+        });
+        Self { runtime, jetstream }
+    }
+
+    /// The configuration of a stream, once the server has created it.
+    fn stream_config(&self, name: &str) -> Config {
+        let started = Instant::now();
+        loop {
+            let found = self.runtime.block_on(self.jetstream.get_stream(name));
+            match found {
+                Ok(stream) => return stream.cached_info().config.clone(),
+                Err(error) => assert!(started.elapsed() < TIMEOUT, "{name}: {error}"),
+            }
+            // The server sends no event when it creates a stream.
+            thread::sleep(Duration::from_millis(20));
+        }
+    }
+
+    fn update(&self, stream: &Config) {
+        let changed = self.runtime.block_on(self.jetstream.update_stream(stream));
+        let _ = changed.expect("NATS updates the stream");
+    }
+
+    fn create(&self, stream: Config) {
+        let created = self.runtime.block_on(self.jetstream.create_stream(stream));
+        let _ = created.expect("NATS creates the stream");
+    }
+
+    fn delete(&self, name: &str) {
+        let deleted = self.runtime.block_on(self.jetstream.delete_stream(name));
+        let _ = deleted.expect("NATS deletes the stream");
+    }
+}
+
+#[test]
+fn result_waits_while_stream_is_full() {
+    let scratch = tempfile::tempdir().expect("a scratch folder can be made");
+    let reference_run = ReferenceRun::prepare(scratch.path());
+    let nats = Nats::start(&scratch.path().join("nats"));
+    let files = Relay::start();
+    let config = server_config(&nats, files.address());
+    let server = start_server(&reference_run, &config, &files);
+    let worker = Worker::start(scratch.path(), "worker", &worker_config(nats.address(), 1));
+    wait_for_workers(&server, 1);
+    let administrator = Administrator::connect(&nats);
+    let original = administrator.stream_config("faceoff-outcomes");
+    administrator.update(&Config {
+        max_bytes: 1,
+        ..original.clone()
+    });
+    resume(&server);
+    let message = "the result is not stored by NATS yet; trying again";
+    worker.wait_for_log(message, 1);
+    assert!(worker.log().contains("maximum bytes"), "{}", worker.log());
+    // The page of workers and the health endpoints report it, too.
+    wait_for_problem(&server, "maximum bytes");
+    for path in ["/api/v1/health", "/readyz"] {
+        let _ = server.poll(path, &server.admin_token, |view| {
+            let detail = view["detail"].as_str();
+            detail.is_some_and(|detail| detail.contains("maximum bytes"))
+        });
+    }
+    // Waits longer than a lease, which the worker renews.
+    thread::sleep(Duration::from_secs(12));
+    assert!(!worker.log().contains("committed"), "{}", worker.log());
+    administrator.update(&original);
+    reference_run.assert_equal_result(&server);
+    let log = worker.log();
+    let count = |word: &str| log.matches(word).count();
+    assert!(count("platform fault") == 0, "{log}");
+    // On a slow machine the worker may lose the lease, which the log reports.
+    let lost = count("lease lost");
+    assert!(
+        count(message) <= 1 + lost,
+        "it is logged once for each job:\n{log}"
+    );
+    assert_eq!(count("begun"), count("committed") + lost, "{log}");
+}
+
+/// Many episodes in one shard, so that its result is the only message over the limit.
+fn with_large_result(config: &str) -> String {
+    with_episodes(config, 60, 60).replace("[evaluation]", "[evaluation]\ntasks = [\"hit\"]")
+}
+
+#[test]
+fn oversized_result_is_platform_fault_and_evaluation_is_rerun() {
+    let scratch = tempfile::tempdir().expect("a scratch folder can be made");
+    let mut nats = Nats::start_with_config(&scratch.path().join("nats"), "max_payload: 8192\n");
+    let files = Relay::start();
+    let config = with_large_result(&server_config(&nats, files.address()));
+    let server = Server::start(&scratch.path().join("data"), &config);
+    files.set_target(server.address().into());
+    let team = Team::create(&server, "Alpha");
+    let agent = bundle::reference("striker", scratch.path());
+    let submission = team.submit(&server, &agent);
+    let evaluation = team.evaluate(&server, &submission);
+    let _worker = Worker::start(scratch.path(), "worker", &worker_config(nats.address(), 1));
+    let failed = server.poll(&evaluation, &server.admin_token, |view| {
+        view["state"] == "platform_failed"
+    });
+    let reason = failed["reason"].as_str().unwrap_or_default();
+    assert!(
+        reason.contains("exceeds the max_payload of NATS, which must be raised"),
+        "{failed:#}"
+    );
+    nats.configure("");
+    nats.kill_and_restart();
+    // The server repeats the evaluation automatically.
+    let _ = server.poll("/api/v1/evaluations", &server.admin_token, |view| {
+        let evaluations = view.as_array().into_iter().flatten();
+        evaluations
+            .into_iter()
+            .any(|evaluation| evaluation["state"] == "finished")
+    });
+}
+
+#[test]
+fn oversized_result_waits_until_limit_is_raised() {
+    let scratch = tempfile::tempdir().expect("a scratch folder can be made");
+    let mut nats = Nats::start_with_config(&scratch.path().join("nats"), "max_payload: 8192\n");
+    let files = Relay::start();
+    // The lease is long enough for slow machines.
+    let config = with_large_result(&server_config(&nats, files.address())).replace("lease_s = 10", "lease_s = 3600");
+    let server = Server::start(&scratch.path().join("data"), &config);
+    files.set_target(server.address().into());
+    let team = Team::create(&server, "Alpha");
+    let agent = bundle::reference("striker", scratch.path());
+    let submission = team.submit(&server, &agent);
+    let evaluation = team.evaluate(&server, &submission);
+    let worker = Worker::start(scratch.path(), "worker", &worker_config(nats.address(), 1));
+    worker.wait_for_log(
+        "but NATS accepts messages of at most 8192: raise its max_payload",
+        1,
+    );
+    nats.configure("");
+    nats.kill_and_restart();
+    let finished = team.wait_until_finished(&server, &evaluation);
+    assert_eq!(finished["state"], "finished", "{finished:#}");
+    let log = worker.log();
+    assert_eq!(
+        log.matches("started job=").count(),
+        1,
+        "the job ran more than once:\n{log}"
+    );
+    assert!(!log.contains("platform fault"), "{log}");
+}
+
+/// A certificate authority with this name.
+fn authority(name: &str) -> CertifiedIssuer<'static, KeyPair> {
+    let mut params = CertificateParams::default();
+    params.is_ca = IsCa::Ca(BasicConstraints::Unconstrained);
+    params.distinguished_name.push(DnType::CommonName, name);
+    let key = KeyPair::generate().expect("a key can be made");
+    CertifiedIssuer::self_signed(params, key).expect("a certificate can be made")
+}
+
+#[test]
+fn nats_certificate_is_verified_with_configured_authority() {
+    let scratch = tempfile::tempdir().expect("a scratch folder can be made");
+    let reference_run = ReferenceRun::prepare(scratch.path());
+    let file = |name: &str, text: &str| {
+        let file = scratch.path().join(name);
+        fs::write(&file, text).expect("a scratch file can be written");
+        file
+    };
+    let (trusted, untrusted) = (authority("trusted"), authority("untrusted"));
+    let key = KeyPair::generate().expect("a key can be made");
+    let certificate = CertificateParams::new(["127.0.0.1".to_owned()])
+        .and_then(|params| params.signed_by(&key, &trusted))
+        .expect("a certificate can be made");
+    let [right, wrong] = [("trusted.pem", &trusted), ("untrusted.pem", &untrusted)]
+        .map(|(name, authority)| file(name, &authority.pem()));
+    let nats = format!(
+        "tls {{\n  cert_file: {:?}\n  key_file: {:?}\n}}\n",
+        file("nats.pem", &certificate.pem()),
+        file("nats.key", &key.serialize_pem())
+    );
+    let nats = Nats::start_with_config(&scratch.path().join("nats"), &nats);
+    let files = Relay::start();
+    let with_authority = |config: String, authority: &Path| {
+        let config = config.replace("nats://", "tls://");
+        format!("{config}ca_file = {authority:?}\n")
+    };
+    let refused = "NATS cannot be reached: its certificate is not trusted";
+    let server_config_with = |authority: &Path| with_authority(server_config(&nats, files.address()), authority);
+    let worker_config_with = |authority: &Path| with_authority(worker_config(nats.address(), 1), authority);
+
+    let server = Server::start(&scratch.path().join("other"), &server_config_with(&wrong));
+    server.wait_for_log(refused, 1);
+    drop(server);
+    let worker = Worker::start(scratch.path(), "misconfigured", &worker_config_with(&wrong));
+    worker.wait_for_log(refused, 1);
+    // The worker still stops when it is asked to.
+    worker.stop();
+
+    let server = start_server(&reference_run, &server_config_with(&right), &files);
+    let worker = Worker::start(scratch.path(), "worker", &worker_config_with(&right));
+    resume(&server);
+    reference_run.assert_equal_result(&server);
+    assert!(!worker.log().contains(refused), "{}", worker.log());
+}
+
+#[test]
+fn stream_with_other_settings_is_reported_then_recreated() {
+    let scratch = tempfile::tempdir().expect("a scratch folder can be made");
+    let reference_run = ReferenceRun::prepare(scratch.path());
+    let nats = Nats::start(&scratch.path().join("nats"));
+    let files = Relay::start();
+    let config = server_config(&nats, files.address());
+    let server = start_server(&reference_run, &config, &files);
+    let administrator = Administrator::connect(&nats);
+    let streams =
+        ["faceoff-orders", "faceoff-outcomes"].map(|name| (name, administrator.stream_config(name)));
+    server.kill();
+    for (name, stream) in streams {
+        administrator.delete(name);
+        administrator.create(Config {
+            retention: RetentionPolicy::Limits,
+            ..stream
+        });
+    }
+    let server = start_server(&reference_run, &config, &files);
+    let worker = Worker::start(scratch.path(), "worker", &worker_config(nats.address(), 1));
+    wait_for_workers(&server, 1);
+    resume(&server);
+    for name in ["faceoff-orders", "faceoff-outcomes"] {
+        let message = format!("the stream {name} has other settings than this server needs");
+        server.wait_for_log(&message, 1);
+        wait_for_problem(&server, &message);
+        let log = server.log();
+        assert_eq!(log.matches(&message).count(), 1, "it is logged once:\n{log}");
+    }
+    assert!(!worker.log().contains("started job="), "{}", worker.log());
+    for name in ["faceoff-orders", "faceoff-outcomes"] {
+        administrator.delete(name);
+    }
+    wait_for_no_problem(&server);
+    reference_run.assert_equal_result(&server);
+}
+
+#[test]
+fn server_without_nats_starts_and_continues_once_connected() {
+    let scratch = tempfile::tempdir().expect("a scratch folder can be made");
+    let (files, link) = (Relay::start(), Relay::start());
+    let config = format!(
+        "{COMMON}[workers]\nslots = 1\nplay = false\n[nats]\nurl = \"nats://{}\"\nfiles_url = \"http://{}\"\n",
+        link.address(),
+        files.address()
+    );
+    let server = Server::start(&scratch.path().join("data"), &config);
+    files.set_target(server.address().into());
+    server.wait_for_log("NATS cannot be reached", 1);
+    // The health endpoint reports it, since no job would run.
+    let not_ready = |word: &str| {
+        let health = server.poll("/api/v1/health", &server.admin_token, |view| {
+            view["detail"]
+                .as_str()
+                .is_some_and(|detail| detail.contains(word))
+        });
+        assert_eq!(health["status"], 503, "{health:#}");
+    };
+    not_ready("The server cannot reach NATS: nats://");
+    let worker = Worker::start(scratch.path(), "worker", &worker_config(link.address(), 1));
+    worker.wait_for_log("NATS cannot be reached", 1);
+    let team = Team::create(&server, "Alpha");
+    let submission = team.submit(&server, &repository().join("agents/hold"));
+    let evaluation = team.evaluate(&server, &submission);
+    let nats = Nats::start(&scratch.path().join("nats"));
+    link.set_target(nats.address());
+    let finished = team.wait_until_finished(&server, &evaluation);
+    assert_eq!(finished["state"], "finished", "{finished:#}");
+    // A worker with --drain-after-idle stops when no job is left.
+    let options = ["--drain-after-idle", "1s"];
+    Worker::start_with_arguments(scratch.path(), "idle", &worker_config(link.address(), 1), &options).wait_for_exit();
+    let workers = server.poll("/api/v1/workers", &server.admin_token, |view| {
+        view["troubles"] == json!([])
+    });
+    let names = [0, 1].map(|index: usize| workers["workers"][index]["name"].clone());
+    assert_eq!(names, ["idle", "worker"], "{workers:#}");
+    let _ = server.poll("/api/v1/health", &server.admin_token, |view| {
+        view["status"] == "ok"
+    });
+}

@@ -1,0 +1,124 @@
+//! Remote workers that are stopped (SIGTERM) during a job: the job is released at once and counts as no failure. Leases
+//! last an hour here, so other workers get the job only if it is released.
+
+use super::{ReferenceRun, server_config, resume, with_episodes, worker_config};
+use crate::{Team, dataset, entry, evaluation_path, start_day};
+use faceoff_tests::{bundle, nats::Nats, relay::Relay, repository, server::Server, worker::Worker};
+use serde_json::json;
+use std::net::TcpListener;
+
+fn with_hour_leases(config: &str) -> String {
+    config.replace("lease_s = 10", "lease_s = 3600")
+}
+
+#[test]
+fn job_waiting_for_bundle_is_released_and_rerun_after_restart() {
+    let scratch = tempfile::tempdir().expect("a scratch folder can be made");
+    let reference_run = ReferenceRun::prepare(scratch.path());
+    let nats = Nats::start(&scratch.path().join("nats"));
+    let files = Relay::start();
+    // This listener accepts connections and never answers.
+    let silent = TcpListener::bind(("127.0.0.1", 0)).expect("there is a port");
+    files.set_target(silent.local_addr().expect("it is bound"));
+    let config = with_hour_leases(&server_config(&nats, files.address()));
+    let server = Server::start(&reference_run.data, &config);
+    let config = worker_config(nats.address(), 1);
+    let worker = Worker::start(scratch.path(), "worker", &config);
+    resume(&server);
+    worker.wait_for_log("started job=", 1);
+    worker.request_stop();
+    worker.wait_for_log("lease lost", 1);
+    server.wait_for_log("result accepted", 1);
+    let log = worker.log();
+    worker.wait_for_exit();
+    assert!(!log.contains("platform fault"), "{log}");
+    assert!(!log.contains("committed"), "{log}");
+
+    files.set_target(server.address().into());
+    let restarted = Worker::start(scratch.path(), "worker", &config);
+    let (evaluation, token) = (reference_run.evaluation.clone(), reference_run.team.token.clone());
+    reference_run.assert_equal_result(&server);
+    restarted.stop();
+    let shards = entry(
+        &mut dataset(&server, &evaluation, &token),
+        "calibration.json",
+    );
+    for shard in shards["shards"].as_array().expect("it lists the shards") {
+        assert_eq!(
+            shard.get("platform_retries"),
+            None,
+            "the release counts as no failure: {shards:#}"
+        );
+    }
+}
+
+#[test]
+fn running_job_is_released_and_started_by_another_worker() {
+    let scratch = tempfile::tempdir().expect("a scratch folder can be made");
+    let nats = Nats::start(&scratch.path().join("nats"));
+    let files = Relay::start();
+    // One shard of one task.
+    let config = with_episodes(&with_hour_leases(&server_config(&nats, files.address())), 40, 40)
+        .replace("[evaluation]", "[evaluation]\ntasks = [\"hit\"]");
+    let server = Server::start(&scratch.path().join("data"), &config);
+    files.set_target(server.address().into());
+    // The agent hangs after 3000 control steps: validation runs are shorter, the shard is longer.
+    let hangs = bundle::python_agent(
+        "seen = globals().setdefault('seen', [0])\nseen[0] += 1\nif seen[0] > 3000: time.sleep(600)\nsay(hold)",
+    );
+    let hangs = bundle::python_bundle(scratch.path(), "hangs", &hangs);
+    let team = Team::create(&server, "Slow");
+    let submission = team.submit(&server, &hangs);
+    assert_eq!(submission["state"], "valid", "{submission:#}");
+    let [first, second] = ["first", "second"];
+    let first = Worker::start(scratch.path(), first, &worker_config(nats.address(), 1));
+    let evaluation = evaluation_path(&start_day(&server), &submission);
+    // The shard has started, and will never end.
+    let _ = server.poll(&evaluation, &team.token, |view| {
+        view["progress"]["episodes_done"].as_u64() > Some(0)
+    });
+    first.request_stop();
+    server.wait_for_log("result accepted", 1);
+    let second = Worker::start(scratch.path(), second, &worker_config(nats.address(), 1));
+    second.wait_for_log("started job=", 1);
+    let log = first.log();
+    first.wait_for_exit();
+    assert!(!log.contains("platform fault"), "{log}");
+    assert!(!log.contains("committed"), "{log}");
+}
+
+#[test]
+fn cancelled_job_stops_on_worker_and_frees_its_slot() {
+    let scratch = tempfile::tempdir().expect("a scratch folder can be made");
+    let nats = Nats::start(&scratch.path().join("nats"));
+    let files = Relay::start();
+    let config = with_episodes(&server_config(&nats, files.address()), 40, 40);
+    let server = Server::start(&scratch.path().join("data"), &config);
+    files.set_target(server.address().into());
+    // The agent hangs after 3000 control steps: validation runs are shorter, each shard is longer.
+    let hangs = bundle::python_agent(
+        "seen = globals().setdefault('seen', [0])\nseen[0] += 1\nif seen[0] > 3000: time.sleep(600)\nsay(hold)",
+    );
+    let hangs = bundle::python_bundle(scratch.path(), "hangs", &hangs);
+    let (slow, quick) = (
+        Team::create(&server, "Slow"),
+        Team::create(&server, "Quick"),
+    );
+    let slow_evaluation = slow.submit(&server, &hangs);
+    let quick_evaluation = quick.submit(&server, &repository().join("agents/hold"));
+    assert_eq!(slow_evaluation["state"], "valid", "{slow_evaluation:#}");
+    let worker = Worker::start(scratch.path(), "worker", &worker_config(nats.address(), 1));
+    let day = start_day(&server);
+    let [slow_evaluation, quick_evaluation] = [&slow_evaluation, &quick_evaluation].map(|submission| evaluation_path(&day, submission));
+    let _ = server.poll(&slow_evaluation, &slow.token, |answer| answer["state"] == "running");
+    let cancelled = server.post(
+        &format!("{slow_evaluation}/cancel"),
+        &server.admin_token,
+        &json!({ "reason": "Its team asked for it" }),
+    );
+    assert!(cancelled.status().is_success(), "{}", cancelled.status());
+    worker.wait_for_log("lease lost", 1);
+    let finished = quick.wait_until_finished(&server, &quick_evaluation);
+    assert_eq!(finished["state"], "finished", "{finished:#}");
+    worker.stop();
+}

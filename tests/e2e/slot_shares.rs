@@ -1,0 +1,266 @@
+//! Teams share slots fairly, whatever their agents do. The log of a real server with one slot shows in which order it
+//! starts its jobs.
+
+use crate::{Team, evaluation_path, start_day};
+use faceoff_tests::{
+    bundle::{pack, python_agent, python_bundle},
+    server::Server,
+};
+use serde_json::{Value, json};
+use std::{collections::BTreeMap, path::Path};
+
+/// One slot, small shards, and time limits that a sleeping agent exceeds.
+const CONFIG: &str = concat!(
+    include_str!("../patient.toml"),
+    r#"
+[evaluation]
+tasks = ["prepare"]
+episodes_per_task = 12
+episodes_per_shard = 1
+[workers]
+slots = 1
+"#
+);
+
+/// A configuration with this time limit for the start of an agent.
+fn with_startup_s(seconds: f64) -> String {
+    let changed = [
+        ("startup_s = 600.0", format!("startup_s = {seconds:.1}")),
+        // More episodes keep the evaluation running for a while.
+        (
+            "episodes_per_task = 12",
+            "episodes_per_task = 40".to_owned(),
+        ),
+    ];
+    changed
+        .iter()
+        .fold(CONFIG.to_owned(), |config, (from, to)| {
+            assert!(config.contains(from), "{from}");
+            config.replace(from, to)
+        })
+}
+
+/// A job that the slot ran, from the log.
+#[derive(Debug, Clone, PartialEq)]
+struct LoggedJob {
+    /// `validation` of a submission, `shard` of an evaluation or ablation, `scoring` of an evaluation.
+    kind: &'static str,
+    /// Id of the submission, evaluation or ablation.
+    subject: String,
+    /// Milliseconds within the day.
+    from: i64,
+    to: i64,
+}
+
+impl LoggedJob {
+    fn duration_ms(&self) -> i64 {
+        self.to - self.from
+    }
+}
+
+/// Milliseconds within the day of a line's time stamp, `2026-03-01T10:00:00.123456Z`.
+fn stamp(line: &str) -> i64 {
+    let time = line.split_once('T').expect("a time stamp").1;
+    let number = |range: std::ops::Range<usize>| -> i64 { time[range].parse().expect("digits") };
+    ((number(0..2) * 60 + number(3..5)) * 60 + number(6..8)) * 1000 + number(9..12)
+}
+
+/// All started jobs, in order.
+fn logged_jobs(server: &Server) -> Vec<LoggedJob> {
+    let mut started: Vec<(String, LoggedJob)> = Vec::new();
+    for line in server.log().lines() {
+        let Some((_, rest)) = line.split_once("faceoff_worker::slot: ") else {
+            continue;
+        };
+        let field = |name: &str| rest.split_once(name).map(|(_, rest)| rest.to_owned());
+        let id = field("job=").expect("a job id")[..36].to_owned();
+        if rest.starts_with("started") {
+            let description = field("description=").expect("a description");
+            let (kind, before) = if description.starts_with("validation run") {
+                ("validation", "submission ")
+            } else if description.starts_with("scoring") {
+                ("scoring", "evaluation ")
+            } else {
+                ("shard", " of ")
+            };
+            let subject = description.split_once(before).expect("a subject").1[..36].to_owned();
+            // The slot ends each job before it starts the next. The end of the last job is not used.
+            let (from, to) = (stamp(line), stamp(line));
+            let job = LoggedJob {
+                kind,
+                subject,
+                from,
+                to,
+            };
+            started.push((id, job));
+        } else {
+            let job = started.iter_mut().rfind(|job| job.0 == id);
+            job.expect("the job was started before").1.to = stamp(line);
+        }
+    }
+    started.into_iter().map(|job| job.1).collect()
+}
+
+/// Asserts that two kinds of jobs alternate by slot time while both are pending: one kind gets consecutive jobs only while
+/// the other is ahead, and by no more than the other's longest job. This holds on a slow machine, too.
+fn assert_fair_shares(
+    jobs: &[LoggedJob],
+    one: impl Fn(&LoggedJob) -> bool,
+    other: impl Fn(&LoggedJob) -> bool,
+) {
+    for (kind, opposite) in [
+        (
+            &one as &dyn Fn(&LoggedJob) -> bool,
+            &other as &dyn Fn(&LoggedJob) -> bool,
+        ),
+        (&other, &one),
+    ] {
+        let both: Vec<&LoggedJob> = jobs
+            .iter()
+            .filter(|job| one(job) || other(job))
+            .collect();
+        // Before the first and after the last job of the other kind, none of it is pending.
+        let opposites = || both.iter().enumerate().filter(|(_, job)| opposite(job));
+        let first = opposites().next().expect("there are some").0;
+        let last = opposites().next_back().expect("there are some").0;
+        let longest = opposites().map(|(_, job)| job.duration_ms()).max();
+        // The time between a claim and its line in the log belongs to neither job.
+        let longest = longest.unwrap_or_default() + 2000;
+        for run in both[first..last].chunk_by(|a, b| kind(a) == kind(b)) {
+            if kind(run[0]) {
+                // The last of them was started while this kind was not ahead.
+                let before_last: i64 =
+                    run[..run.len() - 1].iter().map(|job| job.duration_ms()).sum();
+                assert!(before_last <= longest, "{run:#?}\nin {jobs:#?}");
+            }
+        }
+    }
+}
+
+fn sleeping_bundle(scratch: &Path) -> Vec<u8> {
+    pack(&python_bundle(
+        scratch,
+        "sleeper",
+        "import time\ntime.sleep(10_000)\n",
+    ))
+}
+
+fn quick_bundle(scratch: &Path) -> std::path::PathBuf {
+    python_bundle(scratch, "quick", &python_agent("say(hold)"))
+}
+
+fn shards_of(jobs: &[LoggedJob], evaluation: &str) -> usize {
+    jobs
+        .iter()
+        .filter(|job| job.kind == "shard" && evaluation.ends_with(&job.subject))
+        .count()
+}
+
+#[test]
+fn running_evaluation_keeps_its_share_beside_sleeping_uploads() {
+    // uploads of two teams, and several of one
+    for uploads in [[1, 1], [3, 0]] {
+        let scratch = tempfile::tempdir().expect("a scratch folder can be made");
+        let server = Server::start(&scratch.path().join("data"), &with_startup_s(10.0));
+        let quick_team = Team::create(&server, "Quick");
+        let submission = quick_team.submit(&server, &quick_bundle(scratch.path()));
+        assert_eq!(submission["state"], "valid", "{submission:#}");
+        let before = logged_jobs(&server).len();
+        let day = start_day(&server);
+        let evaluation = evaluation_path(&day, &submission);
+        // the evaluation is running
+        let _ = server.poll(&evaluation, &quick_team.token, |answer| {
+            answer["episodes_done"].as_u64() >= Some(2)
+                || answer["state"] != "running" && answer["state"] != "queued"
+        });
+        let mut sleepers = Vec::new();
+        for (index, count) in uploads.into_iter().enumerate() {
+            let team = Team::create(&server, &format!("Sleeper {index}"));
+            for _ in 0..count {
+                sleepers.push(team.upload(&server, sleeping_bundle(scratch.path())));
+            }
+        }
+        let finished = quick_team.wait_until_finished(&server, &evaluation);
+        assert_eq!(finished["state"], "finished", "{finished:#}");
+        for id in &sleepers {
+            let verdict = verdict_of(&server, id);
+            assert_eq!(verdict["state"], "invalid", "{verdict:#}");
+        }
+        let jobs = &logged_jobs(&server)[before..];
+        assert_eq!(shards_of(jobs, &evaluation), 40);
+        assert_fair_shares(
+            jobs,
+            |job| job.kind == "validation",
+            |job| job.kind == "shard",
+        );
+        let validations = jobs.iter().filter(|job| job.kind == "validation");
+        assert_eq!(validations.count(), sleepers.len(), "{jobs:#?}");
+    }
+}
+
+fn verdict_of(server: &Server, submission: &str) -> Value {
+    server.poll(
+        &format!("/api/v1/submissions/{submission}"),
+        &server.admin_token,
+        |answer| answer["state"] != "validating",
+    )
+}
+
+#[test]
+fn evaluations_share_slots_and_ablations_run_after_them() {
+    let scratch = tempfile::tempdir().expect("a scratch folder can be made");
+    let server = Server::start(&scratch.path().join("data"), CONFIG);
+    let teams: BTreeMap<&str, (Team, Value)> = [
+        // it sleeps, so it is slow on every machine
+        (
+            "Slow",
+            "if message['step'] == 0: time.sleep(1.5)\nsay(hold)",
+        ),
+        ("Quick", "say(hold)"),
+    ]
+    .into_iter()
+    .map(|(name, on_step)| {
+        let team = Team::create(&server, name);
+        let folder = python_bundle(scratch.path(), name, &python_agent(on_step));
+        let submission = team.submit(&server, &folder);
+        assert_eq!(submission["state"], "valid", "{submission:#}");
+        (name, (team, submission))
+    })
+    .collect();
+    let before = logged_jobs(&server).len();
+    let slow_id = teams["Slow"].1["id"].as_str().expect("an id");
+    let requested = server.post(
+        &format!("/api/v1/submissions/{slow_id}/ablation"),
+        &server.admin_token,
+        &json!({ "episodes_per_task": 1 }),
+    );
+    assert_eq!(requested.status().as_u16() / 100, 2, "requesting an ablation");
+    let day = start_day(&server);
+    let evaluations = ["Slow", "Quick"].map(|name| evaluation_path(&day, &teams[name].1));
+    for (path, name) in evaluations.iter().zip(["Slow", "Quick"]) {
+        let finished = teams[name].0.wait_until_finished(&server, path);
+        assert_eq!(finished["state"], "finished", "{finished:#}");
+    }
+    let jobs = &logged_jobs(&server)[before..];
+    let is_shard_of =
+        |path: &str, job: &LoggedJob| job.kind == "shard" && path.ends_with(&job.subject);
+    let [slow, quick] = &evaluations;
+    for path in &evaluations {
+        assert_eq!(shards_of(jobs, path), 12);
+    }
+    assert_fair_shares(
+        jobs,
+        |job| is_shard_of(slow, job),
+        |job| is_shard_of(quick, job),
+    );
+    // Ablations do not delay the day. One job of the ablation may have started before the day.
+    let counts = |job: &LoggedJob| is_shard_of(slow, job) || is_shard_of(quick, job);
+    let last = jobs.iter().rposition(counts).expect("both evaluations are finished");
+    let first = jobs.iter().position(counts).expect("both evaluations are finished");
+    assert!(
+        jobs[first..=last]
+            .iter()
+            .all(|job| counts(job) || job.kind == "scoring"),
+        "{jobs:#?}"
+    );
+}

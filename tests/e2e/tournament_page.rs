@@ -1,0 +1,113 @@
+//! Pages of a tournament round in a real browser: live updates, and hidden results for visitors who avoid spoilers.
+
+use crate::{
+    CONFIG, Team,
+    axe::{axe, faults},
+    commands::admin,
+};
+use faceoff_tests::{
+    browser::{Browser, Page, View},
+    repository,
+    server::Server,
+};
+use serde_json::{Value, json};
+
+/// Sets a mark that the page loses when it is reloaded.
+fn mark(page: &Page) {
+    assert_eq!(page.evaluate("window.isMarked = true"), true);
+}
+
+#[test]
+fn round_pages_update_live_and_can_hide_results() {
+    let axe = axe();
+    let scratch = tempfile::tempdir().expect("a scratch folder can be made");
+    let server = Server::start(&scratch.path().join("data"), CONFIG);
+    for name in ["Ada", "Bob"] {
+        let team = Team::create(&server, name);
+        let submission = team.submit(&server, &repository().join("agents/hold"));
+        assert_eq!(submission["state"], "valid", "{submission:#}");
+    }
+    let rules = [
+        "--format",
+        "round-robin",
+        "--rounds",
+        "1",
+        "--steps",
+        "1500",
+    ];
+    let open = ["tournament", "open", "Cup", "--teams", "Ada,Bob", "--json"];
+    let cup = admin(&server, &[&open[..], &rules].concat()).json();
+    let cup = cup["id"].as_str().expect("a tournament has an id");
+    let browser = Browser::start(scratch.path());
+    let tournament = browser.open(&format!("{}/tournaments/{cup}", server.url));
+    mark(&tournament);
+
+    // The queue is paused until the pages are open.
+    let pause = json!({ "reason": "Until the pages are open" });
+    let paused = server.post("/api/v1/queue/pause", &server.admin_token, &pause);
+    assert!(paused.status().is_success(), "{}", paused.status());
+    admin(&server, &["tournament", "start-round", "Cup"]).expect_success();
+    tournament.wait_for("[data-live-region=schedule] a[href^='/games/']");
+    let game = tournament.evaluate(
+        "document.querySelector('[data-live-region=schedule] a[href^=\"/games/\"]').pathname",
+    );
+    let game = game.as_str().expect("a path is text");
+    let watched = browser.open(&format!("{}{game}", server.url));
+    let later = browser.open(&format!("{}{game}", server.url));
+    later.navigate_by("document.querySelector('form.spoilers').requestSubmit()");
+    let resumed = server.post("/api/v1/queue/resume", &server.admin_token, &json!({}));
+    assert!(resumed.status().is_success(), "{}", resumed.status());
+
+    tournament.wait_until(
+        "document.querySelector('[data-live-region=schedule]').textContent.includes('1 of 1 games')",
+    );
+    assert_eq!(tournament.evaluate("window.isMarked"), true);
+    // The page of a finished game shows the result and the replay.
+    watched.wait_for("#result");
+
+    // The result is on the first visitor's pages, and on no page of the visitor who hides results.
+    let view: Value = server
+        .get(&format!("/api/v1{game}"), None)
+        .json()
+        .expect("the API speaks JSON");
+    let because = view["result"]["because"]
+        .as_str()
+        .expect("a finished game has a reason for its result");
+    watched.go_to(&format!("{}{game}", server.url));
+    assert!(watched.html().contains(because), "{because:?}");
+    for path in [
+        game.to_owned(),
+        format!("/tournaments/{cup}"),
+        "/tournaments".to_owned(),
+    ] {
+        later.go_to(&format!("{}{path}", server.url));
+        let html = later.html();
+        assert!(!html.contains(because), "{path}: {html}");
+        assert!(later.text("main").contains("hidden"), "{path}");
+    }
+    later.go_to(&format!("{}{game}?show=result", server.url));
+    assert!(later.html().contains(because), "this result alone is shown");
+
+    let two = tournament.evaluate(
+        "document.querySelector('a[href*=\"/teams/\"][href^=\"/tournaments/\"]').pathname",
+    );
+    let two = two.as_str().expect("a path is text").to_owned();
+    let mut found = Vec::new();
+    for (page, path) in [
+        (&tournament, "/tournaments".to_owned()),
+        (&tournament, format!("/tournaments/{cup}")),
+        (&tournament, two.clone()),
+        (&later, two),
+        (&later, format!("/tournaments/{cup}")),
+        (&watched, game.to_owned()),
+        (&later, game.to_owned()),
+    ] {
+        page.set_view(View::DESKTOP);
+        page.go_to(&format!("{}{path}", server.url));
+        page.wait_until(
+            "[...document.querySelectorAll('.replay')].every(replay => replay.dataset.state == 'ready')",
+        );
+        found.extend(faults(page, &axe, &path));
+    }
+    assert!(found.is_empty(), "{}", found.join("\n"));
+}

@@ -1,0 +1,434 @@
+//! Commands for users: invitations, tokens, team registration, announcements and questions. Invalid values end with a
+//! message and the matching exit status.
+
+use crate::{
+    CONFIG,
+    commands::{FAILED, USAGE_ERROR, NOT_ALLOWED, REFUSED, CommandOutput, admin, admin_as, faceoff, member},
+};
+use faceoff_tests::server::{Server, http};
+use serde_json::{Value, json};
+use std::{fs, os::unix::fs::PermissionsExt, path::Path};
+
+const UNKNOWN_ID: &str = "00000000-0000-7000-8000-000000000000";
+
+fn join(server: &Server, link: &str, args: &[&str]) -> CommandOutput {
+    faceoff(
+        &[&["join", link, "--server", &server.url], args].concat(),
+        "",
+    )
+}
+
+/// The first word of a text that contains this part.
+#[track_caller]
+fn word(text: &str, part: &str) -> String {
+    let found = text
+        .split_whitespace()
+        .find(|word| word.contains(part));
+    found
+        .unwrap_or_else(|| panic!("no {part} in {text:?}"))
+        .to_owned()
+}
+
+fn id(value: &Value) -> String {
+    value["id"].as_str().expect("it has an id").to_owned()
+}
+
+/// Invites a user with these arguments and accepts the invitation; returns the user's token.
+#[track_caller]
+pub fn invite_and_join(server: &Server, invite: &[&str], name: &str) -> String {
+    let invited = admin(server, &[&["people"], invite].concat()).expect_success();
+    assert!(invited.contains("is not shown again"), "{invited}");
+    let link = word(&invited, "/join/fo_invite_");
+    word(&join(server, &link, &["--name", name]).expect_success(), "fo_person_")
+}
+
+#[test]
+fn commands_invite_and_remove_users() {
+    let scratch = tempfile::tempdir().expect("a scratch folder can be made");
+    let server = Server::start(&scratch.path().join("data"), CONFIG);
+    let people = |args: &[&str]| admin(&server, &[&["people"], args].concat());
+    assert!(people(&["list"]).expect_success().contains("no users yet"));
+    assert!(
+        people(&["invitations"])
+            .expect_success()
+            .contains("no invitations yet")
+    );
+
+    // An organiser, by a link that is valid once.
+    let invited = people(&["invite-organiser", "Grace"]).expect_success();
+    let link = word(&invited, "/join/fo_invite_");
+    join(&server, "nonsense", &["--name", "Grace"]).expect_refusal(FAILED, &["expected a link like"]);
+    join(&server, &format!("{link}x"), &["--name", "Grace"])
+        .expect_refusal(REFUSED, &["the server refused"]);
+    join(&server, &link, &["--name", "<b>"]).expect_refusal(USAGE_ERROR, &["--name", "letters, digits"]);
+    join(&server, &link, &[]).expect_refusal(REFUSED, &["name: expected the name"]);
+    join(&server, &link, &["--name", "Grace", "--accept-terms", "1"])
+        .expect_refusal(REFUSED, &["this season has no terms"]);
+    let output = join(&server, &link, &["--name", "Grace"]).expect_success();
+    assert!(
+        output.contains("organiser") && output.contains("not shown again"),
+        "{output}"
+    );
+    let grace = word(&output, "fo_person_");
+    join(&server, &link, &["--name", "Grace again"]).expect_refusal(REFUSED, &["409"]);
+    people(&["invite-organiser", ""]).expect_refusal(REFUSED, &["note", "1 to"]);
+    let account = member(&server, &grace, "whoami", &[]).expect_success();
+    assert!(account.contains("Grace") && account.contains("organiser"), "{account}");
+
+    // A member of a team, with a password.
+    let team = admin_as(&server, &grace, &["create-team", "Alpha"]).expect_success();
+    word(&team, "fo_team_");
+    people(&["invite-member", "Unknown", "Ada"]).expect_refusal(
+        FAILED,
+        &["there is no team \"Unknown\"", "faceoff admin teams"],
+    );
+    let invited = people(&["invite-member", "Alpha", "Ada"]).expect_success();
+    let link = word(&invited, "/join/fo_invite_");
+    let with_password = |password: &str| {
+        let args = [
+            "join",
+            &link,
+            "--server",
+            &server.url,
+            "--name",
+            "Ada",
+            "--password-stdin",
+        ];
+        faceoff(&args, password)
+    };
+    with_password("too short\n").expect_refusal(REFUSED, &["password", "12"]);
+    let output = with_password("a dozen characters, and more\n").expect_success();
+    let ada = word(&output, "fo_person_");
+    assert!(output.contains("of the team Alpha"), "{output}");
+    let members = member(&server, &ada, "team", &["members"]).expect_success();
+    assert!(
+        members.contains("Ada") && !members.contains("Grace"),
+        "{members}"
+    );
+    // A member may not run organisers' commands.
+    for args in [
+        &["people", "invite-organiser", "Eve"][..],
+        &["registration", "list"],
+        &["announce", "a", "b"],
+        &["create-team", "Eve"],
+    ] {
+        admin_as(&server, &ada, args).expect_refusal(NOT_ALLOWED, &["403"]);
+    }
+    admin_as(&server, "fo_person_unknown", &["people", "list"]).expect_refusal(NOT_ALLOWED, &["401"]);
+
+    // The founder of a team.
+    let invited = people(&["invite-team", "a founder"]).expect_success();
+    let link = word(&invited, "/join/fo_invite_");
+    let founder = ["--name", "Bob", "--affiliation", "TU"];
+    join(&server, &link, &founder).expect_refusal(USAGE_ERROR, &["--team"]);
+    join(&server, &link, &["--name", "Bob"]).expect_refusal(REFUSED, &["expected the team's name"]);
+    let taken = [&founder[..], &["--team", "alpha"]].concat();
+    join(&server, &link, &taken).expect_refusal(REFUSED, &["exists already"]);
+    let right = [&founder[..], &["--team", "Beta"]].concat();
+    let output = join(&server, &link, &right).expect_success();
+    assert!(output.contains("of the team Beta"), "{output}");
+
+    // A revoked link.
+    let invited = people(&["invite-member", "Beta", "Carl"]).expect_success();
+    let (invitation, link) = (word(&invited, "-"), word(&invited, "/join/fo_invite_"));
+    let revoked = people(&["uninvite", &invitation]).expect_success();
+    assert!(revoked.contains("revoked"), "{revoked}");
+    join(&server, &link, &["--name", "Carl"]).expect_refusal(REFUSED, &["409"]);
+    people(&["uninvite", UNKNOWN_ID]).expect_refusal(REFUSED, &["404", "invitation"]);
+    people(&["uninvite", "Carl"]).expect_refusal(USAGE_ERROR, &["Carl"]);
+    let all = people(&["invitations"]).expect_success();
+    for note in ["Grace", "Ada", "a founder", "Carl"] {
+        assert!(all.contains(&format!("for {note},")), "{note}: {all}");
+    }
+
+    // A user without password and token gets a link to the same account.
+    people(&["invite-back", "Zoe"]).expect_refusal(FAILED, &["there is no user \"Zoe\""]);
+    let invited = people(&["invite-back", "Ada"]).expect_success();
+    let link = word(&invited, "/join/fo_invite_");
+    join(&server, &link, &["--name", "Eve"]).expect_refusal(REFUSED, &["leave the name out"]);
+    let ada = word(&join(&server, &link, &[]).expect_success(), "fo_person_");
+    let account = member(&server, &ada, "whoami", &["--json"]).json();
+    assert_eq!(
+        (&account["role"], &account["person"]["name"]),
+        (&json!("member"), &json!("Ada"))
+    );
+
+    // Removing a user needs a confirmation.
+    people(&["remove", "Zoe"]).expect_refusal(FAILED, &["there is no user"]);
+    for args in [
+        &["remove", "Ada"][..],
+        &["remove", "Ada", "--confirm", "ada"],
+    ] {
+        people(args).expect_refusal(REFUSED, &["nothing is done yet", "\"Ada\""]);
+    }
+    member(&server, &ada, "whoami", &[]).expect_success();
+    let removed = people(&["remove", "Ada", "--confirm", "Ada"]).expect_success();
+    assert!(removed.contains("left"), "{removed}");
+    member(&server, &ada, "whoami", &[]).expect_refusal(NOT_ALLOWED, &["401"]);
+    people(&["invite-back", "Ada"]).expect_refusal(REFUSED, &["has left"]);
+    let list = admin(&server, &["people", "list", "--json"]).json();
+    let names: Vec<_> = list.as_array().expect("a list").iter().collect();
+    assert_eq!(names.len(), 3, "{list:#}");
+}
+
+#[test]
+fn commands_create_list_rotate_and_revoke_tokens() {
+    let scratch = tempfile::tempdir().expect("a scratch folder can be made");
+    let server = Server::start(&scratch.path().join("data"), CONFIG);
+    let grace = invite_and_join(&server, &["invite-organiser", "Grace"], "Grace");
+    let tokens = |args: &[&str]| admin_as(&server, &grace, &[&["token"], args].concat());
+    let is_valid = |token: &str| member(&server, token, "whoami", &[]).code == Some(0);
+
+    let made = tokens(&["create", "laptop", "--days", "30"]).expect_success();
+    let laptop = word(&made, "fo_person_");
+    assert!(
+        made.contains("not shown again") && is_valid(&laptop),
+        "{made}"
+    );
+    for days in ["0", "-1", "many", "70000"] {
+        let days = format!("--days={days}");
+        tokens(&["create", "x", &days]).expect_refusal(USAGE_ERROR, &["--days"]);
+    }
+    tokens(&["create", ""]).expect_refusal(REFUSED, &["name", "1 to"]);
+    tokens(&["create", "ci", "--team", "Alpha"]).expect_refusal(USAGE_ERROR, &["--team"]);
+    tokens(&["create", "ci", "--team", UNKNOWN_ID]).expect_refusal(REFUSED, &["404"]);
+    let team = admin(&server, &["create-team", "Alpha", "--json"]).json();
+    let made = tokens(&["create", "ci", "--team", &id(&team), "--json"]).json();
+    let ci = made["secret"]
+        .as_str()
+        .expect("it is shown once")
+        .to_owned();
+    let account = member(&server, &ci, "whoami", &[]).expect_success();
+    assert!(account.contains("API client of the team Alpha"), "{account}");
+
+    let list = tokens(&["list"]).expect_success();
+    let of_laptop = list.lines().find(|line| line.contains("laptop"));
+    let of_laptop = of_laptop.expect("it is listed").to_owned();
+    assert!(of_laptop.contains("valid until"), "{of_laptop}");
+    for secret in [&laptop, &ci, &grace, &server.admin_token] {
+        assert!(!list.contains(secret.as_str()), "a list shows no secret");
+    }
+    let id_of_laptop = of_laptop
+        .split_whitespace()
+        .next()
+        .expect("its id comes first");
+
+    // A rotated token is invalid at once.
+    let rotated = tokens(&["rotate", id_of_laptop]).expect_success();
+    let fresh = word(&rotated, "fo_person_");
+    assert!(!is_valid(&laptop) && is_valid(&fresh));
+    member(&server, &laptop, "whoami", &[]).expect_refusal(NOT_ALLOWED, &["401"]);
+    let by_host = admin(&server, &["token", "rotate", id_of_laptop]);
+    by_host.expect_refusal(NOT_ALLOWED, &["403", "only by that user"]);
+    for verb in ["rotate", "revoke"] {
+        tokens(&[verb, UNKNOWN_ID]).expect_refusal(REFUSED, &["404"]);
+        tokens(&[verb, "laptop"]).expect_refusal(USAGE_ERROR, &["laptop"]);
+    }
+    let revoked = admin(&server, &["token", "revoke", id_of_laptop]).expect_success();
+    assert!(revoked.contains("revoked 2"), "{revoked}");
+    assert!(!is_valid(&fresh) && is_valid(&grace));
+    member(&server, &fresh, "whoami", &[]).expect_refusal(NOT_ALLOWED, &["401", "revoked"]);
+    tokens(&["rotate", id_of_laptop]).expect_refusal(REFUSED, &["create another one"]);
+    // A second revocation changes nothing.
+    tokens(&["revoke", id_of_laptop]).expect_success();
+    // Users have the same commands for their own tokens without `admin`.
+    let own = |args: &[&str]| member(&server, &grace, "token", args);
+    let created = own(&["create", "office"]).expect_success();
+    let list = own(&["list"]).expect_success();
+    let of_office = list.lines().find(|line| line.contains(" office "));
+    let of_office = word(of_office.expect("it is listed"), "-");
+    let fresh = word(&own(&["rotate", &of_office]).expect_success(), "fo_person_");
+    assert!(!is_valid(&word(&created, "fo_person_")) && is_valid(&fresh));
+    own(&["revoke", &of_office]).expect_success();
+    assert!(!is_valid(&fresh));
+    own(&["revoke", "office"]).expect_refusal(USAGE_ERROR, &["office"]);
+    let revoked = tokens(&["revoke", &id(&made)]).expect_success();
+    assert!(revoked.contains("ci") && !is_valid(&ci));
+}
+
+#[test]
+fn commands_register_teams_and_publish_announcements() {
+    let scratch = tempfile::tempdir().expect("a scratch folder can be made");
+    let server = Server::start(&scratch.path().join("data"), CONFIG);
+    let registration = |args: &[&str]| admin(&server, &[&["registration"], args].concat());
+    let http = http().build().expect("a client needs nothing");
+    let register = |body: &Value| {
+        let url = format!("{}/api/v1/registrations", server.url);
+        let answer = http
+            .post(url)
+            .json(body)
+            .send()
+            .expect("the server answers");
+        let status = answer.status().as_u16();
+        (status, answer.json::<Value>().expect("the API speaks JSON"))
+    };
+    let team = |name: &str| json!({ "team": { "name": name }, "contact": "ada@example.org", "accepted_terms": 1 });
+
+    // Teams must accept the terms, so these are published first.
+    let terms = scratch.path().join("terms.txt");
+    let publish = |file: &Path| admin(&server, &["publish-terms", &file.to_string_lossy()]);
+    publish(&terms).expect_refusal(FAILED, &["reading the terms from", "terms.txt"]);
+    fs::write(&terms, " \n").expect("a scratch file can be written");
+    publish(&terms).expect_refusal(REFUSED, &["text", "1 to"]);
+    fs::write(&terms, b"\xff\xfe").expect("a scratch file can be written");
+    publish(&terms).expect_refusal(FAILED, &["reading the terms from"]);
+    fs::write(&terms, "Be fair.").expect("a scratch file can be written");
+    assert!(publish(&terms).expect_success().contains("published as version 1"));
+    publish(&terms).expect_refusal(REFUSED, &["the same as the current ones"]);
+
+    // Teams can register while registration is open.
+    assert!(
+        registration(&["list"])
+            .expect_success()
+            .contains("no team has registered")
+    );
+    let (status, problem) = register(&team("Alpha"));
+    assert_eq!(status, 409, "{problem:#}");
+    let open = registration(&["open"]).expect_success();
+    assert!(
+        open.contains("registration is open; divisions: none"),
+        "{open}"
+    );
+    registration(&["divisions", "Open", "open"]).expect_refusal(REFUSED, &["listed twice"]);
+    registration(&["divisions", "<b>"]).expect_refusal(USAGE_ERROR, &["letters, digits"]);
+    let divided = registration(&["divisions", "Open", "Students"]).expect_success();
+    assert!(divided.contains("divisions: Open, Students"), "{divided}");
+    let mut students = team("Alpha");
+    students["team"]["division"] = json!("Students");
+    let (_, alpha) = register(&students);
+    let (_, beta) = register(&team("Beta"));
+    let list = registration(&["list"]).expect_success();
+    assert!(
+        list.contains("Alpha") && list.contains("ada@example.org, waiting"),
+        "{list}"
+    );
+
+    let link = alpha["join_link"].as_str().expect("it is shown once");
+    let consenting = ["--name", "Ada", "--accept-terms", "1"];
+    join(&server, link, &consenting).expect_refusal(REFUSED, &["is pending"]);
+    registration(&["approve", UNKNOWN_ID]).expect_refusal(REFUSED, &["404", "registration"]);
+    registration(&["approve", "Alpha"]).expect_refusal(USAGE_ERROR, &["Alpha"]);
+    let approved = registration(&["approve", &id(&alpha)]).expect_success();
+    assert!(approved.contains("approved"), "{approved}");
+    registration(&["approve", &id(&alpha)]).expect_refusal(REFUSED, &["was approved"]);
+    registration(&["refuse", &id(&beta), ""]).expect_refusal(REFUSED, &["reason"]);
+    let refused = registration(&["refuse", &id(&beta), "one team each"]).expect_success();
+    assert!(refused.contains("refused: one team each"), "{refused}");
+    registration(&["refuse", &id(&beta), "again"]).expect_refusal(REFUSED, &["was refused"]);
+    let of_beta = beta["join_link"].as_str().expect("it is shown once");
+    join(&server, of_beta, &consenting).expect_refusal(REFUSED, &["one team each"]);
+    join(&server, link, &["--name", "Ada"]).expect_refusal(REFUSED, &["consent to version 1"]);
+    let output = join(&server, link, &consenting).expect_success();
+    let ada = word(&output, "fo_person_");
+    assert!(
+        member(&server, &ada, "team", &["show"])
+            .expect_success()
+            .contains("Students")
+    );
+    registration(&["divisions", "Open"]).expect_refusal(REFUSED, &["“Students” has"]);
+    assert!(
+        registration(&["close"])
+            .expect_success()
+            .contains("registration is closed")
+    );
+    assert_eq!(register(&team("Gamma")).0, 409);
+
+    // Other terms stop uploads until a member has accepted them.
+    fs::write(&terms, "Be fair, and quick.").expect("a scratch file can be written");
+    assert!(publish(&terms).expect_success().contains("version 2"));
+    let of_team = |args: &[&str]| member(&server, &ada, "team", args);
+    let upload = || server.upload(&ada, vec![0x1f, 0x8b, 8, 0]).status();
+    assert_eq!(upload(), 403);
+    assert!(of_team(&["terms"]).expect_success().contains("Be fair, and quick."));
+    of_team(&["terms", "--accept", "7"]).expect_refusal(REFUSED, &["expected 2", "got 7"]);
+    of_team(&["terms", "--accept", "two"]).expect_refusal(USAGE_ERROR, &["--accept"]);
+    of_team(&["terms", "--accept", "2"]).expect_success();
+    assert_eq!(upload(), 201);
+
+    // Announcements, questions and their answers.
+    admin(&server, &["announce", "", "text"]).expect_refusal(REFUSED, &["title"]);
+    admin(&server, &["announce", "title", " "]).expect_refusal(REFUSED, &["text"]);
+    admin(&server, &["announce", "title"]).expect_refusal(USAGE_ERROR, &["<TEXT>"]);
+    admin(
+        &server,
+        &["announce", "No day on Sunday", "The power is off."],
+    )
+    .expect_success();
+    assert!(
+        admin(&server, &["questions"])
+            .expect_success()
+            .contains("no questions yet")
+    );
+    of_team(&["ask", ""]).expect_refusal(REFUSED, &["text"]);
+    of_team(&["ask", "May we use two arms?"]).expect_success();
+    let questions = admin(&server, &["questions", "--json"]).json();
+    let asked = id(&questions[0]);
+    admin(&server, &["answer", UNKNOWN_ID, "No."]).expect_refusal(REFUSED, &["404", "question"]);
+    admin(&server, &["answer", "first", "No."]).expect_refusal(USAGE_ERROR, &["first"]);
+    admin(&server, &["answer", &asked, ""]).expect_refusal(REFUSED, &["text"]);
+    admin(&server, &["answer", &asked, "No.", "--public"]).expect_success();
+    let news = of_team(&["news"]).expect_success();
+    for part in [
+        "No day on Sunday",
+        "The power is off.",
+        "May we use two arms?",
+        "→ No.",
+    ] {
+        assert!(news.contains(part), "{part:?} is not in {news}");
+    }
+}
+
+#[test]
+fn server_start_replaces_revoked_host_token() {
+    let scratch = tempfile::tempdir().expect("a scratch folder can be made");
+    let data = scratch.path().join("data");
+    let file = data.join("admin-token");
+    let by_file = |server: &Server, args: &[&str]| {
+        let folder = data.to_string_lossy();
+        let options = ["admin", "--server", &server.url, "--data-dir", &folder];
+        faceoff(&[&options[..], args].concat(), "")
+    };
+    let server = Server::start(&data, CONFIG);
+    let first = server.admin_token.clone();
+    let grace = invite_and_join(&server, &["invite-organiser", "Grace"], "Grace");
+    // A start with a valid token keeps the token.
+    server.kill();
+    let server = Server::start(&data, CONFIG);
+    assert_eq!(server.admin_token, first);
+    by_file(&server, &["people", "list"]).expect_success();
+
+    let list = admin_as(&server, &grace, &["token", "list", "--json"]).json();
+    let list = list.as_array().expect("a list");
+    let of_host = list.iter().find(|token| token["name"] == "admin-token");
+    let of_host = id(of_host.expect("the host has a token"));
+    // The host's token cannot be rotated: the file would keep the old one, and the next start would use it.
+    admin_as(&server, &grace, &["token", "rotate", &of_host])
+        .expect_refusal(REFUSED, &["data folder", "revoke it"]);
+    admin_as(&server, &grace, &["token", "revoke", &of_host]).expect_success();
+    by_file(&server, &["people", "list"]).expect_refusal(NOT_ALLOWED, &["401", "revoked"]);
+    server.kill();
+
+    let server = Server::start(&data, CONFIG);
+    assert_ne!(server.admin_token, first);
+    server.wait_for_log("was revoked; creating a new one", 1);
+    let mode = fs::metadata(&file)
+        .expect("the file exists")
+        .permissions()
+        .mode();
+    assert_eq!(mode & 0o777, 0o600);
+    by_file(&server, &["people", "list"]).expect_success();
+    admin_as(&server, &first, &["people", "list"]).expect_refusal(NOT_ALLOWED, &["401", "revoked"]);
+    admin_as(&server, &grace, &["people", "list"]).expect_success();
+    // A revoked token stays revoked, even if it is written back to the file.
+    server.kill();
+    fs::write(&file, format!("{first}\n")).expect("the file can be written");
+    let server = Server::start(&data, CONFIG);
+    assert_ne!(server.admin_token, first);
+    admin_as(&server, &first, &["people", "list"]).expect_refusal(NOT_ALLOWED, &["401", "revoked"]);
+    // A missing token is reported, too.
+    fs::remove_file(&file).expect("the file can be removed");
+    by_file(&server, &["people", "list"]).expect_refusal(
+        NOT_ALLOWED,
+        &["reading the organiser's token from", "--data-dir"],
+    );
+}

@@ -1,0 +1,48 @@
+import type { Kinematics } from "../model/kinematics";
+import type { Pose } from "../motion/pose";
+import type { Palette } from "./palette";
+import type { Part } from "./source";
+
+/** Layers switched on by the visitor. */
+export interface Layers {
+  seen: boolean;
+  real: boolean;
+  commanded: boolean;
+  puck: boolean;
+  /** Lines of the whole part instead of the last second only. */
+  whole: boolean;
+}
+
+/** Length of the trail in seconds. */
+export const TRAIL_S = 1;
+
+/** State to draw. One instance is updated for each frame. */
+export interface FrameState {
+  part: Part;
+  position: number;
+  readonly pose: Pose;
+  /** The arms on the table, set to the pose. */
+  readonly arms: readonly [Kinematics, Kinematics];
+  readonly layers: Layers;
+  /** Observed position of the puck; NaN without an observation. */
+  seenX: number;
+  seenY: number;
+  /** The camera has lost the puck. */
+  lost: boolean;
+}
+
+/** A renderer of table, puck and arms. */
+export interface View {
+  readonly canvas: HTMLCanvasElement;
+  /** Size in CSS pixels; `ratio`: device pixels per CSS pixel. */
+  resize(width: number, height: number, ratio: number): void;
+  paint(palette: Palette): void;
+  /** Draws and returns the number of draw calls. */
+  draw(frame: FrameState): number;
+}
+
+/** Positions of the start and end of the drawn lines. */
+export function trail(frame: FrameState): [number, number] {
+  if (frame.layers.whole) return [-Infinity, Infinity];
+  return [frame.position - TRAIL_S / frame.part.motion.stepS, frame.position];
+}

@@ -1,0 +1,132 @@
+// Extras of the dashboards: a progress bar for uploads, drag and drop, and live states of a validation run. Without
+// JavaScript everything works with forms and reloading.
+
+const EVERY_MS = 3000;
+
+function showStatus(form, text) {
+  let line = form.querySelector("[role=status]");
+  if (!line) {
+    line = document.createElement("p");
+    line.setAttribute("role", "status");
+    form.append(line);
+  }
+  line.textContent = text;
+}
+
+function addProgressBar(form) {
+  const progress = document.createElement("progress");
+  progress.setAttribute("aria-label", "Uploaded");
+  form.append(progress);
+  return progress;
+}
+
+// The error on the page of the response.
+function refusal(text) {
+  const page = new DOMParser().parseFromString(text, "text/html");
+  return page.querySelector("[role=alert]") ?? page.querySelector("main section p");
+}
+
+function showRefusal(form, alert, status) {
+  document.querySelector(".refused")?.remove();
+  const box = document.createElement("div");
+  box.className = "refused";
+  box.setAttribute("role", "alert");
+  if (alert) {
+    box.append(...Array.from(alert.childNodes, (node) => document.importNode(node, true)));
+  } else {
+    box.textContent = `The server refused the upload (status ${status}).`;
+  }
+  form.before(box);
+}
+
+function upload(form, event) {
+  event.preventDefault();
+  const button = form.querySelector("button");
+  const progress = addProgressBar(form);
+  const request = new XMLHttpRequest();
+  const done = () => {
+    progress.remove();
+    button.disabled = false;
+  };
+  button.disabled = true;
+  showStatus(form, "Uploading …");
+  request.upload.addEventListener("progress", (sent) => {
+    if (!sent.lengthComputable) return;
+    progress.max = sent.total;
+    progress.value = sent.loaded;
+    const percent = Math.floor((100 * sent.loaded) / sent.total);
+    progress.setAttribute("aria-valuetext", `${percent} %`);
+  });
+  request.upload.addEventListener("load", () => showStatus(form, "Sent. The server is storing the bundle …"));
+  request.addEventListener("load", () => {
+    if (request.status >= 200 && request.status < 300) {
+      location.assign(request.responseURL);
+      return;
+    }
+    done();
+    showStatus(form, "Upload failed.");
+    showRefusal(form, refusal(request.responseText), request.status);
+  });
+  request.addEventListener("error", () => {
+    done();
+    showStatus(form, "The connection was lost and nothing was stored. Upload again.");
+  });
+  request.open("POST", form.action);
+  request.send(new FormData(form));
+}
+
+function acceptDrops(form) {
+  const input = form.querySelector("input[type=file]");
+  const hint = document.createElement("p");
+  hint.className = "note";
+  hint.textContent = "Or drop the bundle here.";
+  input.after(hint);
+  const highlight = (isOver) => form.classList.toggle("over", isOver);
+  form.addEventListener("dragover", (event) => {
+    event.preventDefault();
+    highlight(true);
+  });
+  form.addEventListener("dragleave", () => highlight(false));
+  form.addEventListener("drop", (event) => {
+    event.preventDefault();
+    highlight(false);
+    if (event.dataTransfer.files.length !== 1) {
+      showStatus(form, "Drop one bundle at a time.");
+      return;
+    }
+    input.files = event.dataTransfer.files;
+    form.requestSubmit();
+  });
+}
+
+// Replaces sections with a changing state by their current content. Open or focused sections are left alone.
+async function follow() {
+  if (!document.querySelector("[data-moving]")) return;
+  const isBusy = document.hidden || document.querySelector("[data-live] details[open]");
+  if (!isBusy) {
+    try {
+      const address = new URL(location.href);
+      address.searchParams.delete("done");
+      const response = await fetch(address, { headers: { accept: "text/html" } });
+      if (response.ok && !response.redirected) {
+        const page = new DOMParser().parseFromString(await response.text(), "text/html");
+        for (const old of document.querySelectorAll("[data-live]")) {
+          const fresh = page.querySelector(`[data-live="${old.dataset.live}"]`);
+          const hasFocus = old.contains(document.activeElement);
+          if (fresh && !hasFocus && fresh.innerHTML !== old.innerHTML) {
+            old.replaceWith(document.importNode(fresh, true));
+          }
+        }
+      }
+    } catch {
+      // The server is not reachable at the moment: the next attempt follows.
+    }
+  }
+  setTimeout(follow, EVERY_MS);
+}
+
+for (const form of document.querySelectorAll("form[data-upload]")) {
+  form.addEventListener("submit", (event) => upload(form, event));
+  acceptDrops(form);
+}
+setTimeout(follow, EVERY_MS);
