@@ -1,4 +1,4 @@
-# Two commands matter: `make demo` plays a competition day, `make test` proves that it works.
+# The two main targets: `make demo` runs a competition day, `make test` runs all tests.
 
 # Variables a user may set:
 EPISODES ?= 50
@@ -15,12 +15,12 @@ ROUNDS   ?= 1
 COMMIT   ?= HEAD
 JSON     ?=
 
-# Tests wait for much of their time, so there are more at a time than CPUs.
+# Tests spend much of their time waiting, so more run at once than there are CPUs.
 TEST_THREADS ?= $(shell echo $$((3 * $$(nproc))))
 
 CARGO      ?= cargo
-# A folder's path may have spaces. So recipes quote each of these, and none is a target, a prerequisite or a word of one of make's functions,
-# which take a space for the end of a name.
+# Paths may contain spaces. So recipes quote these variables, and none is a target, a prerequisite or an argument of a make function, which
+# split names at spaces.
 TARGET_DIR := $(if $(CARGO_TARGET_DIR),$(CARGO_TARGET_DIR),target)
 RELEASE    := $(TARGET_DIR)/release
 DEMO       := $(TARGET_DIR)/demo
@@ -28,32 +28,32 @@ DEMO       := $(TARGET_DIR)/demo
 .PHONY: demo test tests-built tests-of-rust tests-of-python tests-of-api tests-of-agents tests-of-scripts test-release costs web wheel pictures test-api test-python test-learning fuzz busy load elsewhere crowd objects soak steady frames test-cgroup2 test-box test-engine lint format fidelity setup setup-test agents dist clean-demo help
 
 help:
-	@echo "make demo   play a competition day: EPISODES=$(EPISODES) SERVE=$(SERVE) LISTEN=$(LISTEN)"
+	@echo "make demo   run a competition day: EPISODES=$(EPISODES) SERVE=$(SERVE) LISTEN=$(LISTEN)"
 	@echo "make agents   bundle striker and baseline: $(TARGET_DIR)/bundles"
 	@echo "make dist   pack the program for other Linux machines: $(TARGET_DIR)/dist"
-	@echo "make test   run everything that proves that it works"
-	@echo "make test-release   build the release program, and check its size, its symbols and the golden hashes"
-	@echo "make costs   what building and testing take, from fresh clones: ONLY=$(ONLY) ROUNDS=$(ROUNDS) COMMIT=$(COMMIT) JSON=$(JSON)"
-	@echo "make web    the script of the replay pages: web/client/dist"
-	@echo "make wheel  the Python package: $(TARGET_DIR)/wheels"
-	@echo "make test-api   validate the API's document, try every operation, make two clients of it"
-	@echo "make test-python   make it, install it where nothing else is, test it"
-	@echo "make test-learning   learn from nothing, and try the libraries that need torch (8 GB)"
-	@echo "make test-cgroup2   the sandbox's limits on cgroup v2, in a virtual machine that has nothing else"
-	@echo "make test-box   make the images' file systems without an engine, and start what is in them"
-	@echo "make test-engine   build the images with Docker, and have a day played in containers; WHOLE=1 compiles there, too"
-	@echo "make fuzz   feed the readers what is nearly valid: MINUTES=$(MINUTES)"
-	@echo "make busy   play beside hogs, floods and bursts of processes"
-	@echo "make load   how much looking on a server bears, and that agents notice nothing of it"
-	@echo "make elsewhere   what it costs to play on another machine"
-	@echo "make crowd   what one server carries when many machines work for it: SHARDS=$(SHARDS) WORKERS=$(WORKERS) SLEEP_S=$(SLEEP_S)"
-	@echo "make objects   what files by JetStream's object store would take, against HTTP, on a link of 200 ms"
-	@echo "make soak   upload, play, read, fill the disk and kill the server, all at once: MINUTES=$(MINUTES)"
-	@echo "make steady run the tests ten times, and three times on a busy machine"
-	@echo "make frames   how much CPU time a frame of a replay takes its script"
-	@echo "make pictures   take the pictures of pages in README and docs/ anew"
-	@echo "make lint   format check and lints"
-	@echo "make fidelity   draw how far the simulator is from the recordings"
+	@echo "make test   run all tests"
+	@echo "make test-release   build the release program and check its size, symbols and golden hashes"
+	@echo "make costs   measure the cost of building and testing, from fresh clones: ONLY=$(ONLY) ROUNDS=$(ROUNDS) COMMIT=$(COMMIT) JSON=$(JSON)"
+	@echo "make web    build the script of the replay pages: web/client/dist"
+	@echo "make wheel  build the Python package: $(TARGET_DIR)/wheels"
+	@echo "make test-api   validate the OpenAPI document, call every operation, generate two clients"
+	@echo "make test-python   build the Python package, install it in an empty environment, test it"
+	@echo "make test-learning   train the learning examples from scratch, and test the libraries that need torch (8 GB)"
+	@echo "make test-cgroup2   test the sandbox's limits on cgroup v2, in a virtual machine without v1"
+	@echo "make test-box   build the images' file systems without a container engine, and start the programs in them"
+	@echo "make test-engine   build the images with Docker, and run a day in containers; WHOLE=1 also compiles there"
+	@echo "make fuzz   fuzz the parsers with almost valid input: MINUTES=$(MINUTES)"
+	@echo "make busy   run agents beside other load: CPU, memory, I/O and processes"
+	@echo "make load   measure how many page views a server handles, and check that agents are not affected"
+	@echo "make elsewhere   measure the overhead of a remote worker"
+	@echo "make crowd   measure the throughput of one server with many workers: SHARDS=$(SHARDS) WORKERS=$(WORKERS) SLEEP_S=$(SLEEP_S)"
+	@echo "make objects   compare file transfer by JetStream's object store and by HTTP, on a link of 200 ms"
+	@echo "make soak   upload, evaluate, read, fill the disk and kill the server, all at once: MINUTES=$(MINUTES)"
+	@echo "make steady run the tests ten times, and three times on a busy host"
+	@echo "make frames   measure the CPU time per frame of the replay script"
+	@echo "make pictures   take the screenshots of README and docs/ again"
+	@echo "make lint   check format and lints"
+	@echo "make fidelity   draw the differences between the simulator and the recordings"
 
 setup:
 	@docker/setup.sh build
@@ -61,18 +61,18 @@ setup:
 setup-test:
 	@docker/setup.sh test
 
-# The bundles of the compiled agents: folders a team could copy. The demo uploads striker; baseline is for test games.
-# Built by themselves, they need other features of their dependencies than beside the server: the demo builds all at once.
+# The bundles of the compiled agents. The demo uploads striker; baseline is for test games. Built alone, they use other features of their
+# dependencies than together with the server, so the demo builds all at once.
 agents: setup
 	$(CARGO) build --release --locked --package striker --package baseline
 	built="$(RELEASE)"; $(PACK_AGENTS)
 
-# The program in an archive; it refuses what only a newer system than the participants' could start.
+# The program in an archive. It fails if the program needs a newer system than the participants have.
 dist: setup
 	$(CARGO) build --release --locked --package faceoff
 	docker/dist.sh "$(RELEASE)/faceoff" "$(TARGET_DIR)/dist"
 
-# The release program is built, checked and packed; first its check (docker/check-program.sh) is tested itself.
+# Builds, checks and packs the release program, after a test of the check (docker/check-program.sh).
 test-release:
 	python3 docker/test_check_program.py
 	$(MAKE) --no-print-directory dist
@@ -91,17 +91,17 @@ demo: setup
 	    --bundle agents/hold --bundle "$(TARGET_DIR)/bundles/striker" --bundle agents/reckless \
 	    $(if $(filter 0,$(SERVE)),--no-serve)
 
-# Side by side what waits for much of its time: for a registry, for one program, for one of two CPUs. What Cargo says is told as it comes
-# (the + below), all else when it is complete.
+# Runs targets in parallel, since they wait much: for a registry, for one program, for one of two CPUs. Cargo's output is printed at once
+# (the + below), other output when a target is complete.
 SIDE_BY_SIDE = $(MAKE) --no-print-directory --output-sync=target --keep-going --jobs
 
 test: setup-test
 	$(SIDE_BY_SIDE) tests-built tests-of-agents tests-of-scripts
 	$(SIDE_BY_SIDE) tests-of-rust tests-of-python tests-of-api
 
-# Parts of `make test`, in two rounds: Rust's tests use what those of the agents and pages install.
-# The programs first: the end-to-end tests run the real binary and the real agents. With --tests the
-# dependencies get the same features as in the run below, and are not built twice.
+# Parts of `make test`, in two rounds: the Rust tests use tools that the tests of agents and pages install.
+# The programs are built first, since the end-to-end tests run the real binary and the real agents. With --tests the
+# dependencies get the same features as in the test run below, and are built only once.
 tests-built:
 	+$(CARGO) build --locked --workspace --bins --tests
 	tests/runtimes.sh "$(TARGET_DIR)"
@@ -117,17 +117,18 @@ tests-of-agents:
 	python3 agents/test_agents.py
 	web/client/build.sh test
 	TARGET_DIR="$(TARGET_DIR)" tests/s3/setup.sh
-# The scripts that check a release and measure builds, on small programs and a small project.
+# Tests of the scripts that check a release and measure builds, on small programs and a small project.
 tests-of-scripts:
 	python3 docker/test_check_program.py
 	python3 tests/costs/test_costs.py
+	python3 tests/words/test_words.py
 
-# Measures HEAD or COMMIT from fresh clones and prints a table; nothing else should run. ONLY: of demo, test, page, store, release,
-# crates, lines. ROUNDS: of demo, test and release. JSON=FILE: the numbers there, too. TMPDIR=FOLDER: clones are made there.
+# Measures HEAD or COMMIT from fresh clones and prints a table; run it on an idle machine. ONLY: some of demo, test, page, store, release,
+# crates, lines. ROUNDS: of demo, test and release. JSON=FILE also writes the numbers there. TMPDIR=FOLDER: folder of the clones.
 costs: setup-test
 	@python3 tests/costs/costs.py --only '$(ONLY)' --rounds $(ROUNDS) --commit '$(COMMIT)' $(if $(JSON),--json '$(JSON)')
 
-# The script of the replay pages, from its sources; what it makes is committed.
+# The script of the replay pages, from its sources; the output is committed.
 web:
 	web/client/build.sh build
 
@@ -135,96 +136,97 @@ web:
 wheel: setup
 	TARGET_DIR="$(TARGET_DIR)" crates/faceoff-py/test.sh wheel
 
-# The API as strangers' tools see it: a validator, a fuzzer and two generators of clients, against the debug server.
+# The API with external tools: a validator, a fuzzer and two client generators, against the debug server.
 test-api: setup-test
 	$(CARGO) build --locked --workspace --bins --tests
 	TARGET_DIR="$(TARGET_DIR)" tests/api/test.sh
 
-# The evaluator in Python is compared with the binary's, and the examples play in the sandbox.
+# Compares the Python evaluator with the binary, and runs the examples in the sandbox.
 test-python: setup-test
 	$(CARGO) build --locked --workspace --bins --tests
 	tests/runtimes.sh "$(TARGET_DIR)"
 	TARGET_DIR="$(TARGET_DIR)" crates/faceoff-py/test.sh test
 
-# What takes long and gigabytes: the examples learned anew, Stable-Baselines3 and LeRobot themselves.
+# Takes long and gigabytes: trains the examples again, with Stable-Baselines3 and LeRobot.
 test-learning: agents
 	$(CARGO) build --release --locked --package faceoff
 	TARGET_DIR="$(TARGET_DIR)" crates/faceoff-py/test.sh learning
 
-# Most hosts have the one version of the interface or the other: here this one, whatever the host has. As root.
+# Tests cgroup v2 on any host, also on one with v1. As root.
 test-cgroup2: setup
 	@docker/setup.sh cgroup2
 	$(CARGO) build --locked --workspace --bins --tests
 	TARGET_DIR="$(TARGET_DIR)" docker/cgroup2.sh
 
-# The steps of docker/Dockerfile, and the configurations of Compose and Kubernetes. As root.
+# Runs the steps of docker/Dockerfile, and checks the configurations of Compose and Kubernetes. As root.
 test-box: setup
 	@docker/setup.sh box
 	$(CARGO) build --locked --workspace --bins --tests
 	TARGET_DIR="$(TARGET_DIR)" docker/test-box.sh
 
-# The same by a real engine, a Docker of its own. As root. WHOLE=1: the program is compiled in an image, too, which takes long.
+# The same with a separate Docker engine. As root. WHOLE=1 also compiles the program in an image, which takes long.
 test-engine: setup
 	@docker/setup.sh engine
 	$(CARGO) build --locked --workspace --bins --tests
 	WHOLE=$(WHOLE) TARGET_DIR="$(TARGET_DIR)" docker/test-engine.sh
 
-# The fuzz targets, all at once for so many minutes; FUZZ_SEED=N for other inputs than last time.
+# All fuzz targets at once for MINUTES; FUZZ_SEED=N gives other inputs.
 fuzz: setup-test
 	FUZZ_MINUTES=$(MINUTES) $(CARGO) test --release --locked --package faceoff-runner --test it fuzz:: \
 	    -- --nocapture --test-threads 4
 
-# What other load costs agents: nothing. Alone, for it takes all of the machine that it can get.
+# Checks that other load does not affect agents. Run it alone: it uses all CPUs.
 busy: setup-test
 	$(CARGO) build --locked --workspace --bins --tests
 	$(CARGO) test --locked --workspace --test e2e busy_host -- --include-ignored --test-threads 1
 
-# Visitors by the hundred, beside evaluations, on the machine's own CPUs; nothing else should run.
+# Hundreds of visitors beside evaluations, on the same CPUs; run it on an idle machine.
 load:
 	@docker/setup.sh load
 	$(CARGO) build --release --locked --package faceoff --package striker --package baseline
 	python3 tests/load/load.py "$(RELEASE)/faceoff" "$(RELEASE)/striker"
 
-# A slot of a worker against one of the server's own; nothing else should run.
+# Compares a slot of a remote worker with a slot of the server; run it on an idle machine.
 elsewhere: setup-test
 	$(CARGO) build --release --locked --package faceoff
 	python3 tests/load/remote_slot.py "$(RELEASE)/faceoff"
 
-# Many workers that sleep in place of playing, for one server; nothing else should run. TMPDIR=FOLDER: on that disk.
+# Many workers that sleep instead of running agents, for one server; run it on an idle machine. TMPDIR=FOLDER selects the disk.
 crowd: setup-test
 	$(CARGO) build --release --locked --package faceoff --package faceoff-tests --bin faceoff --example crowd
 	SHARDS=$(SHARDS) WORKERS=$(WORKERS) SLEEP_S=$(SLEEP_S) RECORDING_BYTES=$(RECORDING_BYTES) "$(RELEASE)/examples/crowd"
 
-# The same files by JetStream's object store and by HTTP, without a delay and with 200 ms there and back; some five minutes.
+# Transfers files by JetStream's object store and by HTTP, without delay and with a round trip of 200 ms; about five minutes.
 objects: setup-test
 	$(CARGO) build --release --locked --package faceoff-tests --example objects
 	"$(RELEASE)/examples/objects"
 
-# All disturbances at once; SOAK_SEED=N for other moments than last time.
+# All disturbances at once; SOAK_SEED=N gives other times.
 soak: setup-test
 	$(CARGO) build --locked --workspace --bins --tests
 	SOAK_MINUTES=$(MINUTES) $(CARGO) test --locked --workspace --test e2e soak:: -- --include-ignored --nocapture
 
-# No verdict may depend on how busy the machine is.
+# Checks that no test result depends on the load of the machine.
 steady:
 	@docker/setup.sh steady
 	@tests/steady.sh
 
-# The pictures and numbers of docs/simulator.md.
+# The figures and numbers of docs/simulator.md.
 fidelity:
 	$(CARGO) run --locked -p faceoff-sim --example fidelity -- docs/images/fidelity
 
-# The pictures of pages in the README and docs/, from a day that is played for them.
+# The screenshots in README and docs/, from an evaluation day that is run for them.
 pictures: setup-test
 	$(CARGO) build --locked --workspace --bins --tests
 	$(CARGO) test --locked --workspace --test e2e pictures:: -- --include-ignored
 
-# Of the replay's script: so many milliseconds are the machine's, which is why no other test asks.
+# CPU time of the replay script. It depends on the machine, so no other test checks it.
 frames: setup-test
 	$(CARGO) build --locked --workspace --bins --tests
 	$(CARGO) test --locked --workspace --test e2e replay::frames_need_little_script_time -- --include-ignored --nocapture
 
 lint:
+	python3 tests/words/words.py
 	$(CARGO) fmt --all --check
 	$(CARGO) clippy --locked --workspace --all-targets -- -D warnings
 	$(CARGO) build --locked --workspace --benches --examples

@@ -1,6 +1,6 @@
-"""Speaks the protocol with the Python reference agents, as the evaluator does: python3 -m unittest.
+"""Tests the Python reference agents over the protocol: python3 -m unittest.
 
-What they do to the robot is tested end to end, with the simulator.
+Their effect on the robot is tested end to end, with the simulator.
 """
 
 import json
@@ -13,8 +13,8 @@ import unittest
 from pathlib import Path
 
 AGENTS = Path(__file__).parent
-# Seconds for an agent to end; only a dead machine needs more.
-PATIENCE = 600
+# Seconds for an agent to exit, more than on the slowest machine.
+EXIT_TIMEOUT_S = 600
 POSE = [0.0, -0.1961, 0.0, -1.8436, 0.0, 0.9704, 0.0]
 POS_LIMIT = [2.96706, 2.0944, 2.96706, 2.0944, 2.96706, 2.0944, 3.05433]
 VEL_LIMIT = [math.radians(limit) for limit in (85, 85, 100, 75, 130, 135, 135)]
@@ -36,7 +36,7 @@ ENV = {
 
 
 class Agent:
-    """A bundle's program, started by its manifest."""
+    """A running program of a bundle, started by its manifest."""
 
     def __init__(self, name, task="hit"):
         folder = AGENTS / name
@@ -72,10 +72,10 @@ class Agent:
         return answer["action"]
 
 
-class EveryAgent(unittest.TestCase):
+class AllAgents(unittest.TestCase):
     names = ["hold", "reckless", "starter"]
 
-    def test_speaks_the_protocol_from_hello_to_bye(self):
+    def test_agents_follow_the_protocol_from_hello_to_bye(self):
         for name in self.names:
             for task in ("hit", "defend", "prepare", "tournament"):
                 with self.subTest(name, task=task), Agent(name, task) as agent:
@@ -91,24 +91,24 @@ class EveryAgent(unittest.TestCase):
                             self.assertTrue(all(math.isfinite(x) for row in action for x in row))
                         agent.send({"type": "end", "episode": episode, "steps": 500})
                     agent.send({"type": "bye"})
-                    self.assertEqual(agent.process.wait(timeout=PATIENCE), 0)
+                    self.assertEqual(agent.process.wait(timeout=EXIT_TIMEOUT_S), 0)
 
-    def test_ends_when_the_evaluator_goes_away(self):
+    def test_agents_end_with_the_input(self):
         for name in self.names:
             with self.subTest(name), Agent(name) as agent:
                 agent.process.stdin.close()
-                self.assertEqual(agent.process.wait(timeout=PATIENCE), 0)
+                self.assertEqual(agent.process.wait(timeout=EXIT_TIMEOUT_S), 0)
                 agent.process.stdin = None
 
-    def test_manifest_and_protocol_are_those_of_the_folder(self):
-        shell = (AGENTS.parent / "crates/faceoff-py/python/faceoff/agent.py").read_bytes()
+    def test_manifests_and_protocol_copies_are_consistent(self):
+        protocol = (AGENTS.parent / "crates/faceoff-py/python/faceoff/agent.py").read_bytes()
         for name in self.names:
             self.assertEqual(tomllib.loads((AGENTS / name / "agent.toml").read_text())["name"], name)
-            self.assertEqual((AGENTS / name / "protocol.py").read_bytes(), shell)
+            self.assertEqual((AGENTS / name / "protocol.py").read_bytes(), protocol)
 
 
 class Hold(unittest.TestCase):
-    def test_keeps_the_first_pose_of_each_episode_however_the_arm_sags(self):
+    def test_hold_keeps_the_first_pose_of_each_episode(self):
         with Agent("hold") as agent:
             for episode, offset in enumerate((0.0, 0.05)):
                 agent.reset(episode)
@@ -119,7 +119,7 @@ class Hold(unittest.TestCase):
 
 
 class Reckless(unittest.TestCase):
-    def test_runs_to_both_ends_of_every_range_at_full_speed(self):
+    def test_reckless_runs_to_both_ends_at_full_speed(self):
         with Agent("reckless") as agent:
             agent.reset(0)
             actions = [agent.step(step, POSE) for step in range(500)]
@@ -133,7 +133,7 @@ class Reckless(unittest.TestCase):
 
 
 class Starter(unittest.TestCase):
-    """Its geometry, and that it keeps its limits whatever it sees."""
+    """The geometry and limits of the starter agent."""
 
     @classmethod
     def setUpClass(cls):
@@ -142,29 +142,29 @@ class Starter(unittest.TestCase):
 
         cls.arm = arm
 
-    def test_joint_angles_lead_to_the_point_they_were_made_for(self):
+    def test_joint_angles_reach_their_point(self):
         for x in (0.6, 0.65, 0.8, 1.0, 1.2):
             for y in (-0.45, -0.2, 0.0, 0.3):
                 q = self.arm.joints_at(x, y, 0.1645)
-                there = self.arm.mallet_at(q)
-                self.assertAlmostEqual(there[0], x, 9)
-                self.assertAlmostEqual(there[1], y, 9)
+                reached = self.arm.mallet_at(q)
+                self.assertAlmostEqual(reached[0], x, 9)
+                self.assertAlmostEqual(reached[1], y, 9)
                 self.assertTrue(all(abs(a) < 0.95 * limit for a, limit in zip(q, POS_LIMIT)), (x, y, q))
-        for angle, home in zip(self.arm.joints_at(0.65, 0.0, 0.1645), POSE):
-            self.assertAlmostEqual(angle, home, 3)
+        for angle, start in zip(self.arm.joints_at(0.65, 0.0, 0.1645), POSE):
+            self.assertAlmostEqual(angle, start, 3)
 
-    def test_keeps_its_limits_whatever_the_puck_does(self):
-        """Pucks at random places that jump, vanish and race: the arm never does."""
-        chance = random.Random(2023)
+    def test_starter_keeps_its_limits_under_any_puck(self):
+        """Pucks at random positions that jump, vanish and move fast."""
+        rng = random.Random(2023)
         for task in ("hit", "defend", "prepare", "tournament"):
             with self.subTest(task), Agent("starter", task) as agent:
                 agent.reset(0)
                 last, puck = POSE, (1.0, 0.0, 0.0, 0.0, 0.0, 0.0)
                 for step in range(3000):
-                    if chance.random() < 0.05:
-                        place = (chance.uniform(0.5, 2.5), chance.uniform(-0.52, 0.52), 0.0)
-                        puck = (*place, chance.gauss(0, 1.5), chance.gauss(0, 1.5), chance.gauss(0, 10))
-                    if chance.random() < 0.03:
+                    if rng.random() < 0.05:
+                        puck_pose = (rng.uniform(0.5, 2.5), rng.uniform(-0.52, 0.52), 0.0)
+                        puck = (*puck_pose, rng.gauss(0, 1.5), rng.gauss(0, 1.5), rng.gauss(0, 10))
+                    if rng.random() < 0.03:
                         puck = (*puck[:3], 0.0, 0.0, 0.0)
                     pose, speeds = agent.step(step, last, task in ("hit", "tournament"), puck)
                     for before, q, dq, limit in zip(last, pose, speeds, VEL_LIMIT):
@@ -175,15 +175,15 @@ class Starter(unittest.TestCase):
                     self.assertLess(abs(y), 0.519 - 0.04815)
                     last = pose
 
-    def test_strikes_a_puck_that_lies_in_front_of_it(self):
+    def test_starter_strikes_a_puck_in_front_of_it(self):
         with Agent("starter", "tournament") as agent:
             agent.reset(0)
-            pose, ahead = POSE, []
+            pose, positions = POSE, []
             for step in range(250):
                 pose, _ = agent.step(step, pose, puck=(1.0, 0.2, 0.0, 0.0, 0.0, 0.0))
-                ahead.append(self.arm.mallet_at(pose))
-            nearest = min(math.dist(at, (1.0, 0.2)) for at in ahead)
-            self.assertLess(nearest, 0.03165 + 0.04815, "it never touched the puck")
+                positions.append(self.arm.mallet_at(pose))
+            nearest = min(math.dist(at, (1.0, 0.2)) for at in positions)
+            self.assertLess(nearest, 0.03165 + 0.04815, "the mallet must touch the puck")
 
 
 if __name__ == "__main__":

@@ -1,28 +1,28 @@
 #!/bin/sh
-# Tries the sandbox's limits on version 2 of the cgroup interface, whatever this host has: boots Debian's kernel in a virtual
-# machine without version 1, whose root is this host's, read-only and with a layer in memory above it, and runs what was built.
+# Tests the sandbox's limits on cgroup v2, on any host: boots Debian's kernel in a virtual machine without v1 and runs the built
+# tests. The machine's root is this host's root, read-only, with a layer in memory.
 #
 #   TARGET_DIR=target docker/cgroup2.sh      (after cargo build --workspace --bins --tests; docker/setup.sh cgroup2)
 #
-# CGROUP2_TIMEOUT_S ends a machine that hangs. Kernel and log stay in TARGET_DIR/cgroup2. The CPU is emulated, which takes minutes: on
-# a host that is itself a virtual machine, an ordinary kernel may hang with the /dev/kvm that is there, and nothing tells before.
+# CGROUP2_TIMEOUT_S ends a hanging machine. Kernel and log stay in TARGET_DIR/cgroup2. The CPU is emulated, which takes minutes: if the
+# host is itself a virtual machine, a kernel may hang with /dev/kvm, and this cannot be detected in advance.
 #
-# A process meets its cgroup in one of five ways, and each of them is tried:
-#   top        in the hierarchy's real top. It is the one cgroup that may have processes and give out controllers at once.
-#   leaf       in a cgroup below, as root: it is busy (it has processes), so it gives out no controller until they have moved.
-#   container  in the top of a cgroup namespace. It looks like the real one and is busy like any other.
-#   user       in a cgroup that an ordinary user was given, as by systemd's Delegate=yes.
-#   image      as container, through docker/entrypoint.sh, which does both: it empties the top and gives it to an ordinary user; and
-#              in a busy cgroup without a namespace, as privileged pods are.
+# A process can have one of five kinds of cgroup, and all are tested:
+#   top        the real root cgroup. Only this one may have processes and enable controllers for children at once.
+#   leaf       a cgroup below it, as root. It is busy (it has processes), so it cannot enable controllers until they have moved.
+#   container  the root of a cgroup namespace. It looks like the real root and is busy like any other.
+#   user       a cgroup that was delegated to an ordinary user, as by systemd's Delegate=yes.
+#   image      as container, through docker/entrypoint.sh, which empties the root and delegates it to an ordinary user; also a busy
+#              cgroup without a namespace, as in privileged pods.
 set -eu
 : "${TARGET_DIR:=target}" "${CGROUP2_TIMEOUT_S:=3600}"
 folder=$(dirname "$(realpath "$0")")
 if [ "$(uname -m)" != x86_64 ]; then
-    echo "error: this script knows the virtual machines of x86_64 only, and this is $(uname -m)" >&2
+    echo "error: this script supports only x86_64, and this is $(uname -m)" >&2
     exit 1
 fi
 program=$(realpath "$TARGET_DIR/debug/faceoff")
-# Every crate's integration tests are called `it`: the newest that have this module.
+# The integration tests of every crate are called `it`: select the newest binary with this module.
 tests_with() { # tests_with MODULE CRATE
     found=$(find "$(realpath "$TARGET_DIR/debug/deps")" -name 'it-*' ! -name '*.*' -type f -perm -u+x -printf '%T@ %p\n' | sort -rn |
         cut -d' ' -f2- | while IFS= read -r candidate; do
@@ -41,7 +41,7 @@ tests=$(tests_with process_limits faceoff-sandbox)
 runner_tests=$(tests_with early_cpu_time faceoff-runner)
 work=$(mkdir -p "$TARGET_DIR/cgroup2" && realpath "$TARGET_DIR/cgroup2")
 
-# The kernel is unpacked, not installed: nothing of it reaches this host's /boot.
+# The kernel is unpacked, not installed: this host's /boot does not change.
 package=$(apt-cache depends linux-image-amd64 | awk '$1 == "Depends:" { print $2; exit }')
 if [ ! -e "$work/$package" ]; then
     rm -rf "$work/unpacked"
@@ -59,7 +59,7 @@ version=${package#linux-image-}
 modules=$initramfs/lib/modules/$version
 mkdir -p "$initramfs/bin" "$modules" "$initramfs/host" "$initramfs/memory" "$initramfs/root"
 cp "$(command -v busybox)" "$initramfs/bin/busybox"
-# Some kernels have built in, or joined, some of them.
+# In some kernels some of these modules are built in or merged.
 for module in virtio virtio_ring virtio_pci_legacy_dev virtio_pci_modern_dev virtio_pci netfs fscache 9pnet 9pnet_virtio 9p overlay; do
     find "$work/$package/lib/modules" \( -name "$module.ko" -o -name "$module.ko.xz" \) -exec cp {} "$modules" \;
 done
@@ -67,7 +67,7 @@ find "$modules" -name '*.xz' -exec xz -d {} +
 busybox depmod -b "$initramfs" "$version"
 cat >"$initramfs/init" <<'END'
 #!/bin/busybox sh
-# When a step fails, process 1 ends, the kernel panics, and the machine is off.
+# If a step fails, process 1 ends, the kernel panics, and the machine stops.
 set -eu
 /bin/busybox mkdir -p /proc /sys /dev
 /bin/busybox mount -t proc proc /proc
@@ -86,7 +86,7 @@ done
 /bin/busybox mount -t cgroup2 cgroup2 /root/sys/fs/cgroup
 /bin/busybox mkdir -p /root/dev/shm /root/dev/pts
 /bin/busybox mount -t devpts pts /root/dev/pts
-# Not /tmp, which may hold the repository: the host's is as good, with the layer above it.
+# Not /tmp, which may contain the repository: the host's /tmp with the layer in memory works too.
 for folder in run dev/shm; do
     /bin/busybox mount -t tmpfs -o mode=1777 memory "/root/$folder"
 done
@@ -109,16 +109,16 @@ expect() { # expect NAME COMMAND…
     shift
     "$@" || failed="$failed $name"
 }
-# The sandbox's own tests that meet a cgroup: limits, ends, CPUs, and what a killed service leaves.
+# The sandbox's tests that use a cgroup: limits, exits, CPUs, and cleanup after a killed service.
 limits() {
     "$tests" --test-threads 1 resource_limits:: process_limits:: cpu_limits:: cpu_count:: process_cleanup:: \
         killed_service:: exit_causes:: probe:: normal_operation:: channel_blocking::
 }
-# The evaluator's, attacked by agents that hold it, or that compute while nobody waits for them.
+# The evaluator's tests with agents that block it, or that compute before they are asked.
 attacks() {
     "$runner_tests" --test-threads 1 early_cpu_time:: supervision:: unread_questions:: waits_of_helpers
 }
-# All of doctor's layers, with version 2 in three of them. The exit status alone would leave out by which version.
+# All checks of doctor, three of them with cgroup v2. The exit status alone does not show the version.
 doctor() {
     cd "$TMPDIR" && "$program" doctor >doctor.$$
     status=$?
@@ -136,24 +136,24 @@ uname -sr
 grep cgroup /proc/mounts
 ip link set lo up 2>/dev/null || /bin/busybox ip link set lo up
 echo "controllers: $(cat $top/cgroup.controllers)"
-# An agent that asks for more than this machine has is to meet its limit, not a kernel that gives nothing out at all.
+# An agent that requests more memory than this machine has must reach its limit, not a refusal of the kernel.
 echo 1 >/proc/sys/vm/overcommit_memory
-# An ordinary user has no way into a home folder; here it does, in memory.
+# An ordinary user cannot enter a home folder; allow it here, in the layer in memory.
 for path in "$tests" "$runner_tests" "$program" "$repository/tests/agents/exceeds_limits.py"; do
     while path=$(dirname "$path") && [ "$path" != / ]; do chmod a+x "$path"; done
 done
 
-case_is "top: doctor in the hierarchy's real top, with all processes of this machine"
+case_is "top: doctor in the real root cgroup, with all processes of this machine"
 expect top-doctor sh "$0" run doctor
-# As it was: the cases below are given the controllers by name.
+# Restore the initial state: the cases below enable the controllers by name.
 for group in $top/*/; do rmdir "$group" 2>/dev/null; done
 echo '+memory +pids +cpu +cpuset' >$top/cgroup.subtree_control || failed="$failed controllers"
 
 case_is "leaf: doctor, then the sandbox's tests, as root in a busy cgroup"
 mkdir $top/leaf
-# The kernel's word is EBUSY for memory. Processes and CPU time it lets a busy cgroup give out, which thereby becomes a threaded one: then
-# memory is refused with EOPNOTSUPP, and a group below takes no process in.
-printf 'a busy cgroup does not give out memory: '
+# The kernel returns EBUSY for memory. A busy cgroup can enable pids and cpu, and then becomes a threaded one: memory is refused with
+# EOPNOTSUPP, and child groups accept no process.
+printf 'a busy cgroup cannot enable memory: '
 sh -c "echo 0 >$top/leaf/cgroup.procs; echo +memory >$top/leaf/cgroup.subtree_control" 2>&1 && failed="$failed leaf-busy"
 expect leaf-doctor sh -c "echo 0 >$top/leaf/cgroup.procs; exec sh '$0' run doctor"
 mkdir $top/leaf-tests
@@ -163,7 +163,7 @@ case_is "leaf: agents that attack the evaluator's clock, as root in a busy cgrou
 mkdir $top/leaf-attacks
 expect leaf-attacks sh -c "echo 0 >$top/leaf-attacks/cgroup.procs; exec sh '$0' run attacks"
 
-case_is "container: the same in the top of a cgroup namespace"
+case_is "container: the same in the root of a cgroup namespace"
 mkdir $top/container
 expect container sh -c "echo 0 >$top/container/cgroup.procs
     exec unshare --cgroup --mount sh -c 'umount $top && mount -t cgroup2 cgroup2 $top && cat /proc/self/cgroup &&
@@ -175,7 +175,7 @@ chown 1234:1234 $top/user $top/user/cgroup.procs $top/user/cgroup.threads $top/u
 expect user sh -c "echo 0 >$top/user/cgroup.procs
     exec setpriv --reuid 1234 --regid 1234 --clear-groups sh -c 'sh $0 run doctor && sh $0 run limits'"
 
-case_is "image: the same as the image's user, through docker/entrypoint.sh in the top of a cgroup namespace"
+case_is "image: the same as the image's user, through docker/entrypoint.sh in the root of a cgroup namespace"
 useradd --system --user-group --uid 990 faceoff
 mkdir $top/image
 expect image sh -c "echo 0 >$top/image/cgroup.procs
@@ -186,17 +186,17 @@ case_is "image: doctor in a busy cgroup without a namespace of its own, as in pr
 mkdir $top/pod
 expect image-pod sh -c "echo 0 >$top/pod/cgroup.procs; exec \"\$entrypoint\" sh $0 run doctor"
 
-case_is "partial: doctor in a busy cgroup that is offered pids and cpu, and no memory"
+case_is "partial: doctor in a busy cgroup with the controllers pids and cpu, without memory"
 mkdir $top/partial
 echo '+pids +cpu' >$top/partial/cgroup.subtree_control
 mkdir $top/partial/service
-# What is missing there is memory alone.
+# Only memory is missing there.
 expect partial sh -c "echo 0 >$top/partial/service/cgroup.procs; cd $TMPDIR; '$program' doctor >partial; cat partial
     [ \"\$(grep -c 'cgroup v2, limits accepted' partial)\" = 2 ]"
 
-case_is "what is left"
+case_is "remaining cgroups"
 find $top -type d -name 'agent-*' | grep . && failed="$failed left-behind"
-[ -z "$failed" ] && echo "everything passed" || echo "failed:$failed"
+[ -z "$failed" ] && echo "all cases passed" || echo "failed:$failed"
 echo "result:${failed:- passed}" >/dev/ttyS1
 sync
 /bin/busybox poweroff -f
@@ -207,7 +207,7 @@ rm -rf "$initramfs"
 
 rm -f "$work/result"
 echo "booting $package; the log is $work/log"
-# With a file as input it takes no keys of the terminal, and stops for none.
+# With /dev/null as input it does not read the terminal.
 timeout --kill-after=10 "$CGROUP2_TIMEOUT_S" qemu-system-x86_64 -accel tcg -cpu max -smp 2 -m 4096 \
     -nodefaults -no-user-config -display none -no-reboot \
     -kernel "$work/$package"/boot/vmlinuz-* -initrd "$work/initramfs.gz" \
@@ -218,7 +218,7 @@ case $(tr -d '\r' <"$work/result" 2>/dev/null) in
 "result: passed") ;;
 result:*) exit 1 ;;
 *)
-    echo "error: the machine ended, or was ended after $CGROUP2_TIMEOUT_S s, before its tests did" >&2
+    echo "error: the machine ended before its tests, or was stopped after $CGROUP2_TIMEOUT_S s" >&2
     exit 1
     ;;
 esac

@@ -1,6 +1,6 @@
 #!/bin/sh
-# Checks a release program before others get it: its size, that it carries no symbols, and that its simulator computes the ruleset's bits.
-# Names all defects, not only the first.
+# Checks a release program before its publication: its size, that it has no symbols, and that its simulator gives the golden hashes of the
+# ruleset. Reports all defects, not only the first.
 # usage: check-program.sh PROGRAM      (PROGRAM: for example target/release/faceoff)
 set -eu
 if [ $# -ne 1 ]; then
@@ -9,7 +9,7 @@ if [ $# -ne 1 ]; then
 fi
 program=$(realpath "$1")
 golden=$(dirname "$(dirname "$(realpath "$0")")")/tests/golden/simulator.txt
-# A bound on what dependencies and generic code add; in this place alone.
+# Limit for growth by dependencies and generic code; defined only here.
 most_bytes=40000000
 
 wrong=''
@@ -24,20 +24,20 @@ if ! sections=$(LC_ALL=C readelf --sections --wide "$program" 2>/dev/null); then
 fi
 surplus=$(printf '%s\n' "$sections" | grep -oE ' \.(symtab|z?debug_[a-z_]+)' | tr -d '\n' || true)
 if [ -n "$surplus" ]; then
-    refuse "carries what only debuggers read:$surplus. Set \`strip = \"symbols\"\` in [profile.release] of Cargo.toml, and have no" \
+    refuse "has sections for debuggers:$surplus. Set \`strip = \"symbols\"\` in [profile.release] of Cargo.toml, and have no" \
         "[profile.release.package.faceoff]: with it, cargo does not strip the program. \`cargo build --profile symbols\` is for debuggers"
 fi
 bytes=$(wc -c <"$program")
 if [ "$bytes" -gt "$most_bytes" ]; then
-    refuse "has $bytes bytes, and $most_bytes is the most that it may have. \`make costs ONLY=release,crates\` says of what sections they are" \
-        "and docs/contributing/building.md what has made it smaller; the bound is in docker/check-program.sh"
+    refuse "has $bytes bytes, at most $most_bytes are allowed. \`make costs ONLY=release,crates\` lists its sections" \
+        "and docs/contributing/building.md says how its size was reduced; the limit is in docker/check-program.sh"
 fi
 if ! computed=$("$program" sim golden); then
     refuse "does not run \`faceoff sim golden\`, which prints the hashes of the simulator's golden episodes and games"
 elif [ "$computed" != "$(cat "$golden")" ]; then
     printf '%s\n' "$computed" | diff "$golden" - >&2 || true
-    refuse "computes other golden hashes (>) than $golden has (<), so its episodes are not the ruleset's. If \`make test\`" \
-        "finds the golden hashes, the release profile or its compiler changes the simulator's arithmetic: undo that. A change that is meant" \
+    refuse "computes other golden hashes (>) than $golden has (<), so its episodes differ from the ruleset's. If \`make test\`" \
+        "passes, the release profile or its compiler changes the simulator's arithmetic: undo that. An intended change" \
         "needs a new ruleset"
 fi
 [ -z "$wrong" ] || exit 1

@@ -1,6 +1,6 @@
 #!/bin/sh
-# Packs the program for other machines: any Linux of this architecture whose C library is not older than asked for.
-# What is packed has passed check-program.sh.
+# Packs the program for other Linux machines of this architecture with the C library below or a newer one.
+# The packed program has passed check-program.sh.
 # usage: dist.sh PROGRAM FOLDER      (PROGRAM: for example target/release/faceoff)
 set -eu
 if [ $# -ne 2 ]; then
@@ -8,16 +8,16 @@ if [ $# -ne 2 ]; then
     exit 2
 fi
 program=$1 folder=$2
-# Debian 12, Ubuntu 22.04, Fedora 35 and RHEL 9 have this one or a newer one.
+# Debian 12, Ubuntu 22.04, Fedora 35 and RHEL 9 have this version or a newer one.
 newest_glibc=2.34
 
 needed=$(objdump -T "$program" | grep -o 'GLIBC_[0-9][0-9.]*' | sort -uV | tail -1)
 needed=${needed#GLIBC_}
 if [ "$(printf '%s\n' "$needed" "$newest_glibc" | sort -V | tail -1)" != "$newest_glibc" ]; then
-    echo "error: $program needs glibc $needed, and $newest_glibc is the newest that may be needed: build on an older system" >&2
+    echo "error: $program needs glibc $needed, at most $newest_glibc is allowed: build on an older system" >&2
     exit 1
 fi
-# What a slim system lacks must not be needed.
+# It may only need libraries that every system has.
 others=$(objdump -p "$program" | awk '$1 == "NEEDED" { print $2 }' | grep -Ev '^(libc|libm|libgcc_s|ld-linux-.*)\.so' || true)
 if [ -n "$others" ]; then
     echo "error: $program needs libraries that not every Linux has: $others" >&2

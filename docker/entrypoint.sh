@@ -1,22 +1,22 @@
 #!/bin/sh
-# Starts the program in a container: gives the ordinary user `faceoff` the container's control group, and becomes that user.
+# Starts the program in a container: delegates the container's control group to the ordinary user `faceoff`, and changes to that user.
 # usage: entrypoint.sh COMMAND …
 #
-# In a control group with processes of its own no memory limit can be given to a group below, and a container's own group has
-# them: this shell, to begin with. So they move into a leaf, where the sandbox looks for its service, and the controllers are
-# handed down before anything is started.
+# A control group with processes cannot give memory limits to child groups, and the container's group has processes, such as
+# this shell. So they are moved to a leaf group, which the sandbox expects, and the controllers are enabled for child groups
+# before the program starts.
 #
-# What cannot be had is said, and the command is started all the same: it refuses by itself what it cannot do.
+# Missing features are reported, and the command is started anyway: it refuses what it cannot do.
 set -eu
 user=faceoff
 missing() { echo "entrypoint: agents cannot be bounded here: $*" >&2; }
 if [ "$(id -u)" -ne 0 ]; then
-    missing "control groups are handed out by root, and this container starts as another user (leave out --user, or runAsUser)"
+    missing "only root can delegate control groups, and this container starts as another user (leave out --user, or runAsUser)"
     exec "$@"
 fi
-# As ordinary as the unit of systemd: nothing is left that a program with other rights could give back.
+# The same rights as with the systemd unit: no capabilities, and no way to regain them.
 ordinary() {
-    # Volumes come as root's, where the engine does not copy the image's folder.
+    # Volumes belong to root if the engine does not copy the image's folder.
     for folder in /data /scratch; do
         [ ! -d $folder ] || [ "$(stat -c %U $folder)" = $user ] || chown $user: $folder
     done
@@ -27,11 +27,11 @@ top=/sys/fs/cgroup
 privileged="start it privileged, with a cgroup namespace of its own (docker run --privileged --cgroupns=private)"
 if [ ! -e $top/cgroup.controllers ]; then
     if [ -d $top/memory ] && [ -w $top/memory ]; then
-        echo "entrypoint: control groups are of version 1, of which root hands none out: the command stays root" >&2
+        echo "entrypoint: control groups have version 1, which cannot be delegated: the command runs as root" >&2
         exec "$@"
     fi
     if [ -d $top/memory ]; then
-        missing "the container's control groups, which are of version 1, are read-only: $privileged"
+        missing "the container's control groups, of version 1, are read-only: $privileged"
     else
         missing "there is no control group at $top"
     fi
@@ -47,21 +47,21 @@ fi
 for controller in memory pids cpu; do
     grep -qw $controller "$own/cgroup.controllers" || missing "the container's control group has no controller $controller"
 done
-# Some may end meanwhile, and whoever they have started since is found by another look.
+# Processes may end or start others meanwhile; repeat until those have moved too.
 for _ in 1 2 3 4 5; do
     while read -r process; do
         echo "$process" >"$own/faceoff-service/cgroup.procs" 2>/dev/null || true
     done <"$own/cgroup.procs"
 done
-# The real top is not asked: it alone may have both.
+# Not for the real root group, which has no cgroup.type: it may have both processes and controllers.
 if [ -e "$own/cgroup.type" ] && [ -n "$(cat "$own/cgroup.procs")" ]; then
-    missing "processes from outside of the container live in its control group, and cannot be moved from here"
+    missing "processes from outside of the container are in its control group, and cannot be moved from here"
 fi
 for controller in memory pids cpu cpuset; do
     ! grep -qw $controller "$own/cgroup.controllers" || echo +$controller 2>/dev/null >"$own/cgroup.subtree_control" ||
-        missing "the container's control group does not hand down $controller"
+        missing "the container's control group does not enable $controller for child groups"
 done
-# What an owner needs to have groups below, as systemd delegates them; the container's own limits stay root's.
+# The files that an owner of child groups needs, as in systemd's delegation; the container's own limits stay with root.
 for file in . cgroup.procs cgroup.threads cgroup.subtree_control faceoff-service faceoff-service/cgroup.procs; do
     chown $user: "$own/$file"
 done

@@ -1,12 +1,12 @@
 #!/bin/sh
-# Makes the runtime python3-ml in a folder: a virtual environment of this host's Python with NumPy, SciPy and ONNX
-# Runtime, in the versions and with the hashes of docker/python3-ml/requirements.txt, and nothing of the host's packages.
+# Creates the runtime python3-ml in a folder: a virtual environment of this host's Python with NumPy, SciPy and ONNX
+# Runtime, in the versions and with the hashes of docker/python3-ml/requirements.txt, without the host's packages.
 #
-#   docker/runtime.sh FOLDER                   make it; nothing is done if it is there as it should be
-#   docker/runtime.sh FOLDER PIP-ARGUMENTS …   also install what pip is told, without changing the versions above:
+#   docker/runtime.sh FOLDER                   create it; does nothing if it is up to date
+#   docker/runtime.sh FOLDER PIP-ARGUMENTS …   also install packages with pip, without changing the versions above:
 #       docker/runtime.sh FOLDER --index-url https://download.pytorch.org/whl/cpu torch
 #
-# PYTHON=/path/to/python3 chooses the interpreter; otherwise it is the one of the runtime python3.
+# PYTHON=/path/to/python3 selects the interpreter; the default is that of the runtime python3.
 set -eu
 
 here=$(cd "$(dirname "$0")" && pwd)/python3-ml
@@ -27,7 +27,7 @@ python=${PYTHON:-}
 for candidate in /usr/local/bin/python3 /usr/bin/python3 /bin/python3 /opt/python/bin/python3; do
     [ -n "$python" ] || [ ! -x "$candidate" ] || python=$candidate
 done
-[ -n "$python" ] || fail "no python3 in the usual places; install one, or name it: PYTHON=/path/to/python3"
+[ -n "$python" ] || fail "no python3 in the usual folders; install it, or set PYTHON=/path/to/python3"
 version=$("$python" -c 'import sys; print("%d.%d.%d" % sys.version_info[:3])') || fail "$python does not start"
 case $version in
     3.11.* | 3.12.* | 3.13.* | 3.14.*) ;;
@@ -35,7 +35,7 @@ case $version in
 esac
 
 mkdir -p "$(dirname "$folder")"
-# Two that make it at once: the second finds it made.
+# If two processes create it at once, the second finds it complete.
 exec 9>"$folder.lock"
 flock 9
 
@@ -49,12 +49,12 @@ if [ "$(cat "$folder/.faceoff-runtime" 2>/dev/null)" = "$stamp" ]; then
     exit 0
 fi
 if [ -e "$folder" ] && [ ! -e "$folder/.faceoff-runtime" ]; then
-    fail "$folder is there and was not made by this script; name a folder that does not exist"
+    fail "$folder exists and was not created by this script; pass a folder that does not exist"
 fi
 
 new=$folder.new
 rm -rf "$new"
-echo "making $folder with Python $version of $python"
+echo "creating $folder with Python $version of $python"
 "$python" -m venv --without-pip "$new"
 if "$python" -m pip --version >/dev/null 2>&1; then
     pip() { "$python" -m pip --python "$new/bin/python3" "$@"; }
@@ -79,10 +79,10 @@ site=$("$new/bin/python3" -c 'import sysconfig; print(sysconfig.get_path("pureli
 cp "$here/faceoff_threads.py" "$site/"
 echo 'import faceoff_threads' >"$site/faceoff_threads.pth"
 "$new/bin/python3" -m compileall -q "$site/faceoff_threads.py"
-# Programs whose first line names a folder that goes; agents run modules.
+# Their first line has the path of a temporary folder, and agents run modules.
 find "$new/bin" -type f ! -name 'python*' -delete
 ORT_DISABLE_TELEMETRY=1 "$new/bin/python3" -I -c 'import numpy, scipy.linalg, onnxruntime' || fail "the packages do not load; see above"
-# Agents are other users.
+# Agents run as other users.
 chmod -R a+rX "$new"
 echo "$stamp" >"$new/.faceoff-runtime"
 
@@ -90,6 +90,6 @@ rm -rf "$folder.old"
 [ ! -e "$folder" ] || mv "$folder" "$folder.old"
 mv "$new" "$folder"
 rm -rf "$folder.old"
-echo "offer it in the server's configuration:"
+echo "add it to the server's configuration:"
 echo "  [runtimes.python3-ml]"
 echo "  folder = \"$folder\""

@@ -3,16 +3,16 @@
 #
 #   docker/setup.sh build    to compile and run the service (cc for the C parts of SQLite and zstd,
 #                            bubblewrap for the sandbox)
-#   docker/setup.sh test     also what the tests drive (a browser, so that pages are really opened)
-#   docker/setup.sh load     also what asks a server for pages, as often as it can
-#   docker/setup.sh steady   also what keeps the machine busy while the tests run again and again
-#   docker/setup.sh cgroup2  also a virtual machine, for the tests of the other version of control groups
-#   docker/setup.sh box      also what the images are made of, where no engine makes them
-#   docker/setup.sh engine   also Docker, what its images are made of, and who else saves images
+#   docker/setup.sh test     also the tools of the tests (such as a browser for the pages)
+#   docker/setup.sh load     also HTTP load generators
+#   docker/setup.sh steady   also a CPU load generator for repeated tests
+#   docker/setup.sh cgroup2  also a virtual machine for the tests of cgroup v2
+#   docker/setup.sh box      also tools to build images without a container engine
+#   docker/setup.sh engine   also Docker, tools for its base images, and other tools that save images
 #
 # As root it installs them with apt-get; otherwise it prints the command and fails.
 set -eu
-# Where ordinary users do not look, and servers are.
+# Folder of server programs, often not in the PATH of ordinary users.
 PATH=$PATH:/usr/sbin
 
 purpose=${1:-build}
@@ -23,26 +23,26 @@ need() { # need COMMAND PACKAGE
 
 need cc build-essential
 need bwrap bubblewrap
-# Reference agents are interpreted by it.
+# Interpreter of the reference agents.
 need python3 python3
-# Whom to trust, when webhooks are told by TLS.
+# Root certificates for webhooks over TLS.
 [ -e /etc/ssl/certs/ca-certificates.crt ] || missing="$missing ca-certificates"
 if [ "$purpose" = test ] || [ "$purpose" = steady ]; then
     need chromium chromium
-    # Of the Python that agents get, to make the runtime python3-ml (docker/runtime.sh).
+    # pip of the agents' Python, to create the runtime python3-ml (docker/runtime.sh).
     /usr/bin/python3 -m pip --version >/dev/null 2>&1 || missing="$missing python3-pip"
-    # The Python package is tested in an environment of its own.
+    # The Python package is tested in a virtual environment.
     python3 -c 'import ensurepip' 2>/dev/null || missing="$missing python3-venv"
-    # A client of the API in TypeScript is made and run.
+    # A TypeScript client of the API is generated and run.
     need node nodejs
     need npm npm
-    # Workers on other machines are given work by it.
+    # Remote workers get their jobs through NATS.
     need nats-server nats-server
-    # A worker gets a clock that is wrong.
+    # For a worker with a wrong clock.
     ls /usr/lib/*/faketime/libfaketime.so.1 >/dev/null 2>&1 || missing="$missing libfaketime"
-    # Databases are given what no version of ours writes.
+    # To write database contents that no version of the server writes.
     need sqlite3 sqlite3
-    # The examples for organisers are tried: systemd's own judgement of the unit, and the proxies.
+    # To check the examples for organisers: the systemd units and the proxies.
     need systemd-analyze systemd
     need nginx nginx-light
     need caddy caddy
@@ -92,7 +92,7 @@ if [ "$(id -u)" -ne 0 ]; then
 fi
 echo "installing:$missing"
 export DEBIAN_FRONTEND=noninteractive
-# Servers are installed to be started by tests, not by themselves.
+# Do not start the installed servers: the tests start them.
 export RUNLEVEL=1
 apt-get update -qq
 # shellcheck disable=SC2086 # a list of words on purpose

@@ -1,12 +1,12 @@
 #!/bin/sh
-# Tries the images without an engine for them: does each step of docker/Dockerfile in a folder, and starts what comes of it in
-# namespaces, as a privileged container, with the configurations of docker/compose.yaml and of docker/kubernetes/.
+# Tests the images without a container engine: runs each step of docker/Dockerfile in a folder, and starts the result in
+# namespaces, like a privileged container, with the configurations of docker/compose.yaml and docker/kubernetes/.
 #
 #   TARGET_DIR=target docker/test-box.sh         (as root, after cargo build --bins; docker/setup.sh box)
-#   TARGET_DIR=target docker/test-box.sh start   what an earlier call has made
+#   TARGET_DIR=target docker/test-box.sh start   (start the images of an earlier call)
 #
-# The program is the one that was built here, not one of the Dockerfile's first stage. On a host with version 1 of the cgroup
-# interface the entry point leaves the program root; `make test-cgroup2` is for the other.
+# The program is the one built on this host, not in the Dockerfile's first stage. On a host with cgroup v1 the entry point runs
+# the program as root; `make test-cgroup2` tests v2.
 set -eu
 : "${TARGET_DIR:=target}"
 repository=$(dirname "$(dirname "$(realpath "$0")")")
@@ -17,12 +17,12 @@ fail() {
     echo "error: $*" >&2
     exit 1
 }
-[ "$(id -u)" -eq 0 ] || fail "root file systems are made by root"
+[ "$(id -u)" -eq 0 ] || fail "run it as root: it creates root file systems"
 
-# It is started outside of the image and ends inside: none of the host's programs is needed there.
+# Starts outside of the image and changes into it, so that the image needs no program of the host.
 cat >"$work/enter" <<'END'
 #!/bin/sh
-# enter ROOT COMMAND…: as a privileged container with the namespaces that it is started in.
+# enter ROOT COMMAND…: runs a command like a privileged container, in the current namespaces.
 set -eu
 root=$1
 shift
@@ -38,7 +38,7 @@ fi
 for folder in dev/shm tmp run; do
     mount -t tmpfs -o mode=1777 memory "$root/$folder"
 done
-# The names that Compose and Kubernetes give to the others.
+# Host names of the other services in Compose and Kubernetes.
 echo '127.0.0.1 localhost nats server faceoff' >"$root/run/hosts"
 touch "$root/etc/hosts"
 mount --bind "$root/run/hosts" "$root/etc/hosts"
@@ -46,7 +46,7 @@ if [ -n "${BOX_CONFIG:-}" ]; then
     mkdir -p "$root/etc/faceoff"
     mount --bind "$BOX_CONFIG" "$root/etc/faceoff"
 fi
-# A program that makes user namespaces may not be in a chroot.
+# A program in a chroot cannot create user namespaces.
 mkdir -p "$root/old"
 cd "$root"
 pivot_root . old
@@ -56,10 +56,10 @@ cd /
 exec env -i PATH=/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin ${FACEOFF_CONFIG:+FACEOFF_CONFIG="$FACEOFF_CONFIG"} "$@"
 END
 chmod 755 "$work/enter"
-# box ROOT COMMAND…: in a control group and namespaces of its own; the network is the caller's. Nothing from outside of its namespace of
-# processes is in the group, as in a container.
+# box ROOT COMMAND…: runs a command in a new control group and new namespaces, with the caller's network. As in a container, the group
+# contains no process from outside of the PID namespace.
 box() {
-    # shellcheck disable=SC2016 # the inner shell's words
+    # shellcheck disable=SC2016 # expanded by the inner shell
     unshare --pid --fork --kill-child sh -c '
         if [ -e /sys/fs/cgroup/cgroup.controllers ]; then
             group=$(mktemp -d /sys/fs/cgroup/faceoff-box-XXXXXX) && echo 0 >"$group/cgroup.procs"
@@ -67,8 +67,8 @@ box() {
         exec unshare --mount --cgroup --ipc --uts "$@"' sh "$work/enter" "$@"
 }
 
-# Server, worker and NATS with one set of configurations, in a network that nobody else sees.
-together() {
+# Runs server, worker and NATS with one set of configurations, in a separate network.
+run_services() {
     kind=$1
     entrypoint=$(cat "$work/base.ENTRYPOINT")
     ip link set lo up
@@ -78,7 +78,7 @@ together() {
     sed "s,/var/lib/nats,$work/streams," "$work/$kind/nats-server.conf" >"$work/run/nats.conf"
     nats-server --config "$work/run/nats.conf" >"$work/run/nats" 2>&1 &
     export BOX_CONFIG="$work/$kind"
-    # shellcheck disable=SC2046 # the words of CMD
+    # shellcheck disable=SC2046 # CMD is split into words
     FACEOFF_CONFIG=/etc/faceoff/faceoff.toml box "$work/server" "$entrypoint" $(cat "$work/server.CMD") >"$work/run/server" 2>&1 &
     # shellcheck disable=SC2046
     FACEOFF_CONFIG=/etc/faceoff/worker.toml box "$work/worker" "$entrypoint" $(cat "$work/worker.CMD") >"$work/run/worker" 2>&1 &
@@ -89,16 +89,16 @@ together() {
             curl --silent --output /dev/null --write-out '%{http_code} ' "http://127.0.0.1:8080/$path" || true
         done)
         if [ "$answers" = '200 200 ' ] && grep -q 'connected to NATS' "$work/run/worker"; then
-            # A slot that is free asks the server for work. It does so again after some seconds if there was no server yet.
+            # A free slot requests a job from the server. It retries after some seconds if the server was not ready.
             sleep 10
             errors=$(grep -c ERROR "$work/run/worker" || true)
             sleep 10
             if grep ERROR "$work/run/server" || [ "$(grep -c ERROR "$work/run/worker" || true)" != "$errors" ]; then
                 cat "$work/run/worker" >&2
-                echo "error: $kind: server and worker do not understand each other" >&2
+                echo "error: $kind: requests between server and worker fail" >&2
                 return 1
             fi
-            echo "$kind: the server answers /livez and /readyz, and the worker asks it for work"
+            echo "$kind: the server answers /livez and /readyz, and the worker requests jobs"
             return 0
         fi
     done
@@ -106,26 +106,26 @@ together() {
     echo "error: $kind: /livez and /readyz answered ${answers:-nothing}, or the worker did not connect" >&2
     return 1
 }
-if [ "${1:-}" = together ]; then
-    together "$2"
+if [ "${1:-}" = run-services ]; then
+    run_services "$2"
     exit
 fi
 
-# schema PROGRAM …: by its interpreter, for a path with a space names none in a program's first line.
+# schema PROGRAM …: runs it with its interpreter, since a path with a space does not work in a program's first line.
 schema() {
     checker=$1
     shift
     "$work/schemas/bin/python" "$work/schemas/bin/$checker" "$@"
 }
-# The files for engines that are not here: what their schemas say of them.
+# Checks the files for other engines against their schemas.
 [ -x "$work/schemas/bin/kubernetes-validate" ] || {
     python3 -m venv "$work/schemas"
     "$work/schemas/bin/python" -m pip install --quiet check-jsonschema==0.39.0 kubernetes-validate==1.37.0 pyyaml
 }
 schema check-jsonschema --builtin-schema vendor.compose-spec "$repository/docker/compose.yaml"
 schema kubernetes-validate --strict --quiet "$repository"/docker/kubernetes/*.yaml
-echo "the schemas of Compose and Kubernetes take the files"
-# Their configurations, as compose/ and kubernetes/; and every path that Compose mounts or builds from is there.
+echo "the files match the schemas of Compose and Kubernetes"
+# Extracts their configurations to compose/ and kubernetes/, and checks that every path in compose.yaml exists.
 "$work/schemas/bin/python" - "$repository/docker" "$work" <<'END'
 import pathlib, sys, yaml
 docker, work = map(pathlib.Path, sys.argv[1:])
@@ -147,12 +147,12 @@ for name, service in compose["services"].items():
         context = docker / service["build"]["context"]
         paths.append(context.relative_to(docker) / service["build"]["dockerfile"])
     for path in paths:
-        assert (docker / path).is_file(), f"{name} names {path}, which is not there"
+        assert (docker / path).is_file(), f"{name} has the path {path}, which does not exist"
 END
 
-# in_root COMMAND: as in an image that is being built, with this host's network.
+# in_root COMMAND: runs a command like a build step, with this host's network.
 in_root() {
-    # shellcheck disable=SC2016 # the inner shell's words
+    # shellcheck disable=SC2016 # expanded by the inner shell
     unshare --mount --pid --fork sh -c '
         set -eu
         mount --bind "$1" "$1"
@@ -162,11 +162,11 @@ in_root() {
         exec chroot "$1" /bin/sh -c "$2"' sh "$root" "$1"
 }
 
-# image TARGET: makes $work/TARGET by the steps of the stages that it is built from, and keeps ENTRYPOINT and CMD.
+# image TARGET: creates $work/TARGET by the steps of its stages, and stores ENTRYPOINT and CMD.
 image() {
     root=$work/$1
     rm -rf "$root"
-    # One step a line, comments left out; then only the stages from the target back to an image of others.
+    # One step per line, without comments; then the stages from the target back to an external image.
     awk '/^#/ { next } { line = line $0 } /\\$/ { sub(/\\$/, "", line); next } line != "" { print line; line = "" }' "$dockerfile" >"$work/steps"
     stages=$1
     while from=$(awk -v stage="${stages%% *}" '$1 == "FROM" && $4 == stage { print $2 }' "$work/steps") && case $from in *:*) false ;; esac; do
@@ -174,12 +174,12 @@ image() {
         stages="$from $stages"
     done
     suite=${from#debian:}
-    [ "$suite" != "$from" ] || fail "this script makes images of Debian only, and ${stages%% *} is from $from"
+    [ "$suite" != "$from" ] || fail "this script supports only Debian images, and ${stages%% *} is from $from"
     echo "image $1: $from, then the stages $stages"
-    # mmdebstrap needs a folder that is empty; what of minbase the slim images leave out is documents.
+    # mmdebstrap needs an empty folder; the slim images are minbase without documentation.
     mmdebstrap --quiet --variant=minbase "${suite%-slim}" "$root" >"$work/log" 2>&1 || {
         cat "$work/log" >&2
-        fail "mmdebstrap cannot make $from"
+        fail "mmdebstrap cannot create $from"
     }
     for stage in $stages; do
         awk -v stage="$stage" '$1 == "FROM" { in_it = $4 == stage; next } in_it' "$work/steps" >"$work/stage"
@@ -190,7 +190,7 @@ image() {
                 fail "RUN $words"
             } ;;
             COPY)
-                # shellcheck disable=SC2086 # words on purpose
+                # shellcheck disable=SC2086 # split into words
                 set -- $words
                 case $1 in
                 --from=build)
@@ -200,7 +200,7 @@ image() {
                     ;;
                 *) source=$repository/$1 ;;
                 esac
-                [ -e "$source" ] || fail "COPY $words: there is no $source"
+                [ -e "$source" ] || fail "COPY $words: $source does not exist"
                 cp "$source" "$root$2"
                 ;;
             ENTRYPOINT | CMD) printf '%s\n' "$words" | tr -d '[]",' >"$work/$stage.$step" ;;
@@ -222,10 +222,10 @@ version=$(box "$work/server" "$entrypoint" faceoff --version)
 echo "faceoff --version: $version"
 for image in server worker; do
     echo "faceoff doctor in the image $image:"
-    box "$work/$image" "$entrypoint" faceoff doctor || fail "the sandbox lacks something in the image $image"
+    box "$work/$image" "$entrypoint" faceoff doctor || fail "the sandbox does not work in the image $image"
 done
 
 for kind in compose kubernetes; do
-    unshare --net --pid --fork --kill-child --mount-proc "$0" together "$kind"
+    unshare --net --pid --fork --kill-child --mount-proc "$0" run-services "$kind"
 done
-echo "the images start, and do what they are for"
+echo "the images start, and their services work"

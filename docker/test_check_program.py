@@ -1,6 +1,6 @@
-"""Has check-program.sh judge programs with one defect each: python3 -m unittest.
+"""Tests check-program.sh with programs that have one defect each: python3 -m unittest.
 
-They are small programs in C that print what the release program prints.
+The programs are small C programs with the output of the release program.
 """
 
 import os
@@ -21,7 +21,7 @@ class Programs(unittest.TestCase):
         self.folder = Path(folder.name)
 
     def program(self, prints: str, *options: str) -> Path:
-        """A program that answers `sim golden` with this text, and fails at anything else."""
+        """A program that prints this text for `sim golden`, and fails for other arguments."""
         hashes, source, program = (self.folder / name for name in ("hashes", "program.c", "program"))
         hashes.write_text(prints)
         source.write_text(

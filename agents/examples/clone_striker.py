@@ -1,12 +1,11 @@
-"""Learns to defend by example: what `striker` did in a recorded evaluation.
+"""Learns to defend by imitating `striker` in a recorded evaluation.
 
     make agents                                                       # the bundle of striker
     python agents/examples/clone_striker.py --out my-clone            # records, learns, evaluates
 
-Records episodes with `faceoff eval`, reads them with `faceoff.dataset`, works out where striker moved its mallet, and
-fits a network to it. Writes `weights.npz` and `log.txt`, then plays the episodes of `faceoff eval --seed 0`, which it did
-not learn from. With `--dataset` it learns from a recording that is there already: of another agent, or the one that the
-server gives you of your own.
+Records episodes with `faceoff eval`, reads them with `faceoff.dataset`, computes striker's mallet velocities, and fits
+a network to them. Writes `weights.npz` and `log.txt`, then evaluates on the episodes of `faceoff eval --seed 0`, which
+are not in the training data. With `--dataset` it learns from an existing recording, of any agent.
 """
 
 from __future__ import annotations
@@ -25,7 +24,7 @@ from faceoff import kinematics
 
 from network import Adam, Floats, Network, Normalisation, save
 from player import MAX_SPEED_M_S
-from scores import tell
+from scores import log_scores
 from view import DT_S, View
 
 ROOT = Path(__file__).parents[2]
@@ -33,8 +32,8 @@ EPOCHS = 40
 MINIBATCH = 2048
 RATE = 2e-3
 HIDDEN = (128, 128)
-#: Share of the episodes that are kept apart, to see whether what was learned holds for others.
-KEPT_APART = 0.1
+#: Share of the episodes for validation.
+VALIDATION_SHARE = 0.1
 
 
 def main() -> None:
@@ -42,77 +41,78 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("--out", type=Path, required=True, help="folder to write to")
     parser.add_argument("--dataset", type=Path, help="learn from this recording")
-    parser.add_argument("--bundle", type=Path, default=ROOT / "target" / "bundles" / "striker", help="whom to record")
+    bundle = ROOT / "target" / "bundles" / "striker"
+    parser.add_argument("--bundle", type=Path, default=bundle, help="bundle of the agent to record")
     parser.add_argument("--program", type=Path, default=ROOT / "target" / "release" / "faceoff", help="faceoff")
     parser.add_argument("--recorded", type=int, default=2000, help="episodes to record (2000)")
-    parser.add_argument("--seed", type=int, default=1, help="of everything drawn, and of the recording (1)")
-    parser.add_argument("--episodes", type=int, default=400, help="of the evaluation at the end (400)")
-    given = parser.parse_args()
-    given.out.mkdir(parents=True, exist_ok=True)
-    with (given.out / "log.txt").open("w") as log:
+    parser.add_argument("--seed", type=int, default=1, help="seed of all random draws and of the recording (1)")
+    parser.add_argument("--episodes", type=int, default=400, help="episodes of the final evaluation (400)")
+    arguments = parser.parse_args()
+    arguments.out.mkdir(parents=True, exist_ok=True)
+    with (arguments.out / "log.txt").open("w") as log:
 
-        def say(line: str) -> None:
+        def log_line(line: str) -> None:
             print(line, flush=True)
             log.write(line + "\n")
 
-        say("$ python " + " ".join(sys.argv))
-        recording = given.dataset or record(given)
+        log_line("$ python " + " ".join(sys.argv))
+        recording = arguments.dataset or record(arguments)
         views, moves, episodes = read(recording)
-        say(f"{len(views):,} control steps of {len(np.unique(episodes))} episodes")
-        learn(views, moves, episodes, given.seed, given.out / "weights.npz", say)
-        tell(given.out / "weights.npz", given.episodes, say)
+        log_line(f"{len(views):,} control steps of {len(np.unique(episodes))} episodes")
+        learn(views, moves, episodes, arguments.seed, arguments.out / "weights.npz", log_line)
+        log_scores(arguments.out / "weights.npz", arguments.episodes, log_line)
 
 
-def record(given: argparse.Namespace) -> Path:
-    """An evaluation of the bundle; the folder that it wrote."""
-    for needed, made_by in ((given.program, "cargo build --release"), (given.bundle, "make agents")):
+def record(arguments: argparse.Namespace) -> Path:
+    """Records an evaluation of the bundle; returns its output folder."""
+    for needed, build in ((arguments.program, "cargo build --release"), (arguments.bundle, "make agents")):
         if not needed.exists():
-            sys.exit(f"{needed} is not there: {made_by}, or name another")
-    folder: Path = given.out / "recording"
+            sys.exit(f"{needed} does not exist: run {build}, or name another")
+    folder: Path = arguments.out / "recording"
     subprocess.run(
-        [given.program, "eval", given.bundle, "--task", "defend", "--episodes", str(given.recorded)]
-        + ["--seed", str(given.seed), "--workers", "2", "--out", folder],
+        [arguments.program, "eval", arguments.bundle, "--task", "defend", "--episodes", str(arguments.recorded)]
+        + ["--seed", str(arguments.seed), "--workers", "2", "--out", folder],
         check=True,
     )
     return folder
 
 
 def read(recording: Path) -> tuple[Floats, Floats, npt.NDArray[np.int64]]:
-    """Of each step what a policy would have seen, how the mallet then moved, and of which episode it is.
+    """Feature vectors, mallet velocities (as shares of MAX_SPEED_M_S) and episode numbers of all steps.
 
-    Episodes are gone through side by side, as if they were worlds: a view remembers what it saw before.
+    Episodes are processed in parallel, like worlds, because a view depends on earlier observations.
     """
     dataset = faceoff.dataset.open_dataset(recording)
-    # Who failed is no example.
-    told = [episode.to_numpy() for episode in dataset.episodes("defend") if episode.success]
-    if len(told) < 2:
-        sys.exit(f"{recording}: expected episodes of defend that were held, two at least, got {len(told)}")
-    lengths = np.array([len(one.actions) for one in told])
+    # Failed episodes are not imitated.
+    recorded = [episode.to_numpy() for episode in dataset.episodes("defend") if episode.success]
+    if len(recorded) < 2:
+        sys.exit(f"{recording}: expected at least two successful episodes of defend, got {len(recorded)}")
+    lengths = np.array([len(episode.actions) for episode in recorded])
     longest = lengths.max()
-    observations = np.stack([padded(one.observations[:-1], longest) for one in told])
-    commanded = [kinematics.forward(one.actions[:, 0])[:, :2] for one in told]
+    observations = np.stack([padded(episode.observations[:-1], longest) for episode in recorded])
+    commanded = [kinematics.forward(episode.actions[:, 0])[:, :2] for episode in recorded]
     start = kinematics.forward(kinematics.model.START_Q)[:2]
-    mallets = np.stack([padded(np.vstack([start, one]), longest + 1) for one in commanded])
+    mallets = np.stack([padded(np.vstack([start, path]), longest + 1) for path in commanded])
     speeds = np.diff(mallets, axis=1) / DT_S
-    view = View(len(told))
-    before = np.zeros((len(told), 2))
-    views, moves, of_episode = [], [], []
+    view = View(len(recorded))
+    before = np.zeros((len(recorded), 2))
+    views, moves, episode_numbers = [], [], []
     for step in range(longest):
-        seen = view.look(observations[:, step], mallets[:, step], before)
+        features = view.update(observations[:, step], mallets[:, step], before)
         before = speeds[:, step]
-        under_way = np.flatnonzero(step < lengths)
-        views.append(seen[under_way])
-        moves.append(before[under_way] / MAX_SPEED_M_S)
-        of_episode.append(under_way)
+        running = np.flatnonzero(step < lengths)
+        views.append(features[running])
+        moves.append(before[running] / MAX_SPEED_M_S)
+        episode_numbers.append(running)
     return (
         np.concatenate(views).astype(np.float32),
         np.concatenate(moves).astype(np.float32),
-        np.concatenate(of_episode),
+        np.concatenate(episode_numbers),
     )
 
 
 def padded(rows: npt.NDArray[np.float64], length: int) -> npt.NDArray[np.float64]:
-    """The last row again and again, up to a length."""
+    """The rows, with the last one repeated up to `length`."""
     return np.concatenate([rows, np.repeat(rows[-1:], length - len(rows), axis=0)])
 
 
@@ -122,35 +122,35 @@ def learn(
     episodes: npt.NDArray[np.int64],
     seed: int,
     weights: Path,
-    say: Callable[[str], None],
+    log_line: Callable[[str], None],
 ) -> None:
-    """Fits a network to the moves by least squares, and writes it."""
+    """Fits a network to the mallet velocities by least squares, and saves it."""
     rng = np.random.default_rng(seed)
     normalisation = Normalisation(views.shape[1])
-    normalisation.see(views)
-    seen = normalisation(views)
+    normalisation.update(views)
+    inputs = normalisation(views)
     drawn = rng.permutation(episodes.max() + 1)
-    is_apart = np.isin(episodes, drawn[: max(1, int(KEPT_APART * len(drawn)))])
-    taught = np.flatnonzero(~is_apart)
+    is_validation = np.isin(episodes, drawn[: max(1, int(VALIDATION_SHARE * len(drawn)))])
+    training = np.flatnonzero(~is_validation)
     network = Network((views.shape[1], *HIDDEN, moves.shape[1]), rng, last_scale=0.1)
     adam = Adam(network.parameters(), max_norm=1.0)
-    begun = time.perf_counter()
+    started_s = time.perf_counter()
     for epoch in range(EPOCHS):
-        rng.shuffle(taught)
-        for first in range(0, len(taught), MINIBATCH):
-            some = taught[first : first + MINIBATCH]
-            layers = network.layers(seen[some])
+        rng.shuffle(training)
+        for first in range(0, len(training), MINIBATCH):
+            batch = training[first : first + MINIBATCH]
+            layers = network.layers(inputs[batch])
             adam.step(
-                network.gradients(layers, (layers[-1] - moves[some]) / np.float32(len(some))),
+                network.gradients(layers, (layers[-1] - moves[batch]) / np.float32(len(batch))),
                 RATE * (1.0 - epoch / EPOCHS),
             )
         if epoch % 5 == 4:
             errors = [
-                MAX_SPEED_M_S * float(np.sqrt(np.mean((network(seen[part]) - moves[part]) ** 2)))
-                for part in (taught, np.flatnonzero(is_apart))
+                MAX_SPEED_M_S * float(np.sqrt(np.mean((network(inputs[part]) - moves[part]) ** 2)))
+                for part in (training, np.flatnonzero(is_validation))
             ]
-            say(
-                f"{time.perf_counter() - begun:5.0f} s  epoch {epoch + 1:3}: off by {errors[0]:.3f} m/s, "
+            log_line(
+                f"{time.perf_counter() - started_s:5.0f} s  epoch {epoch + 1:3}: off by {errors[0]:.3f} m/s, "
                 f"{errors[1]:.3f} m/s in episodes kept apart"
             )
     save(weights, network, normalisation)

@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 Floats = npt.NDArray[np.floating]
 
-#: What a network sees is within so many deviations of the mean.
+#: Normalised inputs are clipped to this many deviations from the mean.
 LARGEST = 10.0
 
 
@@ -29,7 +29,7 @@ class Network:
         return self.layers(inputs)[-1]
 
     def layers(self, inputs: Floats) -> list[Floats]:
-        """The inputs and what each layer makes of them, as :meth:`gradients` wants them."""
+        """The inputs and the output of each layer, the argument of :meth:`gradients`."""
         values = [inputs]
         for weight, bias in zip(self.weights[:-1], self.biases[:-1]):
             values.append(np.tanh(values[-1] @ weight + bias))
@@ -37,14 +37,14 @@ class Network:
         return values
 
     def gradients(self, values: list[Floats], output_gradient: Floats) -> list[Floats]:
-        """Of a loss by each of :meth:`parameters`, from its gradient by the outputs."""
-        found: list[Floats] = []
+        """Gradients of a loss by each of :meth:`parameters`, from its gradient by the outputs."""
+        gradients: list[Floats] = []
         gradient = output_gradient
         for index in reversed(range(len(self.weights))):
-            found += [gradient.sum(axis=0), values[index].T @ gradient]
+            gradients += [gradient.sum(axis=0), values[index].T @ gradient]
             if index > 0:
                 gradient = (gradient @ self.weights[index].T) * (1.0 - values[index] ** 2)
-        return found[::-1]
+        return gradients[::-1]
 
     def parameters(self) -> list[Floats]:
         """Weight and bias of each layer, first layer first; changed in place by :class:`Adam`."""
@@ -52,27 +52,27 @@ class Network:
 
 
 def orthogonal(inputs: int, outputs: int, rng: np.random.Generator) -> Floats:
-    """A matrix whose rows or columns, whichever are fewer, are orthonormal."""
-    drawn = rng.standard_normal((max(inputs, outputs), min(inputs, outputs)))
-    q, r = np.linalg.qr(drawn)
+    """A random matrix (inputs, outputs) whose rows or columns, whichever are fewer, are orthonormal."""
+    random = rng.standard_normal((max(inputs, outputs), min(inputs, outputs)))
+    q, r = np.linalg.qr(random)
     q = q * np.sign(np.diag(r))
     return (q if inputs >= outputs else q.T).astype(np.float32)
 
 
 class Adam:
-    """Kingma and Ba's optimiser, with a bound on the gradient's norm."""
+    """The optimiser of Kingma and Ba, with a limit on the gradient's norm."""
 
     def __init__(self, parameters: list[Floats], max_norm: float) -> None:
         self._parameters = parameters
         self._max_norm = max_norm
-        self._means = [np.zeros_like(one) for one in parameters]
-        self._squares = [np.zeros_like(one) for one in parameters]
+        self._means = [np.zeros_like(parameter) for parameter in parameters]
+        self._squares = [np.zeros_like(parameter) for parameter in parameters]
         self._steps = 0
 
     def step(self, gradients: list[Floats], rate: float) -> None:
         """Moves the parameters against the gradients."""
         self._steps += 1
-        norm = float(np.sqrt(sum(float(np.vdot(one, one)) for one in gradients)))
+        norm = float(np.sqrt(sum(float(np.vdot(gradient, gradient)) for gradient in gradients)))
         share = min(1.0, self._max_norm / (norm + 1e-8))
         corrected = rate * np.sqrt(1.0 - 0.999**self._steps) / (1.0 - 0.9**self._steps)
         for parameter, mean, square, gradient in zip(
@@ -85,51 +85,51 @@ class Adam:
 
 
 class Normalisation:
-    """Mean and deviation of what a network sees, gathered on the way."""
+    """Running mean and variance of a network's input."""
 
     def __init__(self, length: int) -> None:
         self.count = 1e-4
         self.mean = np.zeros(length)
         self.variance = np.ones(length)
 
-    def see(self, seen: npt.NDArray[np.floating]) -> None:
-        """Takes in (n, length) more."""
-        count = len(seen)
+    def update(self, samples: npt.NDArray[np.floating]) -> None:
+        """Adds samples (n, length)."""
+        count = len(samples)
         total = self.count + count
-        delta = seen.mean(axis=0) - self.mean
-        spread = self.variance * self.count + seen.var(axis=0) * count
+        delta = samples.mean(axis=0) - self.mean
+        spread = self.variance * self.count + samples.var(axis=0) * count
         self.variance = (spread + delta**2 * self.count * count / total) / total
         self.mean = self.mean + delta * count / total
         self.count = total
 
-    def __call__(self, seen: npt.NDArray[np.floating]) -> Floats:
-        """In deviations from the mean, within ±LARGEST."""
-        scaled = (seen - self.mean) / np.sqrt(self.variance + 1e-8)
+    def __call__(self, inputs: npt.NDArray[np.floating]) -> Floats:
+        """The inputs in deviations from the mean, clipped to ±LARGEST."""
+        scaled = (inputs - self.mean) / np.sqrt(self.variance + 1e-8)
         return np.clip(scaled, -LARGEST, LARGEST).astype(np.float32)
 
 
 def save(path: Path, network: Network, normalisation: Normalisation) -> None:
-    """Writes what a policy is made of: weights, biases, and what its inputs are normalised by."""
-    parts = {f"weight{index}": one for index, one in enumerate(network.weights)}
-    parts |= {f"bias{index}": one for index, one in enumerate(network.biases)}
+    """Writes a policy: weights, biases, and the normalisation of its input."""
+    parts = {f"weight{index}": weight for index, weight in enumerate(network.weights)}
+    parts |= {f"bias{index}": bias for index, bias in enumerate(network.biases)}
     deviation = np.sqrt(normalisation.variance + 1e-8)
     parts |= {"mean": normalisation.mean.astype(np.float32), "deviation": deviation.astype(np.float32)}
     np.savez(path, **parts)  # type: ignore[arg-type]
 
 
-class Saved:
-    """A policy that :func:`save` wrote."""
+class SavedPolicy:
+    """A policy from a file of :func:`save`."""
 
     def __init__(self, path: Path) -> None:
         with np.load(path) as file:
             self.parts: dict[str, Floats] = {name: file[name] for name in file.files}
         self.layers = sum(name.startswith("weight") for name in self.parts)
 
-    def __call__(self, seen: Floats) -> Floats:
-        """What it answers to (n, inputs): (n, outputs)."""
+    def __call__(self, inputs: Floats) -> Floats:
+        """Actions (n, outputs) for inputs (n, inputs)."""
         parts = self.parts
-        value = np.clip((seen - parts["mean"]) / parts["deviation"], -LARGEST, LARGEST)
+        value = np.clip((inputs - parts["mean"]) / parts["deviation"], -LARGEST, LARGEST)
         for index in range(self.layers - 1):
             value = np.tanh(value @ parts[f"weight{index}"] + parts[f"bias{index}"])
-        answer: Floats = value @ parts[f"weight{self.layers - 1}"] + parts[f"bias{self.layers - 1}"]
-        return answer
+        actions: Floats = value @ parts[f"weight{self.layers - 1}"] + parts[f"bias{self.layers - 1}"]
+        return actions

@@ -1,4 +1,4 @@
-"""A trained policy, as `faceoff.evaluate` plays it and as the agent of a bundle asks it."""
+"""A trained policy for `faceoff.evaluate` and for the agent of a bundle."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ from faceoff.kinematics import MalletMotion
 
 from view import View
 
-#: What an action of 1 stands for.
+#: Mallet speed of an action of 1.
 MAX_SPEED_M_S = 1.5
-EVERY = np.ones(1, np.bool_)
+ALL_WORLDS = np.ones(1, np.bool_)
 
-#: From what is seen (1, LENGTH), float32, to how the mallet shall move (1, 2), shares of MAX_SPEED_M_S.
+#: From features (1, LENGTH), float32, to mallet velocities (1, 2) as shares of MAX_SPEED_M_S.
 Decide = Callable[[npt.NDArray[np.float32]], npt.NDArray[np.float32]]
 
 
 class Player:
-    """From observations to joint positions and velocities."""
+    """A policy from observations to joint positions and velocities."""
 
     def __init__(self, decide: Decide) -> None:
         self._decide = decide
@@ -27,13 +27,13 @@ class Player:
         self._motion = MalletMotion(1, MAX_SPEED_M_S)
 
     def reset(self, task: str = "", episode: int = 0) -> None:
-        """An episode begins."""
-        self._view.restart(EVERY)
-        self._motion.restart(EVERY)
+        """Begins an episode."""
+        self._view.restart(ALL_WORLDS)
+        self._motion.restart(ALL_WORLDS)
 
     def __call__(self, observation: npt.ArrayLike) -> npt.NDArray[np.float64]:
         """(2, 7): positions and velocities at the end of the step."""
-        seen = np.asarray(observation, np.float64)[None, :20]
-        view = self._view.look(seen, self._motion.xy, self._motion.speed)
+        observations = np.asarray(observation, np.float64)[None, :20]
+        view = self._view.update(observations, self._motion.xy, self._motion.speed)
         command = self._motion.command(self._decide(view.astype(np.float32)).astype(np.float64))
         return command.reshape(2, 7)

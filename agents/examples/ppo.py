@@ -1,4 +1,4 @@
-"""Proximal policy optimisation (Schulman and others, 2017) of many worlds at once, in NumPy."""
+"""Proximal policy optimisation (Schulman et al., 2017) on many worlds in parallel, in NumPy."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ Bools = npt.NDArray[np.bool_]
 
 @dataclass(frozen=True)
 class Settings:
-    """What is set; the rest follows."""
+    """Hyperparameters."""
 
     steps_per_round: int = 64
     epochs: int = 5
@@ -31,23 +31,23 @@ class Settings:
 
 
 class Worlds(Protocol):
-    """What is learned in."""
+    """Interface of the training environment."""
 
     worlds: int
     view_length: int
     actions: int
 
     def reset(self, seed: int) -> npt.NDArray[np.floating]:
-        """Begins; what is seen, (worlds, view_length)."""
+        """Begins an episode in each world; returns features (worlds, view_length)."""
 
     def step(
         self, actions: Floats
     ) -> tuple[npt.NDArray[np.floating], npt.NDArray[np.floating], Bools]:
-        """What is seen, rewards, and whose episode has ended (what is seen there is the next one's)."""
+        """Features, rewards and ends of episodes; after an end, features are those of the next episode."""
 
 
 class Learner:
-    """A policy, a critic, and what improves them."""
+    """A policy and a critic with their optimisers."""
 
     def __init__(self, worlds: Worlds, settings: Settings, seed: int) -> None:
         self.settings = settings
@@ -57,75 +57,77 @@ class Learner:
         self.policy = Network((*sizes, worlds.actions), self._rng, last_scale=0.01)
         self.critic = Network((*sizes, 1), self._rng, last_scale=1.0)
         self.normalisation = Normalisation(worlds.view_length)
-        # Apart, so that neither's gradient bounds the other's.
+        # Separate optimisers, so that the norm of one gradient does not limit the other.
         self._policy_adam = Adam(self.policy.parameters(), settings.max_norm)
         self._critic_adam = Adam(self.critic.parameters(), settings.max_norm)
-        self._seen = self.normalisation(worlds.reset(seed))
-        # Before anything is learned: what a first round sees through no normalisation would saturate the network.
-        self._play(np.float32(np.exp(settings.first_log_deviation)))
+        self._views = self.normalisation(worlds.reset(seed))
+        # Initialises the normalisation: without it the first round's inputs would saturate the network.
+        self._rollout(np.float32(np.exp(settings.first_log_deviation)))
 
     def round(self, progress: float) -> None:
-        """Plays some steps in every world and learns from them; `progress` goes from 0 to 1."""
-        given = self.settings
-        log_deviation = (1.0 - progress) * given.first_log_deviation + progress * given.last_log_deviation
-        played = self._play(np.float32(np.exp(log_deviation)))
-        advantages, returns = self._advantages(*played[2:])
-        self._learn(played[0], played[1], advantages, returns, np.exp(log_deviation), given.rate * (1.0 - progress))
+        """Runs `steps_per_round` steps in every world and learns from them; `progress` goes from 0 to 1."""
+        settings = self.settings
+        log_deviation = (1.0 - progress) * settings.first_log_deviation + progress * settings.last_log_deviation
+        rollout = self._rollout(np.float32(np.exp(log_deviation)))
+        advantages, returns = self._advantages(*rollout[2:])
+        rate = settings.rate * (1.0 - progress)
+        self._learn(rollout[0], rollout[1], advantages, returns, np.exp(log_deviation), rate)
 
-    def _play(self, deviation: np.float32) -> tuple[Floats, Floats, Floats, Floats, Floats]:
+    def _rollout(self, deviation: np.float32) -> tuple[Floats, Floats, Floats, Floats, Floats]:
         steps, worlds = self.settings.steps_per_round, self._worlds.worlds
-        seen = np.empty((steps, worlds, self._worlds.view_length), np.float32)
+        views = np.empty((steps, worlds, self._worlds.view_length), np.float32)
         noises = np.empty((steps, worlds, self._worlds.actions), np.float32)
         rewards = np.empty((steps, worlds), np.float32)
-        goes_on = np.empty((steps, worlds), np.float32)
+        continues = np.empty((steps, worlds), np.float32)
         raws = []
         for step in range(steps):
-            seen[step] = self._seen
+            views[step] = self._views
             noises[step] = self._rng.standard_normal(noises.shape[1:], np.float32)
-            raw, reward, ended = self._worlds.step(self.policy(self._seen) + deviation * noises[step])
+            raw, reward, ended = self._worlds.step(self.policy(self._views) + deviation * noises[step])
             raws.append(raw)
             rewards[step] = reward
-            goes_on[step] = ~ended
-            self._seen = self.normalisation(raw)
-        self.normalisation.see(np.concatenate(raws))
-        flat = np.concatenate([seen.reshape(-1, seen.shape[-1]), self._seen])
+            continues[step] = ~ended
+            self._views = self.normalisation(raw)
+        self.normalisation.update(np.concatenate(raws))
+        flat = np.concatenate([views.reshape(-1, views.shape[-1]), self._views])
         values = self.critic(flat).reshape(steps + 1, worlds)
-        return seen, noises, rewards, goes_on, values
+        return views, noises, rewards, continues, values
 
-    def _advantages(self, rewards: Floats, goes_on: Floats, values: Floats) -> tuple[Floats, Floats]:
-        given = self.settings
+    def _advantages(self, rewards: Floats, continues: Floats, values: Floats) -> tuple[Floats, Floats]:
+        settings = self.settings
         advantages = np.empty_like(rewards)
         following = np.zeros(rewards.shape[1], np.float32)
         for step in reversed(range(len(rewards))):
-            surprise = rewards[step] + given.discount * goes_on[step] * values[step + 1] - values[step]
-            following = surprise + given.discount * given.trace * goes_on[step] * following
+            error = rewards[step] + settings.discount * continues[step] * values[step + 1] - values[step]
+            following = error + settings.discount * settings.trace * continues[step] * following
             advantages[step] = following
         return advantages, advantages + values[:-1]
 
     def _learn(
-        self, seen: Floats, noises: Floats, advantages: Floats, returns: Floats, deviation: float, rate: float
+        self, views: Floats, noises: Floats, advantages: Floats, returns: Floats, deviation: float, rate: float
     ) -> None:
-        given = self.settings
-        seen = seen.reshape(-1, seen.shape[-1])
+        settings = self.settings
+        views = views.reshape(-1, views.shape[-1])
         noises = noises.reshape(-1, noises.shape[-1])
-        actions = self.policy(seen) + np.float32(deviation) * noises
+        actions = self.policy(views) + np.float32(deviation) * noises
         before = -0.5 * (noises**2).sum(axis=1)
-        gains, goals = advantages.reshape(-1), returns.reshape(-1)
-        for _ in range(given.epochs):
-            order = self._rng.permutation(len(seen))
-            for first in range(0, len(order), given.minibatch):
-                some = order[first : first + given.minibatch]
-                gain = gains[some]
+        advantages, returns = advantages.reshape(-1), returns.reshape(-1)
+        for _ in range(settings.epochs):
+            permutation = self._rng.permutation(len(views))
+            for first in range(0, len(permutation), settings.minibatch):
+                batch = permutation[first : first + settings.minibatch]
+                gain = advantages[batch]
                 gain = (gain - gain.mean()) / (gain.std() + 1e-8)
-                layers = self.policy.layers(seen[some])
-                off = (actions[some] - layers[-1]) / np.float32(deviation)
-                ratio = np.exp(-0.5 * (off**2).sum(axis=1) - before[some])
+                layers = self.policy.layers(views[batch])
+                offset = (actions[batch] - layers[-1]) / np.float32(deviation)
+                ratio = np.exp(-0.5 * (offset**2).sum(axis=1) - before[batch])
                 # Where the clipped objective is the smaller one, it has no gradient.
-                held = np.where(gain > 0.0, ratio > 1.0 + given.clip, ratio < 1.0 - given.clip)
-                pull = np.where(held, 0.0, gain * ratio) / len(some)
-                policy = self.policy.gradients(layers, -(pull[:, None] * off / np.float32(deviation)).astype(np.float32))
-                layers = self.critic.layers(seen[some])
-                error = (layers[-1][:, 0] - goals[some]) / len(some)
+                is_clipped = np.where(gain > 0.0, ratio > 1.0 + settings.clip, ratio < 1.0 - settings.clip)
+                pull = np.where(is_clipped, 0.0, gain * ratio) / len(batch)
+                slope = -(pull[:, None] * offset / np.float32(deviation)).astype(np.float32)
+                policy = self.policy.gradients(layers, slope)
+                layers = self.critic.layers(views[batch])
+                error = (layers[-1][:, 0] - returns[batch]) / len(batch)
                 critic = self.critic.gradients(layers, error[:, None].astype(np.float32))
                 self._policy_adam.step(policy, rate)
                 self._critic_adam.step(critic, rate)

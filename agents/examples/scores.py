@@ -1,4 +1,4 @@
-"""How good saved weights are, beside an arm that holds still."""
+"""Scores of saved weights, compared with an arm that holds still."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ import faceoff
 import numpy as np
 import numpy.typing as npt
 
-from network import Saved
+from network import SavedPolicy
 from player import Player
 
 
 class Hold:
-    """As agents/hold: the pose that it saw first."""
+    """The policy of agents/hold: keeps the first pose."""
 
     def reset(self, task: str, episode: int) -> None:
-        """An episode begins."""
+        """Begins an episode."""
         self.pose: npt.NDArray[np.float64] | None = None
 
     def __call__(self, observation: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
@@ -28,20 +28,21 @@ class Hold:
 
 
 def score(policy: Callable[..., Any], episodes: int) -> dict[str, Any]:
-    """Of `defend` in the profile that counts, as `faceoff eval --seed 0` plays it."""
+    """The task result of `defend` in the profile `evaluation`, as by `faceoff eval --seed 0`."""
     result = faceoff.evaluate(
         policy, tasks="defend", episodes=episodes, interpolation=3, action_mode="raw", workers=2
     )
-    scored: dict[str, Any] = result["tasks"]["defend"]
-    return scored
+    task_result: dict[str, Any] = result["tasks"]["defend"]
+    return task_result
 
 
-def tell(weights: Path, episodes: int, say: Callable[[str], None]) -> None:
-    """Says what the weights reach, and holding."""
-    for name, policy in (("weights.npz", Player(Saved(weights))), ("hold", Hold())):
-        scored = score(policy, episodes)
-        low, high = (100.0 * bound for bound in scored["success_ci95"])
-        say(
-            f"{name:12} defend, evaluation profile, seed 0, {episodes} episodes: {100.0 * scored['success_rate']:.1f} % "
-            f"({low:.1f} to {high:.1f}), {scored['penalty_points']:.1f} penalty points"
+def log_scores(weights: Path, episodes: int, log_line: Callable[[str], None]) -> None:
+    """Logs the scores of the weights and of holding still."""
+    for name, policy in (("weights.npz", Player(SavedPolicy(weights))), ("hold", Hold())):
+        result = score(policy, episodes)
+        low, high = (100.0 * bound for bound in result["success_ci95"])
+        log_line(
+            f"{name:12} defend, evaluation profile, seed 0, {episodes} episodes: "
+            f"{100.0 * result['success_rate']:.1f} % ({low:.1f} to {high:.1f}), "
+            f"{result['penalty_points']:.1f} penalty points"
         )

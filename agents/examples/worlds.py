@@ -1,4 +1,4 @@
-"""Worlds in which a policy learns to defend."""
+"""Training environment for `defend`."""
 
 from __future__ import annotations
 
@@ -10,26 +10,26 @@ from player import MAX_SPEED_M_S
 from view import LENGTH, View
 
 #: The table's centre in the robot's base frame, m.
-MIDDLE = (1.51, 0.0)
+TABLE_CENTRE = (1.51, 0.0)
 
 
 def reward(step: Transition) -> npt.NDArray[np.float64]:
-    """1 for a puck that is held; a tenth of the speed (m/s) that it lost; less for a mallet that is not in its way.
+    """1 for a success, plus a tenth of the speed (m/s) lost by the puck, minus a cost for a mallet out of its way.
 
-    Without the last part a policy first learns to keep away: a mallet that moves at random costs a puck that would have
-    stopped by itself, and few that it meets stop.
+    Without that cost some policies learn to stay away: a mallet that moves at random disturbs pucks that would have
+    stopped without a contact, and rarely stops others.
     """
     before, after = step.state.puck, step.next_state.puck
     lost_m_s = np.linalg.norm(before[:, 3:5], axis=1) - np.linalg.norm(after[:, 3:5], axis=1)
-    mallet = step.next_state.mallet[:, :2] - MIDDLE
+    mallet = step.next_state.mallet[:, :2] - TABLE_CENTRE
     is_coming = (after[:, 3] < 0.0) & (after[:, 0] > mallet[:, 0])
     off_m = np.where(is_coming, np.abs(after[:, 1] - mallet[:, 1]), 0.0)
     rewards: npt.NDArray[np.float64] = 1.0 * step.success + 0.1 * lost_m_s - 0.05 * off_m
     return rewards
 
 
-class Defending:
-    """Episodes of `defend`, perturbed as they count, each world with another robot; actions are the mallet's velocity."""
+class DefendWorlds:
+    """Episodes of `defend`, profile `evaluation`, each world with another robot; actions are mallet velocities."""
 
     view_length = LENGTH
     actions = 2
@@ -50,25 +50,25 @@ class Defending:
         self._ended: list[tuple[bool, bool]] = []
 
     def reset(self, seed: int) -> npt.NDArray[np.float64]:
-        """Begins; world i plays the episodes of seed + i."""
+        """Begins an episode in each world; world i has the episodes of seed + i."""
         observations, _ = self._plane.reset(seed=seed)
         self._view.restart(np.ones(self.worlds, np.bool_))
-        return self._look(observations)
+        return self._features(observations)
 
-    def _look(self, observations: npt.NDArray[np.float32]) -> npt.NDArray[np.float64]:
+    def _features(self, observations: npt.NDArray[np.float32]) -> npt.NDArray[np.float64]:
         motion = self._plane.motion
-        return self._view.look(observations, motion.xy, motion.speed)
+        return self._view.update(observations, motion.xy, motion.speed)
 
     def shares(self) -> tuple[float, float]:
-        """Of the episodes that ended since the last call: that were held, and that broke a constraint."""
-        held, violated = np.mean(self._ended, axis=0) if self._ended else (np.nan, np.nan)
+        """Shares of successes and of violations among the episodes that ended since the last call."""
+        succeeded, violated = np.mean(self._ended, axis=0) if self._ended else (np.nan, np.nan)
         self._ended.clear()
-        return float(held), float(violated)
+        return float(succeeded), float(violated)
 
     def step(
         self, actions: npt.NDArray[np.float32]
     ) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64], npt.NDArray[np.bool_]]:
-        """What is seen, rewards, whose episode ended."""
+        """Features, rewards and ends of episodes; see :class:`ppo.Worlds`."""
         observations, rewards, terminated, truncated, infos = self._plane.step(actions)
         ended = terminated | truncated
         self._view.restart(ended)
@@ -76,4 +76,4 @@ class Defending:
             final = infos["final_info"]
             for world in np.flatnonzero(ended):
                 self._ended.append((final["success"][world], final["violations"][world].any()))
-        return self._look(observations), rewards, ended
+        return self._features(observations), rewards, ended

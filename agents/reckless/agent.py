@@ -1,14 +1,14 @@
-"""Breaks the safety rules on purpose: what a non-deployable agent looks like."""
+"""Violates the safety constraints on purpose: an example of a non-deployable agent."""
 
 from protocol import Agent, run
 
-# Where each joint runs first. Shoulder back and elbow open lift the mallet off the table; the base turns
+# Initial direction of each joint. Shoulder back and elbow open lift the mallet off the table; the base turns
 # it over the edge.
 START = [+1, -1, +1, +1, +1, -1, +1]
 
 
 class Reckless(Agent):
-    """Runs every joint at its full speed from one end of its range to the other."""
+    """Moves every joint at full speed from one end of its range to the other."""
 
     # Interpolation 3: an action is the joints' positions and velocities at the end of the step.
     interpolation = 3

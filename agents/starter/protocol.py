@@ -1,6 +1,6 @@
-"""The evaluator's side of an agent: one JSON object per line, in and out.
+"""The protocol loop of an agent: one JSON object per line, in and out.
 
-Needs the standard library only, and no other file: `faceoff new` copies it into a bundle as `protocol.py`. An
+It needs only the standard library and no other file: `faceoff new` copies it into a bundle as `protocol.py`. An
 agent is a class derived from `Agent`, and a call of `run`:
 
     from protocol import Agent, run
@@ -17,8 +17,8 @@ agent is a class derived from `Agent`, and a call of `run`:
     if __name__ == "__main__":
         run(Hold)
 
-Lengths in m, angles in rad, times in s; positions in the frame of the agent's own robot base, so that both sides
-of a game see the same picture. Start-up and `reset` are not timed; an answer of `act` costs points from 20 ms on.
+Lengths in m, angles in rad, times in s; positions in the base frame of the agent's own robot, so both sides of a game
+see the table alike. Start-up and `reset` are not timed; an answer of `act` costs points from 20 ms on.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ from typing import Any, BinaryIO
 __all__ = ["Agent", "AgentError", "PROTOCOL", "SHAPES", "run"]
 
 PROTOCOL = 1
-"""The version of the protocol that this file speaks."""
+"""The version of the protocol that this file implements."""
 
 SHAPES: dict[int | None, tuple[int, ...]] = {
     1: (7,),
@@ -48,35 +48,35 @@ SHAPES: dict[int | None, tuple[int, ...]] = {
 """The shape of an action for each interpolation: positions (rad); then velocities (rad/s), accelerations (rad/s²)."""
 
 LARGEST_NUMBER = 1e4
-"""The evaluator refuses actions with a number of a larger magnitude."""
+"""The evaluator refuses actions with numbers of a larger magnitude."""
 
 
 class AgentError(Exception):
-    """What an agent does that the evaluator would refuse; the message says what was expected and what came."""
+    """The evaluator would refuse the agent's answer; the message says what was expected and what came."""
 
 
 class Agent:
     """A policy: everything between an observation and an action. Derive from it and write `act`.
 
-    It is made once per process, after `hello`. What it learns in one episode it may use in the next.
+    It is created once per process, after `hello`. Its state may carry over from one episode to the next.
     """
 
     interpolation: int | None = 3
-    """What an action means, a key of `SHAPES`; 3 is positions and velocities at the end of the step, cubic."""
+    """The meaning of an action, a key of `SHAPES`; 3 is positions and velocities at the end of the step, cubic."""
 
     task: str
     """`hit`, `defend`, `prepare`, or `tournament` for a whole game."""
     agent_id: int
     """1 or 2: which robot of the table is the agent's own."""
     env: dict[str, Any]
-    """Table, robot, limits, and where to find what in an observation, as the protocol's documentation lists them."""
+    """Table, robot, limits and indices of an observation, as listed in the protocol's documentation."""
 
     def __init__(self, task: str, agent_id: int, env: dict[str, Any]) -> None:
         self.task, self.agent_id, self.env = task, agent_id, env
         self.start()
 
     def start(self) -> None:
-        """Called once, when task and env are known: the place to load networks and to prepare tables.
+        """Called once, when `task` and `env` are set: load networks and precompute tables here.
 
         Start-up may take 120 s and is not timed.
         """
@@ -87,14 +87,14 @@ class Agent:
     def act(self, observation: list[float]) -> Any:
         """Called at each control step, 50 times per simulated second.
 
-        `observation` has 20 numbers, 23 with an opponent on the table (`hit`, `tournament`). The answer is an
-        action of the shape of `interpolation` (`SHAPES`): lists, tuples or a NumPy array.
+        `observation` has 20 numbers, 23 with an opponent on the table (`hit`, `tournament`). Returns an action
+        of the shape of `interpolation` (`SHAPES`): lists, tuples or a NumPy array.
         """
         raise NotImplementedError(f"{type(self).__name__} has no act(self, observation)")
 
     @staticmethod
     def puck_state(observation: Sequence[float]) -> list[float]:
-        """x, y (m), yaw (rad), and their rates (m/s, rad/s): 6 numbers."""
+        """The puck's x, y (m), yaw (rad), and their rates (m/s, rad/s): 6 numbers."""
         return list(observation[0:6])
 
     @staticmethod
@@ -109,35 +109,35 @@ class Agent:
 
     @staticmethod
     def opponent_position(observation: Sequence[float]) -> list[float] | None:
-        """x, y, z (m) of the other mallet, or None if there is no opponent on the table."""
+        """x, y, z (m) of the opponent's mallet, or None without an opponent on the table."""
         return list(observation[20:23]) or None
 
 
 def run(
     agent_class: type[Agent], requests: Iterable[bytes] | None = None, answers: BinaryIO | None = None
 ) -> None:
-    """Lets an agent answer the evaluator until it says goodbye or goes away.
+    """Runs an agent until `bye` or the end of the input.
 
-    `requests` and `answers` are standard input and output unless given. What the agent prints goes to standard
-    error, which is its log. An exception goes there with its traceback, and in short to the evaluator, whose
-    fault then quotes it; the program ends with status 1.
+    `requests` and `answers` default to standard input and output. Output of `print` goes to standard error, which
+    is the agent's log. An exception is logged with its traceback, and sent in one line to the evaluator, which
+    quotes it in the agent fault; the program ends with status 1.
     """
-    questions: Iterable[bytes] = sys.stdin.buffer if requests is None else requests
+    lines: Iterable[bytes] = sys.stdin.buffer if requests is None else requests
     output: BinaryIO = _private_output() if answers is None else answers
     try:
-        _converse(agent_class, questions, output)
+        _answer_all(agent_class, lines, output)
     except BrokenPipeError:
-        return  # the evaluator has gone away
+        return  # the evaluator has closed the connection
     except Exception as error:
         traceback.print_exc()
         sys.stderr.flush()
-        # No answer to any question: the evaluator takes it as a fault and shows the line to the team.
-        _say(output, {"type": "error", "error": _in_short(error)})
+        # Not a valid answer: the evaluator counts it as an agent fault and shows the line to the team.
+        _write_answer(output, {"type": "error", "error": _summary(error)})
         sys.exit(1)
 
 
 def _private_output() -> BinaryIO:
-    """Standard output for the protocol alone: a stray print(), of a library in C too, goes to the log."""
+    """Reserves standard output for the protocol: any other output, even of C libraries, goes to the log."""
     sys.stdout.flush()
     answers = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)
@@ -145,14 +145,14 @@ def _private_output() -> BinaryIO:
     return answers
 
 
-def _converse(agent_class: type[Agent], requests: Iterable[bytes], answers: BinaryIO) -> None:
+def _answer_all(agent_class: type[Agent], requests: Iterable[bytes], answers: BinaryIO) -> None:
     agent: Agent | None = None
     for line in requests:
         message = json.loads(line)
         kind = message["type"]
         if kind == "hello":
             if message["protocol"] != PROTOCOL:
-                raise AgentError(f"this agent speaks protocol {PROTOCOL}, the evaluator {message['protocol']}")
+                raise AgentError(f"expected protocol {PROTOCOL}, got {message['protocol']} from the evaluator")
             agent = agent_class(message["task"], message["agent_id"], message["env"])
             if agent.interpolation not in SHAPES:
                 raise AgentError(f"interpolation: expected one of {list(SHAPES)}, got {agent.interpolation!r}")
@@ -164,18 +164,18 @@ def _converse(agent_class: type[Agent], requests: Iterable[bytes], answers: Bina
         elif agent is None:
             raise AgentError(f"expected hello first, got {kind!r}")
         elif kind == "step":
-            action = _action(agent.act(message["obs"]), agent.interpolation)
+            action = _check_action(agent.act(message["obs"]), agent.interpolation)
             answer = {"type": "act", "step": message["step"], "action": action}
         elif kind == "reset":
             agent.reset()
             answer = {"type": "ready", "episode": message["episode"]}
         else:
             raise AgentError(f"expected hello, reset, step, end or bye, got {kind!r}")
-        _say(answers, answer)
+        _write_answer(answers, answer)
 
 
-def _action(action: Any, interpolation: int | None) -> Any:
-    """The action as lists of numbers, of the shape that was agreed."""
+def _check_action(action: Any, interpolation: int | None) -> Any:
+    """The action as nested lists of numbers, after a check of its shape."""
     if hasattr(action, "tolist"):
         action = action.tolist()  # NumPy, torch
     expected, got = SHAPES[interpolation], _shape(action)
@@ -188,7 +188,7 @@ def _action(action: Any, interpolation: int | None) -> Any:
 
 
 def _shape(value: Any) -> tuple[int, ...]:
-    """Lengths of nested lists, outermost first; of lists of unequal shapes none fits."""
+    """Lengths of nested lists, outermost first; without those of inner lists whose shapes differ."""
     if hasattr(value, "tolist"):
         value = value.tolist()
     if not isinstance(value, (list, tuple)):
@@ -211,15 +211,15 @@ def _numbers(value: Any, place: str) -> Any:
     return number
 
 
-def _in_short(error: Exception) -> str:
-    """What happened and where, in a line that the evaluator quotes whole."""
-    where = ""
+def _summary(error: Exception) -> str:
+    """Error and location in one line, short enough for the evaluator to quote it in full."""
+    location = ""
     for frame in traceback.extract_tb(error.__traceback__):
         if frame.filename != __file__:
-            where = f" ({os.path.basename(frame.filename)}, line {frame.lineno}, in {frame.name})"
-    return f"{type(error).__name__}: {error}"[:200] + where
+            location = f" ({os.path.basename(frame.filename)}, line {frame.lineno}, in {frame.name})"
+    return f"{type(error).__name__}: {error}"[:200] + location
 
 
-def _say(answers: BinaryIO, answer: dict[str, Any]) -> None:
+def _write_answer(answers: BinaryIO, answer: dict[str, Any]) -> None:
     answers.write(json.dumps(answer, allow_nan=False).encode() + b"\n")
     answers.flush()

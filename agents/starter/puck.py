@@ -1,8 +1,8 @@
-"""Where the puck is and where it will be, from observations that are noisy and sometimes missing."""
+"""Estimates and predicts the puck from noisy, sometimes missing observations."""
 
 DRAG = 0.5  # share of its speed that a sliding puck loses per second
-RIM = 0.75  # share of its speed across a rim that a bounce leaves
-TRUST = 0.35  # how far one observation moves the estimated velocity
+RIM = 0.75  # coefficient of restitution of a bounce off a rim
+TRUST = 0.35  # weight of one observation in the estimated velocity
 
 
 class Puck:
@@ -16,19 +16,19 @@ class Puck:
         self.last = None
 
     def observe(self, obs):
-        """Takes in an observation: x, y, yaw and their rates come first."""
+        """Updates the estimate with an observation, which begins with x, y, yaw and their rates."""
         x, y, _, vx, vy, _ = obs[:6]
         if self.last is None:
             self.x, self.y, self.vx, self.vy = x, y, vx, vy
         elif (x, y) == self.last and vx == vy == 0.0:
-            # Not seen: the old place comes again, with no velocity at all. It will have slid on.
+            # Tracking is lost: the old position is repeated with zero velocity. The puck has moved on.
             self.x, self.y, self.vx, self.vy = self.after(self.dt)
         else:
-            # Two witnesses for the velocity: what is reported, and the way since the last step.
+            # Two measurements of the velocity: the reported one, and the displacement since the last step.
             _, _, vx_now, vy_now = self.after(self.dt)
             measured_x = 0.5 * (vx + (x - self.x) / self.dt)
             measured_y = 0.5 * (vy + (y - self.y) / self.dt)
-            # After a hit, the old estimate is worth nothing.
+            # After a hit the old estimate is invalid.
             jump = abs(measured_x - vx_now) + abs(measured_y - vy_now) > 0.7
             trust = 1.0 if jump else TRUST
             self.vx = vx_now + trust * (measured_x - vx_now)
@@ -37,7 +37,7 @@ class Puck:
         self.last = (x, y)
 
     def after(self, time):
-        """x, y, vx and vy after some time; bounces off the long rims count, all else does not."""
+        """x, y, vx and vy after `time`, s; only bounces off the long rims are modelled."""
         slide = time * (1 - 0.5 * DRAG * min(time, 2.0))
         fade = 1 - DRAG * min(time, 1.9)
         x, y = self.x + self.vx * slide, self.y + self.vy * slide

@@ -1,13 +1,13 @@
 #!/bin/sh
-# Makes the wheel of the Python package, and tests it where nothing but that wheel is installed.
+# Builds the wheel of the Python package, and tests it in an environment without the sources.
 #   test.sh wheel       one wheel in TARGET/wheels, for glibc 2.17 and later: zig links it
-#   test.sh test [...]  a wheel for this host's glibc of the development build, as the programs are that it is compared with;
-#                       pytest where it alone is installed. The rest of the arguments goes to pytest
-#   test.sh learning    that wheel beside the libraries that need torch; the examples learn anew
-#   test.sh versions    the environments' tests, of the wheel in TARGET/wheels, by each interpreter of PYTHONS
+#   test.sh test [...]  a wheel of the development build for this host's glibc, like the programs it is compared with; runs
+#                       pytest on it, with the remaining arguments
+#   test.sh learning    the wheel with libraries that need torch; repeats the training of the examples
+#   test.sh versions    the environments' tests on the wheel in TARGET/wheels, with each interpreter of PYTHONS
 # TARGET_DIR (default: target), PYTHON (default: python3) and PYTHONS (default: PYTHON) may be set.
 #
-# Programs of an environment are started by its interpreter: their first lines name it, and a path with a space is none there.
+# Programs of an environment are started through its interpreter: shebang lines do not work with a space in the path.
 set -eu
 
 here=$(cd "$(dirname "$0")" && pwd)
@@ -17,7 +17,7 @@ mkdir -p "$target"
 target=$(cd "$target" && pwd)
 python=${PYTHON:-python3}
 
-# An environment with what a file requires, made again only when the file has changed.
+# An environment with the requirements of a file, created again only when the file has changed.
 environment() {
     wanted=$(cksum < "$2")
     if [ "$(cat "$1/made-of" 2>/dev/null)" != "$wanted" ]; then
@@ -28,13 +28,13 @@ environment() {
     fi
 }
 
-# Makes a wheel in a folder; the rest are arguments of maturin.
+# Builds a wheel in a folder; the other arguments are maturin's.
 wheel() {
     environment "$target/python-build" "$here/requirements-build.txt"
     out=$1
     shift
     rm -rf "$out"
-    # The interpreter is named so that one of an active environment is not taken; abi3 makes it one for all.
+    # The interpreter is named so that an active environment is not used; abi3 makes the wheel valid for all versions.
     (cd "$here" && PATH="$target/python-build/bin:$PATH" CARGO_TARGET_DIR="$target" \
         "$target/python-build/bin/python" -m maturin build --quiet --locked --interpreter "$python" --out "$out" "$@")
     ls "$out"/*.whl
@@ -50,7 +50,7 @@ case ${1:-} in
         environment "$target/python-test" "$here/requirements-test.txt"
         "$target/python-test/bin/python" -m pip install --quiet --disable-pip-version-check --force-reinstall --no-deps \
             "$target"/wheels-of-this-host/*.whl
-        # Elsewhere than beside the sources, which would be imported in place of what is installed.
+        # Not in the sources' folder, because they would be imported instead of the installed wheel.
         cd "$target"
         "$target/python-test/bin/python" -m mypy --config-file "$here/pyproject.toml" "$here/python/faceoff"
         "$target/python-test/bin/python" -m mypy --config-file "$here/pyproject.toml" "$root"/agents/examples/*.py
@@ -70,9 +70,9 @@ case ${1:-} in
             --rootdir "$here" "$here/tests_learning" "$@"
         ;;
     versions)
-        for one in ${PYTHONS:-$python}; do
+        for interpreter in ${PYTHONS:-$python}; do
             rm -rf "$target/python-version"
-            "$one" -m venv "$target/python-version"
+            "$interpreter" -m venv "$target/python-version"
             "$target/python-version/bin/python" -m pip install --quiet --disable-pip-version-check \
                 "$target"/wheels/*.whl "gymnasium${GYMNASIUM:-}" pettingzoo pytest
             cd "$target"

@@ -1,29 +1,29 @@
-# Sourced by docker/test-engine.sh: a day in containers, asked from outside by the API and the command line.
+# Sourced by docker/test-engine.sh: a day in containers, controlled from outside by API and command line.
 # shellcheck shell=sh
 : "${work:?}" "${folder:?}" "${repository:?}" "${program:?}"
 #
-# is_so CONDITION PATH: is it true, in Python and of the server's answer `a`?
-is_so() {
+# holds CONDITION PATH: is a Python condition true for the server's answer `a`?
+holds() {
     curl --silent --show-error --fail --noproxy '*' --max-time 20 --header "Authorization: Bearer $FACEOFF_ADMIN_TOKEN" \
         "$FACEOFF_SERVER$2" >"$work/answer" 2>"$work/log" &&
         python3 -c 'import json, sys; a = json.load(open(sys.argv[1])); sys.exit(not eval(sys.argv[2]))' "$work/answer" "$1"
 }
-# awaited SECONDS CONDITION PATH
-awaited() {
+# wait_until SECONDS CONDITION PATH
+wait_until() {
     ends=$(($(date +%s) + $1))
-    until is_so "$2" "$3"; do
+    until holds "$2" "$3"; do
         [ "$(date +%s)" -lt "$ends" ] || {
             for container in nats server worker-1 worker-2; do
                 echo "--- $container" && docker logs --tail 30 $container
             done >&2
             cat "$work/answer" "$work/log" >&2
-            fail "$3: for $1 s it was not so that $2"
+            fail "$3: after $1 s still not: $2"
         }
         sleep 1
     done
 }
-# started SERVICE [MORE]: as compose.yaml says, with more for its configuration.
-started() {
+# start_service SERVICE [MORE]: as in compose.yaml, with MORE appended to its configuration.
+start_service() {
     python3 "$folder/engine/service.py" "$1" "$work/configs" ${2:+"$2"} >"$work/words"
     set --
     while read -r word; do
@@ -32,19 +32,19 @@ started() {
     quietly docker run --detach "$@"
 }
 
-# There may be fewer CPUs here than the file has for them, and no time is measured.
+# This host may have fewer CPUs than the file assigns, and no time is measured.
 SERVER_CPUS=0-$(($(nproc) - 1))
 export SERVER_CPUS WORKER_1_CPUS="$SERVER_CPUS" WORKER_2_CPUS="$SERVER_CPUS"
-# A short day, in shards enough for both workers, and no time limit that a busy machine could miss.
+# A short day with enough shards for both workers, without time limits that a busy machine could exceed.
 {
     cat "$repository/tests/patient.toml"
     printf '[evaluation]\nepisodes_per_task = 4\nepisodes_per_shard = 1\n'
 } >"$work/short.toml"
 quietly docker network create --internal work
-started nats
-started server "$work/short.toml"
-started worker-1
-started worker-2
+start_service nats
+start_service server "$work/short.toml"
+start_service worker-1
+start_service worker-2
 FACEOFF_SERVER=http://$(docker inspect --format '{{.NetworkSettings.Networks.work.IPAddress}}' server):8080
 FACEOFF_ADMIN_TOKEN=''
 export FACEOFF_SERVER FACEOFF_ADMIN_TOKEN
@@ -52,17 +52,17 @@ for _ in $(seq 120); do
     ! FACEOFF_ADMIN_TOKEN=$(docker exec server cat /data/admin-token 2>/dev/null) || break
     sleep 0.5
 done
-[ -n "$FACEOFF_ADMIN_TOKEN" ] || fail "the server has made no token: $(docker logs server 2>&1)"
-awaited 120 'sorted(w["name"] for w in a["workers"] if w["state"] == "idle") == ["worker-1", "worker-2"]' /api/v1/workers
-awaited 60 True /readyz
+[ -n "$FACEOFF_ADMIN_TOKEN" ] || fail "the server has not written its token: $(docker logs server 2>&1)"
+wait_until 120 'sorted(w["name"] for w in a["workers"] if w["state"] == "idle") == ["worker-1", "worker-2"]' /api/v1/workers
+wait_until 60 True /readyz
 echo "server, NATS and two workers are ready in containers"
 
 team_token=$("$program" admin --json create-team Contained | python3 -c 'import json, sys; print(json.load(sys.stdin)["token"])')
-quietly env FACEOFF_TOKEN="$team_token" "$program" submit "$work/ours.tar"
+quietly env FACEOFF_TOKEN="$team_token" "$program" submit "$work/agent.tar"
 evaluation=/api/v1/evaluations/$("$program" admin --json start-day |
     python3 -c 'import json, sys; [made] = json.load(sys.stdin)["created"]; print(made["id"])')
-awaited 300 'a["state"] not in ("queued", "running", "finalising")' "$evaluation"
-is_so 'a["state"] == "finished" and [t["episodes"] for t in a["result"]["tasks"].values()] == [4] * 3 and a["result"]["score"] >= 0' "$evaluation" || {
+wait_until 300 'a["state"] not in ("queued", "running", "finalising")' "$evaluation"
+holds 'a["state"] == "finished" and [t["episodes"] for t in a["result"]["tasks"].values()] == [4] * 3 and a["result"]["score"] >= 0' "$evaluation" || {
     cat "$work/answer" >&2
     fail "the evaluation of an image is not finished with a score"
 }
@@ -71,21 +71,21 @@ for worker in worker-1 worker-2; do
     played=$(grep -c 'committed' "$work/log" || true)
     [ "$played" -gt 0 ] || {
         cat "$work/log" >&2
-        fail "$worker has played nothing"
+        fail "$worker has run no shard"
     }
-    echo "$worker has played $played shards"
+    echo "$worker has run $played shards"
 done
-! docker logs server 2>&1 | grep -E 'ERROR|committed.*work=(hit|defend|prepare) ' || fail "the server has errors in its log, or played by itself"
+! docker logs server 2>&1 | grep -E 'ERROR|committed.*work=(hit|defend|prepare) ' || fail "the server has errors in its log, or ran shards itself"
 
-# SIGTERM is enough: whoever is killed after the time of grace ends with status 137.
+# SIGTERM must suffice: a container that is killed after the grace period ends with status 137.
 for container in worker-1 worker-2 server nats; do
     began=$(date +%s)
     quietly docker stop $container
     status=$(docker inspect --format '{{.State.ExitCode}}' $container)
-    # NATS ends with 1 when it is asked to.
+    # NATS ends with status 1 on SIGTERM.
     [ "$status" = 0 ] || [ "$container $status" = 'nats 1' ] || {
         docker logs --tail 30 $container >&2
-        fail "$container ended with status $status when it was asked to end"
+        fail "$container ended with status $status on SIGTERM"
     }
-    echo "$container ends when it is asked to, with status $status in $(($(date +%s) - began)) s"
+    echo "$container ends on SIGTERM with status $status in $(($(date +%s) - began)) s"
 done

@@ -1,5 +1,5 @@
-"""Makes calls that docker/seccomp.json refuses, each in a way that would do no harm. Ends with status 1, and names them, if one is answered
-otherwise than by EPERM; and if one that bubblewrap needs is answered so."""
+"""Makes harmless system calls that docker/seccomp.json refuses. Prints the calls and ends with status 1 if one of them does not fail with EPERM, or if
+a call that bubblewrap needs does."""
 
 import ctypes
 import errno
@@ -23,7 +23,7 @@ NUMBERS = {  # name: x86_64, aarch64
     "swapon": (167, 224),
     "userfaultfd": (323, 282),
 }
-# No namespace, and nothing mounted.
+# These arguments create no namespace and unmount nothing.
 NEEDED = {"unshare": ((272, 97), 0), "umount2": ((166, 39), 0)}
 
 libc = ctypes.CDLL(None, use_errno=True)
@@ -36,9 +36,9 @@ def is_refused(number, first):
     return ctypes.get_errno() == errno.EPERM
 
 
-# -1 is no request of ptrace's, no flags of another's, and NULL is no name of a file or a key.
+# -1 is not a valid request of ptrace or flag of the others, and NULL is not a valid name of a file or key.
 wrong = [name for name, numbers in NUMBERS.items() if not is_refused(numbers[column], 0 if name == "settimeofday" else -1)]
 wrong += [name for name, (numbers, first) in NEEDED.items() if is_refused(numbers[column], first)]
 if wrong:
-    print("let through, or refused though it is needed:", *wrong)
+    print("allowed, or refused although needed:", *wrong)
 sys.exit(bool(wrong))

@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""runc, which starts containers and processes in them without the capabilities that this host does not have (see start.sh)."""
+"""Wraps runc: removes capabilities that this host does not have from containers and their processes (see start.sh)."""
 
 import json
 import os
@@ -7,11 +7,11 @@ import subprocess
 import sys
 
 
-def after(word):
+def argument_after(word):
     return sys.argv[sys.argv.index(word) + 1]
 
 
-def there():
+def available_capabilities():
     with open("/proc/self/status") as text:
         bounding = next(line.split()[1] for line in text if line.startswith("CapBnd:"))
     decoded = subprocess.run(["capsh", "--decode=" + bounding], capture_output=True, text=True, check=True).stdout
@@ -20,16 +20,16 @@ def there():
 
 file = None
 if "create" in sys.argv:
-    file = os.path.join(after("--bundle"), "config.json")
+    file = os.path.join(argument_after("--bundle"), "config.json")
 elif "exec" in sys.argv:
-    file = after("--process")
+    file = argument_after("--process")
 if file:
     with open(file) as text:
         config = json.load(text)
     sets = config.get("process", config).get("capabilities", {})
-    mine = there()
+    available = available_capabilities()
     for kind, names in sets.items():
-        sets[kind] = [name for name in names if name in mine]
+        sets[kind] = [name for name in names if name in available]
     with open(file, "w") as text:
         json.dump(config, text)
 os.execvp("runc", ["runc", *sys.argv[1:]])

@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
-"""A service of docker/compose.yaml as arguments of `docker run`, one a line, in place of Compose's own program.
+"""Prints a service of docker/compose.yaml as arguments of `docker run`, one per line; replaces the Compose program.
 
-usage: service.py SERVICE CONFIGS [MORE]      (CONFIGS: a folder for the files that Compose would mount; MORE: what to append to them)
+usage: service.py SERVICE CONFIGS [MORE]      (CONFIGS: a folder for the files that Compose would mount; MORE: files to append to them)
 
-A key that this script does not know is refused, so that nothing of the file is left out unseen. Left out on purpose are the way in from
-outside, for whoever tries the service is inside, and what is to be started before.
+Unknown keys are refused, so that no setting is ignored silently. Ports and dependencies are left out on purpose: the test is inside the
+network and starts the services in order.
 """
 
 import os
@@ -21,7 +21,7 @@ service = compose["services"][name]
 
 def volume(value):
     if value.split(":")[0] not in compose["volumes"]:
-        sys.exit(f"error: {name} has the volume {value}, which is none of the file's")
+        sys.exit(f"error: {name} has the volume {value}, which the file does not define")
     return ["--volume", value]
 
 
@@ -34,12 +34,12 @@ def config(value):
 
 
 def variables(value):
-    """With the environment's values, as Compose has them."""
+    """Substitutes environment variables like Compose."""
     return re.sub(r"\$\{(\w+):-([^}]*)\}", lambda found: os.environ.get(found[1]) or found[2], value)
 
 
 def network(value):
-    """The one without a way out."""
+    """The internal network of the service."""
     return ["--network", next(one for one in value if compose["networks"][one].get("internal")), "--network-alias", name]
 
 

@@ -1,9 +1,9 @@
-"""Gives sessions of ONNX Runtime as many threads as the sandbox says that there are CPUs for.
+"""Limits sessions of ONNX Runtime to as many threads as the sandbox has CPUs.
 
-ONNX Runtime takes its number of threads from no environment variable. Left alone it starts one for each CPU that it
-finds and binds each to one of them, which fails under a cpuset. What an agent sets itself stays as it is.
+ONNX Runtime reads its number of threads from no environment variable. By default it starts one thread per CPU that it
+finds and binds each thread to a CPU, which fails under a cpuset. Numbers that an agent sets are kept.
 
-Loaded at each start of the interpreter, by a .pth file; it costs nothing until onnxruntime is imported.
+A .pth file loads this module at each start of the interpreter; it has no cost until onnxruntime is imported.
 """
 
 import os
@@ -14,13 +14,13 @@ from typing import Any, Sequence
 
 
 def threads() -> int:
-    """The number of threads to use: that of OMP_NUM_THREADS, or else one for each CPU that may be used."""
-    told = os.environ.get("OMP_NUM_THREADS", "")
-    return int(told) if told.isdecimal() and int(told) > 0 else len(os.sched_getaffinity(0))
+    """The number of threads to use: OMP_NUM_THREADS, or the number of available CPUs."""
+    value = os.environ.get("OMP_NUM_THREADS", "")
+    return int(value) if value.isdecimal() and int(value) > 0 else len(os.sched_getaffinity(0))
 
 
 def limit(onnxruntime: ModuleType) -> None:
-    """Has the module's sessions use :func:`threads` threads, where their options leave the number open."""
+    """Makes the module's sessions use :func:`threads` threads, unless their options set a number."""
     session = onnxruntime.InferenceSession
     start = session.__init__
 
@@ -36,10 +36,10 @@ def limit(onnxruntime: ModuleType) -> None:
 
 
 class Watch:
-    """Waits on ``sys.meta_path`` for the import of onnxruntime, and leaves with it."""
+    """Waits on ``sys.meta_path`` for the import of onnxruntime, and then removes itself."""
 
     def find_spec(self, name: str, path: Sequence[str] | None = None, target: ModuleType | None = None) -> ModuleSpec | None:
-        """Finds onnxruntime as Python would, and has it limited once it is loaded; no other module."""
+        """Finds onnxruntime like Python, and limits it when it is loaded; ignores other modules."""
         if name != "onnxruntime":
             return None
         sys.meta_path.remove(self)

@@ -39,7 +39,7 @@ def test_generated_client_uploads_polls_and_downloads(server, client_package):
     team = importlib.import_module("faceoff_client.api.team")
     api = {
         name: importlib.import_module(f"{team.__name__}.{name}")
-        for name in ["create_submission", "submission", "submission_archive"]
+        for name in ["create_submission", "submission", "download_bundle"]
     }
     types = importlib.import_module("faceoff_client.types")
     _, token = server.create_team("Python")
@@ -57,7 +57,7 @@ def test_generated_client_uploads_polls_and_downloads(server, client_package):
         lambda submission: submission.state.value != "validating",
     )
     assert validated.state.value == "valid", validated
-    downloaded = api["submission_archive"].sync(id=sent.parsed.id, client=client)
+    downloaded = api["download_bundle"].sync(id=sent.parsed.id, client=client)
     assert downloaded.payload.read() == archive
 
 

@@ -51,8 +51,8 @@ fn assert_refused(answer: Response, status: u16, kind: &str) -> Value {
 fn assert_second_start_is_refused(server: &Server, day: &Value) {
     let answer = server.post("/api/v1/days", &server.admin_token, &json!({}));
     if get(server, "/api/v1/season", &server.admin_token)["today"] == day["day"] {
-        let problem = assert_refused(answer, 409, "day-has-cut");
-        assert!(problem["next_cut"]["day"].is_string(), "{problem:#}");
+        let problem = assert_refused(answer, 409, "cutoff-passed");
+        assert!(problem["next_cutoff"]["day"].is_string(), "{problem:#}");
     }
 }
 
@@ -170,7 +170,7 @@ fn second_start_and_choice_after_cutoff_change_nothing() {
     let named = json!({ "stage": day["stage"] });
     let answer = server.post("/api/v1/days", &server.admin_token, &named);
     if get(&server, "/api/v1/season", &team.token)["today"] == day["day"] {
-        assert_refused(answer, 409, "day-has-cut");
+        assert_refused(answer, 409, "cutoff-passed");
     }
     let done = team.wait_until_finished(&server, &evaluation);
     assert_eq!(done["state"], "finished", "{done:#}");

@@ -89,7 +89,7 @@ fn dashboards_suffice_to_join_upload_and_start_a_day() {
     drop_file(&ada, "agent.zip", b"no archive at all");
     ada.wait_for(".refused");
     assert!(
-        ada.text(".refused").contains("archive"),
+        ada.text(".refused").contains(".zip bundle"),
         "{}",
         ada.text(".refused")
     );

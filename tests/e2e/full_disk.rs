@@ -220,7 +220,7 @@ fn low_space_refuses_uploads_and_queue_resumes_automatically() {
     assert!(disk.files("uploads").is_empty());
 
     let not_ready = wait_for_health(server, 503);
-    assert_eq!(not_ready["room"], "short", "{not_ready:#}");
+    assert_eq!(not_ready["free_space"], "short", "{not_ready:#}");
     assert_eq!(not_ready["queue"], "paused");
     assert_eq!(not_ready["database"], "writable", "there are 6 MiB left");
     assert_eq!(server.get("/api/v1/health/live", None).status(), 200);
@@ -314,7 +314,7 @@ fn upload_on_disk_that_fills_up_leaves_no_files() {
         .expect("the server answers");
     assert_eq!(refused.status(), 507);
     let full = filled.recv().expect("half of the upload was sent");
-    assert_eq!(wait_for_health(&disk.server, 503)["room"], "short");
+    assert_eq!(wait_for_health(&disk.server, 503)["free_space"], "short");
     drop(full);
     assert!(disk.files("uploads").is_empty());
     assert!(disk.files("artifacts").is_empty());
@@ -366,7 +366,7 @@ fn fill_disk_during_shard(episode: &str, done: u64) {
     hold.release();
     disk.server.wait_for_log("disk full: job released", 1);
     let not_ready = wait_for_health(&disk.server, 503);
-    assert_eq!(not_ready["room"], "short", "{not_ready:#}");
+    assert_eq!(not_ready["free_space"], "short", "{not_ready:#}");
     let running = disk.server.poll(&evaluation, &team.token, |_| true);
     assert_eq!(running["state"], "running", "{running:#}");
     drop(full);

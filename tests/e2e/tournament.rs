@@ -102,8 +102,8 @@ fn commands_run_a_tournament_from_opening_to_close() {
     let decline = ["change", "--declines-friendly-games", "true"];
     member(&server, &bert, "team", &decline).expect_success();
     as_ada("game", &["friendly", "Bob"]).expect_refusal(REFUSED, &["409", "Bob"]);
-    let ordered = as_ada("game", &["--json", "test", "Cup"]).json();
-    let test_game = id(&ordered["ordered"][0]).to_owned();
+    let requested = as_ada("game", &["--json", "test", "Cup"]).json();
+    let test_game = id(&requested["queued"][0]).to_owned();
     let watched = as_ada("game", &["watch", &test_game]).expect_success();
     assert!(
         watched.contains("over: faceoff game show"),

@@ -370,7 +370,7 @@ fn refused_uploads_are_removed_from_disk() {
         // The archive may have been removed before or after the verdict was read.
         for view in [&mut current, &mut verdict] {
             let fields = view.as_object_mut().expect("a submission is an object");
-            fields.remove("archive_removed");
+            fields.remove("bundle_removed");
         }
         assert_eq!(current, verdict, "its reason and log stay");
     }

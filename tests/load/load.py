@@ -202,7 +202,7 @@ def run(season: Season, archive: bytes) -> None:
         """Repeats the load until further evaluations have finished."""
         ids = []
         for team, _ in teams[:10]:
-            path = f"/api/v1/stages/{stage}/days/{day['day']}/extra-turn"
+            path = f"/api/v1/stages/{stage}/days/{day['day']}/extra-evaluation"
             body = {"team": team["id"], "reason": name, "confirm": team["name"]}
             ids.append(season.request("POST", path, admin, body)["id"])
         with ThreadPoolExecutor() as pool:

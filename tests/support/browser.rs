@@ -212,11 +212,8 @@ impl Page<'_> {
     pub fn go_to(&self, url: &str) {
         self.mark_document();
         let navigated = self.call("Page.navigate", &json!({ "url": url }));
-        assert!(
-            navigated["errorText"].is_null(),
-            "{url}: {}",
-            navigated["errorText"]
-        );
+        let error = &navigated["errorText"];
+        assert!(error.is_null(), "{url}: {error}");
         self.wait_for_new_document();
     }
 

@@ -1,4 +1,4 @@
-"""Plays with a trained network, which ONNX Runtime runs."""
+"""An agent with a trained network in ONNX Runtime."""
 
 import onnxruntime
 from faceoff.agent import Agent, run
@@ -7,13 +7,13 @@ from player import Player
 
 
 class Learned(Agent):
-    """What is seen of an observation, what the network makes of it, and how the arm follows: see `player.py`."""
+    """Policy from features through the network to arm commands: see `player.py`."""
 
     interpolation = 3
 
     def start(self) -> None:
         session = onnxruntime.InferenceSession("policy.onnx", providers=["CPUExecutionProvider"])
-        self.player = Player(lambda seen: session.run(["action"], {"seen": seen})[0])
+        self.player = Player(lambda view: session.run(["action"], {"view": view})[0])
 
     def reset(self) -> None:
         self.player.reset()

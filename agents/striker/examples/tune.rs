@@ -67,7 +67,7 @@ fn main() -> anyhow::Result<()> {
         let mut tally = Tally::default();
         for season in first..first + seasons {
             let seed = Seed::from_number(season);
-            let plant = Plant::under(profile.factors(), &settings, seed.model_mismatch());
+            let plant = Plant::for_factors(profile.factors(), &settings, seed.model_mismatch());
             let mut agent = agent(task)?;
             for index in 0..episodes {
                 let mut episode = Episode::new(

@@ -59,7 +59,7 @@ pub enum Action {
 }
 
 impl Action {
-    /// The reason for which the evaluator would refuse the action under `interpolation`; `None` if it is valid.
+    /// Why the evaluator would refuse the action under `interpolation`; `None` if it is valid.
     pub(crate) fn refusal(&self, interpolation: Interpolation) -> Option<String> {
         use Interpolation as I;
         let has_shape = match self {

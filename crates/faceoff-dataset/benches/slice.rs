@@ -1,6 +1,6 @@
-//! One episode out of an archive of some 300 MB, as a replay page would ask for it: the archive is
-//! opened anew each time, and nothing but the page cache is warm.
-#![expect(clippy::unwrap_used, reason = "a benchmark has nobody to tell")]
+//! Reads one episode from an archive of about 300 MB, like a replay page: each time the archive is opened again, and
+//! only the page cache is warm.
+#![expect(clippy::unwrap_used, reason = "a benchmark may panic")]
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use faceoff_dataset::{Dataset, Recorder, ShardFolder, ShardReport, assemble};
@@ -16,7 +16,7 @@ const EPISODES: u32 = 1000;
 const EPISODES_PER_SHARD: u32 = 100;
 const STEPS: u32 = 230;
 
-/// A number that hardly repeats, as measured ones do.
+/// A number that rarely repeats, like a measurement.
 fn noise(number: f64) -> f64 {
     (number * 1e3 + 0.37).sin()
 }
@@ -119,7 +119,7 @@ fn slice(criterion: &mut Criterion) {
         .bytes
         / 1_000_000;
     let read = |columns: Option<&[String]>| {
-        let dataset = Dataset::open_unread(&archive).unwrap();
+        let dataset = Dataset::open_lazily(&archive).unwrap();
         dataset.episode(Task::Prepare, 777, columns).unwrap()
     };
     let mut group = criterion.benchmark_group(format!("an episode of {megabytes} MB"));

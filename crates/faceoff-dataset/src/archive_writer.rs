@@ -9,10 +9,10 @@ use std::{
 };
 use zip::{CompressionMethod, DateTime, ZipWriter, write::SimpleFileOptions};
 
-/// A file of the archive being written.
+/// A file in the archive that is being written.
 pub(crate) type Entry<'a> = HashingWriter<&'a mut ZipWriter<BufWriter<File>>>;
 
-/// The archive being written.
+/// Writes a zip archive and records sizes and hashes of its files.
 pub(crate) struct ArchiveWriter {
     zip: ZipWriter<BufWriter<File>>,
     files: BTreeMap<String, FileDigest>,
@@ -27,7 +27,7 @@ impl ArchiveWriter {
         })
     }
 
-    /// Sizes and hashes of what was added.
+    /// Sizes and hashes of the added files.
     pub const fn files(&self) -> &BTreeMap<String, FileDigest> {
         &self.files
     }
@@ -37,8 +37,8 @@ impl ArchiveWriter {
         name: &str,
         write: impl FnOnce(&mut Entry<'_>) -> Result<(), RecordingError>,
     ) -> Result<(), RecordingError> {
-        // Parquet is compressed already, and read in place. No time is stored: the same shards give the
-        // same bytes.
+        // Parquet is already compressed and is read in place. No time is stored, so that the same shards give
+        // the same bytes.
         let method = if name.ends_with(".parquet") {
             CompressionMethod::Stored
         } else {

@@ -1,4 +1,4 @@
-//! Joins the shards of an evaluation to its dataset, and scores it.
+//! Joins the shards of an evaluation into its dataset, and scores it.
 
 use crate::{
     archive_writer::ArchiveWriter,
@@ -9,7 +9,7 @@ use crate::{
         CALIBRATION_FILE, EPISODES_FILE, LOG_FILE, MANIFEST_FILE, RESULTS_FILE, STEPS_FILE,
         VIOLATIONS_FILE,
     },
-    score::{Scored, Tally, score},
+    score::{ScoredEvaluation, Tally, score},
     shard_folder::ShardRecording,
     simulator::simulator_id,
     table::{ShardTable, join},
@@ -26,39 +26,40 @@ use std::{
     path::{Path, PathBuf},
 };
 
+/// The result of assembling a dataset.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Assembled {
-    /// The score, which is also the dataset's `results.json`.
+pub struct AssembledDataset {
+    /// The score; identical to the dataset's `results.json`.
     pub result: EvaluationResult,
-    /// Size and hash of the archive: published, they vouch for every byte of it.
+    /// Size and hash of the archive. Once published, they authenticate every byte of it.
     pub archive: FileDigest,
-    /// Was there anything to draw replays from?
+    /// Was a pack of clips for replays written?
     pub clips: bool,
 }
 
 /// Joins the recordings of all shards of an evaluation, in any order, into one zip archive:
 /// `steps.parquet`, `episodes.parquet`, `violations.json`, `results.json`, `calibration.json`,
-/// `agent.log` and `manifest.json` with the hashes of the others. What replays are drawn from goes to a pack of
-/// its own, `clips`, if one is wanted; shards of earlier layouts have none.
+/// `agent.log` and `manifest.json` with the hashes of the others. The clips for replays are written to a separate
+/// pack, `clips`, if given; shards of earlier layouts have no clips.
 ///
-/// Nothing is simulated again. The archive is written under a temporary name and renamed; the same
+/// No episode is simulated. The archive is written under a temporary name and renamed; the same
 /// shards give the same bytes. Memory grows with the episodes, not with their steps.
 ///
 /// # Errors
-/// [`RecordingError::Unusable`] when a shard is damaged, incomplete, of another evaluation, ended
-/// by faults, or when episodes are missing or recorded twice; [`RecordingError::Io`].
+/// [`RecordingError::Unusable`] if a shard is damaged, incomplete, of another evaluation or ended by faults, or if
+/// episodes are missing or recorded twice; [`RecordingError::Io`].
 pub fn assemble(
     meta: &EvaluationMeta,
     shard_dirs: &[PathBuf],
     archive: &Path,
     clips: Option<&Path>,
-) -> Result<Assembled, RecordingError> {
+) -> Result<AssembledDataset, RecordingError> {
     let mut shards = shard_dirs
         .iter()
         .map(|dir| ShardRecording::open(dir))
         .collect::<Result<Vec<_>, _>>()?;
     shards.sort_by_key(|shard| (shard.spec.task, shard.spec.episodes.start));
-    let episodes = check(meta, &shards)?;
+    let episodes = check_shards(meta, &shards)?;
     let calibration = calibration(&shards);
     let scored = score(
         meta.ruleset,
@@ -66,7 +67,7 @@ pub fn assemble(
         &meta.variation,
         meta.seed,
         Layout::Four,
-        played(&shards)?,
+        tally_tasks(&shards)?,
         calibration.worst(),
     );
 
@@ -78,7 +79,7 @@ pub fn assemble(
             Ok(digest)
         });
     match written {
-        Ok(archive) => Ok(Assembled {
+        Ok(archive) => Ok(AssembledDataset {
             result: scored.result,
             archive,
             clips: match clips {
@@ -95,7 +96,7 @@ pub fn assemble(
     }
 }
 
-/// Joins what clips there are; `false` if there are none.
+/// Joins the shards' clips; returns `false` if there are none.
 fn join_clips(shards: &[ShardRecording], path: &Path) -> Result<bool, RecordingError> {
     let packs: Vec<PathBuf> = shards
         .iter()
@@ -114,7 +115,7 @@ fn write(
     meta: &EvaluationMeta,
     shards: &[ShardRecording],
     episodes: BTreeMap<Task, u32>,
-    Scored { result, violations }: &Scored,
+    ScoredEvaluation { result, violations }: &ScoredEvaluation,
     calibration: &CalibrationFile,
     path: &Path,
 ) -> Result<(), RecordingError> {
@@ -152,13 +153,13 @@ fn write(
     dataset.finish()
 }
 
-/// All shards belong to this evaluation and together hold each episode of each task once, from 0
-/// on. Returns the number of episodes per task.
-fn check(
+/// Checks that all shards belong to this evaluation and together hold each episode of each task once, from 0 on.
+/// Returns the number of episodes per task.
+fn check_shards(
     meta: &EvaluationMeta,
     shards: &[ShardRecording],
 ) -> Result<BTreeMap<Task, u32>, RecordingError> {
-    let wrong = |what: String| Err(RecordingError::Unusable(what));
+    let unusable = |problem: String| Err(RecordingError::Unusable(problem));
     let mut episodes = BTreeMap::new();
     for ShardRecording { spec, report, .. } in shards {
         let name = format!(
@@ -168,27 +169,27 @@ fn check(
         if (spec.profile, spec.seed, spec.mismatch_seed)
             != (meta.profile, meta.seed, meta.mismatch_seed)
         {
-            return wrong(format!("shard {name} belongs to another evaluation"));
+            return unusable(format!("shard {name} belongs to another evaluation"));
         }
         if spec.ruleset != meta.ruleset {
-            return wrong(format!(
+            return unusable(format!(
                 "shard {name} was played by {}, the evaluation by {}",
                 spec.ruleset, meta.ruleset
             ));
         }
         if spec.perturbations != meta.variation.perturbations {
-            return wrong(format!(
+            return unusable(format!(
                 "shard {name} was played with other magnitudes of the perturbations than the evaluation"
             ));
         }
         if report.stopped_by_faults {
-            return wrong(format!(
+            return unusable(format!(
                 "shard {name} was ended by the agent's faults: there is no score"
             ));
         }
         let next = episodes.entry(spec.task).or_insert(0);
         if spec.episodes.start != *next {
-            return wrong(format!(
+            return unusable(format!(
                 "shard {name} does not follow on episode {next}: episodes are missing or twice"
             ));
         }
@@ -198,17 +199,17 @@ fn check(
             .iter()
             .map(|outcome| (outcome.task, outcome.episode)))
         {
-            return wrong(format!("shard {name} does not report its episodes"));
+            return unusable(format!("shard {name} does not report its episodes"));
         }
         *next = spec.episodes.end;
     }
     if episodes.is_empty() {
-        return wrong("an evaluation without shards".to_owned());
+        return unusable("an evaluation without shards".to_owned());
     }
     Ok(episodes)
 }
 
-/// What each slot measured of itself.
+/// The timing measurements of each slot.
 fn calibration(shards: &[ShardRecording]) -> CalibrationFile {
     CalibrationFile {
         schema: DATASET_SCHEMA.to_owned(),
@@ -224,8 +225,8 @@ fn calibration(shards: &[ShardRecording]) -> CalibrationFile {
     }
 }
 
-/// Outcomes and steps of all shards, which come in order.
-fn played(shards: &[ShardRecording]) -> Result<BTreeMap<Task, Tally>, RecordingError> {
+/// Outcomes and steps of all shards, which are in order.
+fn tally_tasks(shards: &[ShardRecording]) -> Result<BTreeMap<Task, Tally>, RecordingError> {
     let mut steps: BTreeMap<Task, u64> = BTreeMap::new();
     for ShardRecording { spec, report, .. } in shards {
         let outcomes = report.outcomes.iter();
@@ -233,19 +234,19 @@ fn played(shards: &[ShardRecording]) -> Result<BTreeMap<Task, Tally>, RecordingE
             .map(|outcome| u64::from(outcome.steps))
             .sum::<u64>();
     }
-    let mut played: BTreeMap<Task, Tally> = steps
+    let mut tallies: BTreeMap<Task, Tally> = steps
         .iter()
         .map(|(task, steps)| (*task, Tally::new(*steps, Layout::Four)))
         .collect();
     for shard in shards {
-        if let Some(tally) = played.get_mut(&shard.spec.task) {
+        if let Some(tally) = tallies.get_mut(&shard.spec.task) {
             for outcome in &shard.report.outcomes {
                 tally.add_episode(outcome.clone());
             }
             tally.add_table(shard.steps.path())?;
         }
     }
-    for (task, tally) in &played {
+    for (task, tally) in &tallies {
         if tally.steps() != steps[task] {
             return Err(RecordingError::Unusable(format!(
                 "{task}: {} steps are recorded, {} were played",
@@ -254,7 +255,7 @@ fn played(shards: &[ShardRecording]) -> Result<BTreeMap<Task, Tally>, RecordingE
             )));
         }
     }
-    Ok(played)
+    Ok(tallies)
 }
 
 fn write_log(shards: &[ShardRecording], out: &mut dyn Write) -> Result<(), RecordingError> {

@@ -1,6 +1,6 @@
-//! Reads a dataset: the archive, the unpacked folder, or the folder that `faceoff eval` writes.
+//! Reads a dataset: the archive, an unpacked folder, or the folder that `faceoff eval` writes.
 
-mod by_index;
+mod random_access;
 mod container;
 mod episodes;
 mod file_range;
@@ -17,7 +17,7 @@ pub(crate) use container::Container;
 pub(crate) use episodes::{Columns, batches as episode_batches};
 pub(crate) use file_range::FileRange;
 pub(crate) use footer::check as check_footer;
-pub(crate) use steps::{BATCH_ROWS, has_columns};
+pub(crate) use steps::{BATCH_ROWS, check_columns};
 
 use crate::{
     digest,
@@ -39,7 +39,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-/// Every file of a dataset but its manifest.
+/// All files of a dataset except its manifest.
 const FILES: [&str; 6] = [
     STEPS_FILE,
     EPISODES_FILE,
@@ -49,51 +49,51 @@ const FILES: [&str; 6] = [
     LOG_FILE,
 ];
 
-/// A dataset whose files are what its manifest says.
+/// A dataset whose files match its manifest.
 #[derive(Debug)]
 pub struct Dataset {
     path: PathBuf,
     container: Container,
     layout: Layout,
     manifest: DatasetManifest,
-    checked: Checked,
+    hash_check: HashCheck,
 }
 
-/// When files are compared with their hashes.
+/// Time at which files are compared with their hashes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Checked {
-    AtOpening,
-    WhenRead,
+enum HashCheck {
+    OnOpen,
+    OnRead,
 }
 
-/// What can be told of a manifest of any layout.
+/// The field that manifests of all layouts have.
 #[derive(Deserialize)]
-struct Schema {
+struct ManifestSchema {
     schema: String,
 }
 
 impl Dataset {
     /// Opens `dataset.zip`, an unpacked folder, or a folder with a `dataset.zip`, and compares every
-    /// file with its hash, so that a damaged or truncated dataset is never half-read.
+    /// file with its hash, so that a damaged or truncated dataset is never partly read.
     ///
     /// # Errors
     /// [`DatasetError`].
     pub fn open(path: &Path) -> Result<Self, DatasetError> {
-        let mut dataset = Self::open_unread(path)?;
+        let mut dataset = Self::open_lazily(path)?;
         if dataset.layout == Layout::Two {
             dataset.container.check_seal()?;
         }
         FILES.iter().try_for_each(|name| dataset.check(name))?;
-        dataset.checked = Checked::AtOpening;
+        dataset.hash_check = HashCheck::OnOpen;
         Ok(dataset)
     }
 
-    /// As [`Dataset::open`], but each file is compared with its hash when it is read: whoever needs a
-    /// few small files, or one episode, need not wait for hundreds of megabytes.
+    /// Like [`Dataset::open`], but each file is compared with its hash when it is read. Reading a few small files or
+    /// one episode then does not need hundreds of megabytes.
     ///
     /// # Errors
     /// [`DatasetError`].
-    pub fn open_unread(path: &Path) -> Result<Self, DatasetError> {
+    pub fn open_lazily(path: &Path) -> Result<Self, DatasetError> {
         let (path, container) = if !fs::metadata(path)?.is_dir() {
             (path.to_owned(), Container::archive(path)?)
         } else if path.join(MANIFEST_FILE).exists() {
@@ -107,7 +107,7 @@ impl Dataset {
                 )));
             }
             let container = Container::archive(&archive)?;
-            same_results(&path.join(RESULTS_FILE), &container)?;
+            check_results_copy(&path.join(RESULTS_FILE), &container)?;
             (archive, container)
         };
         let (layout, manifest) = manifest(&container)?;
@@ -123,23 +123,23 @@ impl Dataset {
             container,
             layout,
             manifest,
-            checked: Checked::WhenRead,
+            hash_check: HashCheck::OnRead,
         })
     }
 
-    /// Which layout its files have.
+    /// The layout of its files.
     #[must_use]
     pub const fn layout(&self) -> Layout {
         self.layout
     }
 
-    /// What the dataset says about itself.
+    /// The dataset's manifest.
     #[must_use]
     pub const fn manifest(&self) -> &DatasetManifest {
         &self.manifest
     }
 
-    /// Size and hash of the archive, all of which is read; none of an unpacked folder.
+    /// Size and hash of the archive, which is read completely; `None` for an unpacked folder.
     ///
     /// # Errors
     /// [`DatasetError::Io`].
@@ -153,25 +153,25 @@ impl Dataset {
     /// The published score.
     ///
     /// # Errors
-    /// [`DatasetError::Unreadable`] if `results.json` is no score.
+    /// [`DatasetError::Unreadable`] if `results.json` has another format.
     pub fn results(&self) -> Result<EvaluationResult, DatasetError> {
         serde_json::from_slice(&self.bytes(RESULTS_FILE)?)
             .map_err(DatasetError::unreadable(RESULTS_FILE))
     }
 
-    /// Where each constraint was broken, and what was slow.
+    /// Violations of each constraint, and slow answers.
     ///
     /// # Errors
-    /// [`DatasetError::Unreadable`] if `violations.json` is nothing of the kind.
+    /// [`DatasetError::Unreadable`] if `violations.json` has another format.
     pub fn violations(&self) -> Result<ViolationsFile, DatasetError> {
         serde_json::from_slice(&self.bytes(VIOLATIONS_FILE)?)
             .map_err(DatasetError::unreadable(VIOLATIONS_FILE))
     }
 
-    /// What the slots measured of themselves.
+    /// The timing measurements of the slots.
     ///
     /// # Errors
-    /// [`DatasetError::Unreadable`] if `calibration.json` is nothing of the kind.
+    /// [`DatasetError::Unreadable`] if `calibration.json` has another format.
     pub fn calibration(&self) -> Result<CalibrationFile, DatasetError> {
         serde_json::from_slice(&self.bytes(CALIBRATION_FILE)?)
             .map_err(DatasetError::unreadable(CALIBRATION_FILE))
@@ -180,8 +180,8 @@ impl Dataset {
     /// The episodes, in order.
     ///
     /// # Errors
-    /// [`DatasetError::Unreadable`] if the table is not one of episodes, or not of as many as the
-    /// manifest says.
+    /// [`DatasetError::Unreadable`] if it is not a table of episodes, or does not have the number of episodes in the
+    /// manifest.
     pub fn episodes(&self) -> Result<Vec<EpisodeRecord>, DatasetError> {
         let records = episodes::records(&self.episode_batches()?)?;
         for (task, expected) in &self.manifest.episodes {
@@ -189,7 +189,7 @@ impl Dataset {
             let found = found.count();
             if found != *expected as usize {
                 return Err(DatasetError::Unreadable(format!(
-                    "{MANIFEST_FILE} tells of {expected} episodes of {task}, {EPISODES_FILE} holds \
+                    "{MANIFEST_FILE} states {expected} episodes of {task}, {EPISODES_FILE} has \
                      {found}"
                 )));
             }
@@ -197,7 +197,7 @@ impl Dataset {
         Ok(records)
     }
 
-    /// The table of episodes as it is.
+    /// The unparsed table of episodes.
     pub(crate) fn episode_batches(&self) -> Result<Vec<RecordBatch>, DatasetError> {
         episodes::batches(self.table(EPISODES_FILE)?)
     }
@@ -205,10 +205,10 @@ impl Dataset {
     /// The table of control steps.
     ///
     /// # Errors
-    /// [`DatasetError::Unreadable`] if the table is not one of control steps.
+    /// [`DatasetError::Unreadable`] if it is not a table of control steps.
     pub fn steps(&self) -> Result<StepTable, DatasetError> {
         let table = StepTable::open(self.table(STEPS_FILE)?)?;
-        if self.layout == Layout::Four && !table.tells_host_time() {
+        if self.layout == Layout::Four && !table.has_host_time() {
             return Err(DatasetError::Unreadable(format!(
                 "{STEPS_FILE} has no column {HOST_TIME}"
             )));
@@ -216,13 +216,12 @@ impl Dataset {
         Ok(table)
     }
 
-    /// The control steps of one episode, of all columns or of the named ones, in the file's order of
-    /// columns. Little more than these rows is read: the table as a whole is not compared with its hash,
-    /// unless [`Dataset::open`] did so.
+    /// The control steps of one episode, with all columns or the named ones, in the file's order of columns. Little
+    /// more than these rows is read: the table is not compared with its hash unless [`Dataset::open`] did so.
     ///
     /// # Errors
-    /// [`DatasetError::Absent`] if there is no such episode or column, [`DatasetError::Unreadable`] if
-    /// the table is damaged.
+    /// [`DatasetError::Absent`] if the episode or a column does not exist, [`DatasetError::Unreadable`] if the table
+    /// is damaged.
     pub fn episode(
         &self,
         task: Task,
@@ -242,21 +241,21 @@ impl Dataset {
             }
             Some(_) => {}
         }
-        by_index::episode(self.range(STEPS_FILE)?, task, episode, columns)
+        random_access::episode(self.range(STEPS_FILE)?, task, episode, columns)
     }
 
     /// A small file's bytes.
     pub(crate) fn bytes(&self, name: &str) -> Result<Vec<u8>, DatasetError> {
-        self.check_if_unread(name)?;
+        self.check_on_read(name)?;
         self.container.bytes(name)
     }
 
     fn table(&self, name: &str) -> Result<FileRange, DatasetError> {
-        self.check_if_unread(name)?;
+        self.check_on_read(name)?;
         self.range(name)
     }
 
-    /// A table of the size that the manifest says.
+    /// Opens a table after a check of its size against the manifest.
     fn range(&self, name: &str) -> Result<FileRange, DatasetError> {
         let (range, listed) = (self.container.range(name)?, &self.manifest.files[name]);
         if range.bytes == listed.bytes {
@@ -268,10 +267,10 @@ impl Dataset {
         )))
     }
 
-    fn check_if_unread(&self, name: &str) -> Result<(), DatasetError> {
-        match self.checked {
-            Checked::AtOpening => Ok(()),
-            Checked::WhenRead => self.check(name),
+    fn check_on_read(&self, name: &str) -> Result<(), DatasetError> {
+        match self.hash_check {
+            HashCheck::OnOpen => Ok(()),
+            HashCheck::OnRead => self.check(name),
         }
     }
 
@@ -289,13 +288,13 @@ impl Dataset {
 
 fn manifest(container: &Container) -> Result<(Layout, DatasetManifest), DatasetError> {
     let bytes = container.bytes(MANIFEST_FILE)?;
-    // The layout first: a manifest of another one may lack fields.
-    let Schema { schema } =
+    // Check the layout first: a manifest of another layout may lack fields.
+    let ManifestSchema { schema } =
         serde_json::from_slice(&bytes).map_err(DatasetError::unreadable(MANIFEST_FILE))?;
-    let Some(layout) = Layout::of(&schema) else {
+    let Some(layout) = Layout::from_schema(&schema) else {
         return Err(DatasetError::Foreign(format!(
             "the dataset's layout is {schema:?}, this version reads {}",
-            Layout::all()
+            Layout::schema_list()
         )));
     };
     let manifest =
@@ -303,12 +302,12 @@ fn manifest(container: &Container) -> Result<(Layout, DatasetManifest), DatasetE
     Ok((layout, manifest))
 }
 
-/// The score beside the archive, if there is one, is the one inside.
-fn same_results(path: &Path, container: &Container) -> Result<(), DatasetError> {
+/// Checks that a `results.json` beside the archive equals the one inside.
+fn check_results_copy(path: &Path, container: &Container) -> Result<(), DatasetError> {
     match fs::read(path) {
-        Ok(beside) if beside == container.bytes(RESULTS_FILE)? => Ok(()),
+        Ok(copy) if copy == container.bytes(RESULTS_FILE)? => Ok(()),
         Ok(_) => Err(DatasetError::Altered(format!(
-            "{} is not the {RESULTS_FILE} inside of {ARCHIVE_FILE}",
+            "{} is not the {RESULTS_FILE} in {ARCHIVE_FILE}",
             path.display()
         ))),
         Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),

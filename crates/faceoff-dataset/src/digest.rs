@@ -6,7 +6,7 @@ use std::{
     path::Path,
 };
 
-/// Passes bytes on and keeps their count and hash.
+/// Forwards bytes and computes their count and hash.
 pub(crate) struct HashingWriter<W> {
     inner: W,
     hasher: blake3::Hasher,
@@ -22,7 +22,7 @@ impl<W> HashingWriter<W> {
         }
     }
 
-    /// Count and hash of what passed.
+    /// Count and hash of the bytes so far.
     pub fn digest(&self) -> FileDigest {
         FileDigest {
             bytes: self.bytes,
@@ -44,9 +44,8 @@ impl<W: Write> Write for HashingWriter<W> {
     }
 }
 
-/// Hashes of what an episode's steps were given from outside: the actions, and apart from them the
-/// measured times. An action may differ in a bit that moves nothing, and a time follows from nothing;
-/// the hashes show both.
+/// Hashes of the external inputs of an episode's steps: one of the actions, one of the measured times. A changed bit
+/// of an action may have no effect on the motion, and a time follows from no other number; the hashes detect both.
 #[derive(Debug, Default)]
 pub(crate) struct StepDigests {
     actions: blake3::Hasher,
@@ -55,19 +54,19 @@ pub(crate) struct StepDigests {
 
 impl StepDigests {
     /// Adds an answered step: the action's numbers as little-endian doubles; the computation time and
-    /// the CPU time in nanoseconds as little-endian 64-bit integers, −1 for a CPU time that is not
-    /// known, then, if the host took some of the time, −2 and that time.
-    pub fn add(&mut self, action: &[f64], answered: &AnswerTiming) {
+    /// the CPU time in nanoseconds as little-endian 64-bit integers, −1 for an unknown CPU time; then, if host
+    /// interference is not 0, −2 and the interference.
+    pub fn add(&mut self, action: &[f64], timing: &AnswerTiming) {
         for number in action {
             self.actions.update(&number.to_le_bytes());
         }
-        let cpu_time_ns = answered.cpu_time_s.map_or(-1, nanoseconds);
+        let cpu_time_ns = timing.cpu_time_s.map_or(-1, nanoseconds);
         self.times
-            .update(&nanoseconds(answered.computation_time_s).to_le_bytes());
+            .update(&nanoseconds(timing.computation_time_s).to_le_bytes());
         self.times.update(&cpu_time_ns.to_le_bytes());
-        let host_time_ns = nanoseconds(answered.host_time_s);
+        let host_time_ns = nanoseconds(timing.host_time_s);
         if host_time_ns != 0 {
-            // No computation time is negative: this cannot be taken for the next step's.
+            // Computation times are not negative, so −2 cannot be mistaken for the next step's.
             self.times.update(&(-2_i64).to_le_bytes());
             self.times.update(&host_time_ns.to_le_bytes());
         }
@@ -84,7 +83,7 @@ pub(crate) fn of_file(path: &Path) -> io::Result<FileDigest> {
     of_reader(&mut fs_err::File::open(path)?)
 }
 
-/// Count and hash of all bytes that come.
+/// Count and hash of all bytes of a reader.
 pub(crate) fn of_reader(reader: &mut dyn io::Read) -> io::Result<FileDigest> {
     let mut hashing = HashingWriter::new(io::sink());
     io::copy(reader, &mut hashing)?;

@@ -2,25 +2,25 @@ use faceoff_replay::ReplayError;
 use faceoff_types::is_full_disk;
 use std::{error::Error, fmt::Display, io};
 
-/// A recording that could not be made or joined; never the agent's fault.
+/// Failure to write or join a recording; never an agent fault.
 #[derive(Debug, thiserror::Error)]
 pub enum RecordingError {
     /// A file could not be read or written; the error names it.
     #[error(transparent)]
     Io(#[from] io::Error),
-    /// There was no room for it; the text says for what.
+    /// The disk is full; the text names the operation.
     #[error("the disk is full: {0}")]
     FullDisk(String),
-    /// What was recorded is damaged, incomplete, or belongs elsewhere.
+    /// The recording is damaged, incomplete, or of another evaluation.
     #[error("{0}")]
     Unusable(String),
 }
 
 impl RecordingError {
-    /// What was attempted, and why it failed.
-    pub(crate) fn unusable<E: Error + 'static>(what: impl Display) -> impl FnOnce(E) -> Self {
+    /// Wraps an error with the attempted operation.
+    pub(crate) fn unusable<E: Error + 'static>(context: impl Display) -> impl FnOnce(E) -> Self {
         move |error| {
-            let text = format!("{what}: {error}");
+            let text = format!("{context}: {error}");
             if is_full_disk(&error) {
                 Self::FullDisk(text)
             } else {
@@ -39,29 +39,29 @@ impl From<ReplayError> for RecordingError {
     }
 }
 
-/// Why a dataset cannot be used.
+/// Reason why a dataset cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum DatasetError {
     /// A file could not be read; the error names it.
     #[error(transparent)]
     Io(#[from] io::Error),
-    /// It is no dataset, or not a whole one.
+    /// It is not a dataset, or not a complete one.
     #[error("not a readable dataset: {0}")]
     Unreadable(String),
     /// It is a dataset of another layout, ruleset or simulator.
     #[error("{0}")]
     Foreign(String),
-    /// Its bytes are not those that were published.
+    /// Its bytes differ from the published ones.
     #[error("damaged or altered: {0}")]
     Altered(String),
-    /// It holds no such episode.
+    /// It does not contain the requested episode or column.
     #[error("{0}")]
     Absent(String),
 }
 
 impl DatasetError {
-    /// What was read, and why it makes no sense.
-    pub(crate) fn unreadable<E: Display>(what: impl Display) -> impl FnOnce(E) -> Self {
-        move |error| Self::Unreadable(format!("{what}: {error}"))
+    /// Wraps an error with the file or value that was read.
+    pub(crate) fn unreadable<E: Display>(context: impl Display) -> impl FnOnce(E) -> Self {
+        move |error| Self::Unreadable(format!("{context}: {error}"))
     }
 }

@@ -1,9 +1,8 @@
-//! Recordings of games: writing one as it is played, its archive and each side's own file, reading it, and
-//! verifying it.
+//! Recordings of games: writing during the game, the archive and each side's archive, reading, and verification.
 
 mod archive;
 mod files;
-mod given;
+mod recorded_inputs;
 mod recorder;
 mod recording;
 mod replay;
@@ -11,7 +10,7 @@ mod rows;
 mod table;
 mod verify;
 
-pub use archive::{GameArchives, RecordedGame, clear_game};
+pub use archive::{GameArchives, RecordedGame, remove_game};
 pub use files::{GAME_FILE, GAME_FILES, side_file};
 pub use recorder::GameRecorder;
 pub use recording::GameRecording;

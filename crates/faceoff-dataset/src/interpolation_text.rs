@@ -1,6 +1,6 @@
 use faceoff_types::Interpolation;
 
-/// An interpolation as tables have it: `1` … `5`, `-1` or `null`.
+/// Parses an interpolation of a table: `1` … `5`, `-1` or `null`.
 pub(crate) fn parse(text: &str) -> Option<Interpolation> {
     let code = match text {
         "null" => None,

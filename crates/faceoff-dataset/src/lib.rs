@@ -1,9 +1,8 @@
-//! Recordings of evaluations: the tables' schema, writing a shard as it is played, joining shards to a
-//! dataset and scoring them, reading a dataset as a whole or by episode, and verifying it. The same of games,
-//! which are recorded as a whole.
+//! Recordings of evaluations: schemas of the tables, recording of shards, joining and scoring of shards, reading of
+//! datasets completely or by episode, and verification. Games are recorded and verified likewise, without shards.
 //!
-//! This crate starts no process and knows neither sandbox nor database. It reads no clock: measured
-//! times come from the caller or from the record.
+//! This crate starts no process and depends on neither sandbox nor database. It reads no clock: measured times come
+//! from the caller or from the recording.
 
 mod archive_writer;
 mod assemble;
@@ -23,12 +22,12 @@ mod table;
 mod times;
 pub mod verify;
 
-pub use assemble::{Assembled, assemble};
+pub use assemble::{AssembledDataset, assemble};
 pub use dataset::{Dataset, EpisodeRecord, Layout, StepBatches, StepTable};
 pub use error::{DatasetError, RecordingError};
 pub use files::{ARCHIVE_FILE, CLIPS_FILE};
-pub use granted_files::files_of;
+pub use granted_files::writable_files;
 pub use recorder::Recorder;
 pub use shard::ShardReport;
 pub use shard_folder::{SHARD_FILES, ShardFolder};
-pub use simulator::has_robot;
+pub use simulator::can_draw_plant;

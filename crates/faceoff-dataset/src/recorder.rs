@@ -10,8 +10,8 @@ use faceoff_types::{EpisodeOutcome, Task};
 use fs_err::File;
 use std::io::BufWriter;
 
-/// Writes both tables of a shard and its clips as it is played. Memory is bounded by one episode and one row group,
-/// whatever the shard's size.
+/// Writes both tables and the clips of a shard while it is played. Memory is bounded by one episode and one row
+/// group.
 pub struct Recorder {
     steps: StepRows,
     steps_file: TableWriter,
@@ -20,11 +20,11 @@ pub struct Recorder {
     clips: ClipRecorder<BufWriter<File>>,
 }
 
-/// Episodes that are held before they go to the file.
+/// Episodes that are buffered in memory before they are written.
 const EPISODES_BATCH: usize = 256;
 
 impl Recorder {
-    /// Opens all three in the folder, under temporary names.
+    /// Creates the three files in the folder, under temporary names.
     ///
     /// # Errors
     /// [`RecordingError::Io`].
@@ -53,7 +53,7 @@ impl Recorder {
         Ok(())
     }
 
-    /// Writes what is left and closes all three.
+    /// Writes the buffered rows and closes the files.
     ///
     /// # Errors
     /// [`RecordingError::Io`], or if the tables cannot be written.

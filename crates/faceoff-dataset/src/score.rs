@@ -1,4 +1,4 @@
-//! What follows from the episodes of an evaluation: the score and where constraints were broken.
+//! Computes the score and the list of violations from the episodes of an evaluation.
 
 use crate::{
     dataset::{FileRange, Layout, StepTable},
@@ -23,40 +23,40 @@ use faceoff_wire::dataset::{
 use serde::Serialize;
 use std::{collections::BTreeMap, path::Path};
 
-/// What scoring needs of one answered step.
+/// Data of one answered step for scoring.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Measured {
-    pub answered: AnswerTiming,
+pub(crate) struct StepMeasurement {
+    pub timing: AnswerTiming,
     /// Joint position, joint velocity, end effector, link height; violated when above 0.
     pub constraints: [f64; 4],
 }
 
-/// Gathers what scoring needs of a task, in order of play.
+/// Collects the data of a task for scoring, in order of play.
 #[derive(Debug)]
 pub(crate) struct Tally {
     outcomes: Vec<EpisodeOutcome>,
     times: Times,
-    /// In the order of [`Measured::constraints`].
+    /// In the order of [`StepMeasurement::constraints`].
     violations: [Vec<ConstraintViolation>; 4],
-    /// The slowest answer of each episode, by what counts of it; `None` in layouts that do not tell.
+    /// The slowest answer of each episode by computation time; `None` for layouts without host interference.
     slowest: Option<BTreeMap<u32, (f64, SlowStep)>>,
 }
 
 #[derive(Debug)]
 enum Times {
-    InOrderOfPlay(StepTimes),
-    /// For layout 2, whose mean was summed up from the shortest time on.
-    FromTheShortestOn(Vec<f64>),
+    PlayOrder(StepTimes),
+    /// For layout 2, whose mean was summed in ascending order.
+    Ascending(Vec<f64>),
 }
 
 impl Tally {
-    /// For a task whose episodes have so many steps in all.
+    /// A tally of a task whose episodes have `steps` steps in total.
     pub fn new(steps: u64, layout: Layout) -> Self {
         Self {
             outcomes: Vec::new(),
             times: match layout {
-                Layout::Two => Times::FromTheShortestOn(Vec::new()),
-                Layout::Three | Layout::Four => Times::InOrderOfPlay(StepTimes::for_steps(steps)),
+                Layout::Two => Times::Ascending(Vec::new()),
+                Layout::Three | Layout::Four => Times::PlayOrder(StepTimes::for_steps(steps)),
             },
             violations: Default::default(),
             slowest: (layout == Layout::Four).then(BTreeMap::new),
@@ -67,15 +67,15 @@ impl Tally {
         self.outcomes.push(outcome);
     }
 
-    pub fn add_step(&mut self, episode: u32, step: u32, measured: &Measured) {
+    pub fn add_step(&mut self, episode: u32, step: u32, measured: &StepMeasurement) {
         let AnswerTiming {
             computation_time_s,
             host_time_s,
             cpu_time_s,
-        } = measured.answered;
+        } = measured.timing;
         match &mut self.times {
-            Times::InOrderOfPlay(times) => times.add(computation_time_s),
-            Times::FromTheShortestOn(times) => times.push(computation_time_s),
+            Times::PlayOrder(times) => times.add(computation_time_s),
+            Times::Ascending(times) => times.push(computation_time_s),
         }
         if let Some(slowest) = &mut self.slowest
             && slowest
@@ -139,8 +139,8 @@ impl Tally {
             .map(|name| batch[name].as_primitive::<Int64Type>());
         let constraints = CONSTRAINTS.map(|name| batch[name].as_primitive::<Float64Type>());
         for row in 0..batch.num_rows() {
-            let measured = Measured {
-                answered: AnswerTiming {
+            let measured = StepMeasurement {
+                timing: AnswerTiming {
                     computation_time_s: seconds(times.value(row)),
                     host_time_s: seconds(host_times.value(row)),
                     cpu_time_s: cpu_times
@@ -153,11 +153,11 @@ impl Tally {
         }
     }
 
-    /// Steps that were added.
+    /// Number of added steps.
     pub fn steps(&self) -> u64 {
         match &self.times {
-            Times::InOrderOfPlay(times) => times.count(),
-            Times::FromTheShortestOn(times) => times.len() as u64,
+            Times::PlayOrder(times) => times.count(),
+            Times::Ascending(times) => times.len() as u64,
         }
     }
 }
@@ -165,8 +165,8 @@ impl Tally {
 impl Times {
     fn finish(self) -> StepTimes {
         match self {
-            Self::InOrderOfPlay(times) => times,
-            Self::FromTheShortestOn(mut times) => {
+            Self::PlayOrder(times) => times,
+            Self::Ascending(mut times) => {
                 times.sort_unstable_by(f64::total_cmp);
                 let mut summary = StepTimes::for_steps(times.len() as u64);
                 times.into_iter().for_each(|time_s| summary.add(time_s));
@@ -176,7 +176,7 @@ impl Times {
     }
 }
 
-pub(crate) struct Scored {
+pub(crate) struct ScoredEvaluation {
     pub result: EvaluationResult,
     pub violations: ViolationsFile,
 }
@@ -188,15 +188,15 @@ pub(crate) fn score(
     variation: &Variation,
     seed: Seed,
     layout: Layout,
-    played: BTreeMap<Task, Tally>,
+    tallies: BTreeMap<Task, Tally>,
     timing: Option<SlotTiming>,
-) -> Scored {
+) -> ScoredEvaluation {
     let mut tasks = BTreeMap::new();
     let mut violations = ViolationsFile {
         schema: layout.schema().to_owned(),
         tasks: BTreeMap::new(),
     };
-    for (task, tally) in played {
+    for (task, tally) in tallies {
         let times = tally.times.finish();
         let result = faceoff_scoring::score_task(&tally.outcomes, &times, &variation.tier_bounds);
         tasks.insert(task, result);
@@ -220,7 +220,7 @@ pub(crate) fn score(
     }
     let mut result = faceoff_scoring::score_evaluation(ruleset, profile, seed, variation, tasks);
     result.timing = timing;
-    Scored { result, violations }
+    ScoredEvaluation { result, violations }
 }
 
 /// A JSON file of a dataset, byte for byte.
@@ -235,7 +235,7 @@ fn slow_episode(
     outcome: &EpisodeOutcome,
     slowest: &BTreeMap<u32, (f64, SlowStep)>,
 ) -> Option<SlowEpisode> {
-    // The rule lives in the scoring crate: the points are what an instant agent would not have.
+    // The scoring crate defines the rule: the points are the difference to an agent that answers instantly.
     let instant = EpisodeOutcome {
         computation_time: ComputationTime::default(),
         end: EpisodeEnd::Horizon,

@@ -24,11 +24,10 @@ const REPORT_FILE: &str = "report.json";
 const SHARD_FILE: &str = "shard.json";
 /// Name and version of a shard folder's layout; private to the platform.
 const SHARD_SCHEMA: &str = "faceoff-shard/5";
-/// The layout before, which has no clips.
+/// The previous layout, which has no clips.
 const WITHOUT_CLIPS_SCHEMA: &str = "faceoff-shard/4";
-/// The layouts before that: 2, whose tables split integers by bytes and have no index of pages, and 3, whose
-/// steps do not tell the host's time. An evaluation that was under way when the program was replaced has
-/// such shards.
+/// Earlier layouts: 2, whose tables split integers by bytes and have no page index, and 3, whose steps have no column
+/// for host interference. Evaluations that run during an upgrade of the program have such shards.
 const OLD_SHARD_SCHEMAS: [&str; 2] = ["faceoff-shard/2", "faceoff-shard/3"];
 
 /// The files of a recorded shard.
@@ -54,14 +53,14 @@ struct ShardFile {
     files: BTreeMap<String, FileDigest>,
 }
 
-/// A folder in which a shard is being recorded.
+/// The folder of a shard that is being recorded.
 #[derive(Debug)]
 pub struct ShardFolder {
     dir: PathBuf,
 }
 
 impl ShardFolder {
-    /// Creates the folder, or empties it of what an interrupted run has left.
+    /// Creates the folder, or removes the files of an interrupted run.
     ///
     /// # Errors
     /// [`RecordingError::Io`].
@@ -81,12 +80,12 @@ impl ShardFolder {
         Ok(folder)
     }
 
-    /// Where a file is written before it is complete.
+    /// Path of a file while it is incomplete.
     pub(crate) fn partial(&self, name: &str) -> PathBuf {
         self.dir.join(format!("{name}.partial"))
     }
 
-    /// Adds report and log to the tables, gives all files their names, and states their hashes.
+    /// Writes report and log, gives all files their final names, and writes their hashes to `shard.json`.
     ///
     /// # Errors
     /// [`RecordingError::Io`].
@@ -126,38 +125,38 @@ fn json<T: Serialize>(value: &T) -> Result<Vec<u8>, RecordingError> {
     Ok(bytes)
 }
 
-/// A complete shard folder whose files are what was recorded.
+/// A complete shard folder whose files match their hashes.
 #[derive(Debug)]
 pub(crate) struct ShardRecording {
     pub spec: ShardSpec,
     pub report: ShardReport,
     pub steps: ShardTable,
     pub episodes: ShardTable,
-    /// Its pack of clips; absent of earlier layouts.
+    /// Its pack of clips; `None` for earlier layouts.
     pub clips: Option<PathBuf>,
 }
 
 impl ShardRecording {
     /// Opens a folder and checks every file's size and hash.
     pub fn open(dir: &Path) -> Result<Self, RecordingError> {
-        let damaged = |what: String| {
+        let damaged = |problem: String| {
             RecordingError::Unusable(format!(
-                "{} is damaged or incomplete: {what}",
+                "{} is damaged or incomplete: {problem}",
                 dir.display()
             ))
         };
-        let unread = |name: &'static str| {
+        let unreadable = |name: &'static str| {
             move |error: &dyn std::fmt::Display| damaged(format!("{name}: {error}"))
         };
         let text = fs::read(dir.join(SHARD_FILE)).map_err(|error| match error.kind() {
-            ErrorKind::NotFound => unread(SHARD_FILE)(&error),
-            // What the disk does not give says nothing of what was recorded.
+            ErrorKind::NotFound => unreadable(SHARD_FILE)(&error),
+            // An I/O error does not mean that the recording is damaged.
             _ => error.into(),
         })?;
-        let shard: ShardFile = serde_json::from_slice(&text).map_err(|e| unread(SHARD_FILE)(&e))?;
-        let part = match &*shard.schema {
-            SHARD_SCHEMA | WITHOUT_CLIPS_SCHEMA => ShardTable::Ready,
-            old if OLD_SHARD_SCHEMAS.contains(&old) => ShardTable::Old,
+        let shard: ShardFile = serde_json::from_slice(&text).map_err(|e| unreadable(SHARD_FILE)(&e))?;
+        let table = match &*shard.schema {
+            SHARD_SCHEMA | WITHOUT_CLIPS_SCHEMA => ShardTable::Current,
+            old if OLD_SHARD_SCHEMAS.contains(&old) => ShardTable::Earlier,
             other => {
                 return Err(damaged(format!(
                     "its layout is {other}; this version joins {}, {WITHOUT_CLIPS_SCHEMA} and {SHARD_SCHEMA}",
@@ -167,7 +166,7 @@ impl ShardRecording {
         };
         if shard.ruleset != shard.spec.ruleset {
             return Err(damaged(format!(
-                "it says {} and {}",
+                "it states the rulesets {} and {}",
                 shard.ruleset, shard.spec.ruleset
             )));
         }
@@ -181,7 +180,7 @@ impl ShardRecording {
         let files = FILES.into_iter();
         for name in files.filter(|name| has_clips || *name != CLIPS_FILE) {
             let Some(expected) = shard.files.get(name) else {
-                return Err(damaged(format!("{SHARD_FILE} does not know {name}")));
+                return Err(damaged(format!("{SHARD_FILE} does not list {name}")));
             };
             let path = dir.join(name);
             if !path.exists() {
@@ -196,12 +195,12 @@ impl ShardRecording {
             }
         }
         let text = fs::read(dir.join(REPORT_FILE))?;
-        let report = serde_json::from_slice(&text).map_err(|e| unread(REPORT_FILE)(&e))?;
+        let report = serde_json::from_slice(&text).map_err(|e| unreadable(REPORT_FILE)(&e))?;
         Ok(Self {
             spec: shard.spec,
             report,
-            steps: part(dir.join(STEPS_FILE)),
-            episodes: part(dir.join(EPISODES_FILE)),
+            steps: table(dir.join(STEPS_FILE)),
+            episodes: table(dir.join(EPISODES_FILE)),
             clips: has_clips.then(|| dir.join(CLIPS_FILE)),
         })
     }

@@ -3,10 +3,11 @@ use faceoff_types::{Profile, Seed, Task};
 use faceoff_wire::dataset::SimulatorId;
 use std::sync::OnceLock;
 
-/// Control steps of each fixed episode: enough for the puck to meet rim and mallet.
+/// Control steps of each fixed episode: enough for contacts of the puck with rim and mallet.
 const STEPS: u32 = 60;
 
-/// Who simulates here. The fingerprint covers a short episode of each task with all perturbations.
+/// Version and fingerprint of this simulator. The fingerprint covers a short episode of each task with all
+/// perturbations.
 pub(crate) fn simulator_id() -> &'static SimulatorId {
     static ID: OnceLock<SimulatorId> = OnceLock::new();
     ID.get_or_init(|| SimulatorId {
@@ -15,9 +16,9 @@ pub(crate) fn simulator_id() -> &'static SimulatorId {
     })
 }
 
-/// Has a season a robot by these magnitudes? See [`Plant::can_be_drawn`]; takes up to a second.
+/// Can a plant be drawn within these magnitudes? See [`Plant::can_be_drawn`]; takes up to a second.
 #[must_use]
-pub fn has_robot(settings: &PerturbationSettings, mismatch_seed: Seed) -> bool {
+pub fn can_draw_plant(settings: &PerturbationSettings, mismatch_seed: Seed) -> bool {
     Plant::can_be_drawn(settings, mismatch_seed)
 }
 
@@ -40,7 +41,7 @@ fn fingerprint() -> String {
             add(&mut hasher, episode.observation());
             let mut action = [0.0; 2 * JOINTS];
             action[..JOINTS].copy_from_slice(&held);
-            // A slow swing of the base, so that the arm's dynamics count.
+            // A slow swing of the base joint, so that the fingerprint covers the arm's dynamics.
             action[0] += 0.005 * f64::from(step);
             let outcome = episode.step(&action);
             let c = outcome.constraints;

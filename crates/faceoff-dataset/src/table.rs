@@ -1,4 +1,4 @@
-//! The tables: of an evaluation control steps and episodes, and those of a game: their columns, their rows, their files.
+//! The tables of evaluations (control steps, episodes) and of games: columns, rows, files.
 
 mod columns;
 mod episodes;
@@ -10,5 +10,5 @@ mod writer;
 pub(crate) use episodes::EpisodeRows;
 pub(crate) use game::{EntryRows, MotionRows, RallyRows, SIDE_TIMES, SideRows};
 pub(crate) use join::{ShardTable, join};
-pub(crate) use steps::{CONSTRAINTS, HOST_TIME, StepRows, without_host_time};
+pub(crate) use steps::{CONSTRAINTS, HOST_TIME, StepRows, with_zero_host_time};
 pub(crate) use writer::TableWriter;

@@ -1,13 +1,13 @@
 use std::time::Duration;
 
-/// A measured time in whole nanoseconds, as tables hold it: a third of the bytes that the same time
-/// takes in seconds. Clocks tick in nanoseconds, so that [`seconds`] gives back the very number.
+/// A measured time in whole nanoseconds, as in the tables: a third of the size of the same time in seconds. Clocks
+/// have nanosecond resolution, so [`seconds`] returns the original number.
 pub(crate) fn nanoseconds(time_s: f64) -> i64 {
-    // Saturates; no agent is waited for for centuries.
+    // Saturates after 292 years.
     (time_s * 1e9).round() as i64
 }
 
-/// The time in seconds, as scores use it.
+/// The time in seconds, as in scores.
 pub(crate) fn seconds(time_ns: i64) -> f64 {
     Duration::from_nanos(time_ns.unsigned_abs()).as_secs_f64()
 }
@@ -17,10 +17,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_a_clock_says_survives() {
+    fn nanoseconds_round_trip_clock_times() {
         let mut nanos: u64 = 1;
         for _ in 0..2000 {
-            // Some odd times between a nanosecond and an hour.
+            // Pseudo-random times between a nanosecond and an hour.
             nanos = nanos
                 .wrapping_mul(6_364_136_223_846_793_005)
                 .wrapping_add(1_442_695_040_888_963_407);

@@ -3,12 +3,12 @@
 //! the published score.
 //!
 //! Computation times, CPU times, faults, the slots' calibration and re-runs cannot be simulated.
-//! They are taken from the record, as they are; what follows from them is computed again.
+//! They are taken from the recording; values that follow from them are recomputed.
 
 pub(crate) mod compare;
 mod difference;
 mod error;
-mod feed;
+mod episode_reader;
 mod replay;
 mod season;
 mod shard;
@@ -22,47 +22,46 @@ use crate::{
     dataset::Dataset,
     error::DatasetError,
     files::{CALIBRATION_FILE, RESULTS_FILE, VIOLATIONS_FILE},
-    score::{Scored, Tally, json_file, score},
+    score::{ScoredEvaluation, Tally, json_file, score},
     simulator::simulator_id,
 };
 use faceoff_episode::Arena;
 use faceoff_types::{EvaluationResult, Ruleset, Task, UnknownRuleset};
-use feed::{Feed, Recorded};
+use episode_reader::{EpisodeReader, RecordedEpisode};
 use rayon::{
     ThreadPoolBuilder,
     iter::{IntoParallelRefIterator, ParallelIterator},
 };
-use replay::{Replay, Replayed};
+use replay::{Replayer, ReplayedEpisode};
 use std::{collections::BTreeMap, num::NonZero};
 
 /// Episodes per thread that are read ahead.
 const READ_AHEAD: usize = 8;
 
-/// What was found to be identical.
+/// A dataset that was verified: the simulation gives the same numbers.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Verified {
+pub struct VerifiedDataset {
     pub episodes: u32,
     /// Control steps simulated again.
     pub steps: u64,
-    /// The score, computed again.
+    /// The recomputed score.
     pub result: EvaluationResult,
 }
 
-/// Simulates a dataset again on `workers` threads; `progress` is called after each episode. What is
-/// found does not depend on the number of threads. Memory grows with the episodes, not with their
-/// steps.
+/// Simulates a dataset again on `workers` threads; `progress` is called after each episode. The result does not depend
+/// on the number of threads. Memory grows with the episodes, not with their steps.
 ///
 /// # Errors
-/// [`VerifyError::Differs`] with the first difference in order of task, episode and step; else why
-/// nothing could be compared.
+/// [`VerifyError::Differs`] with the first difference in order of task, episode and step; otherwise the
+/// reason why nothing could be compared.
 pub fn verify(
     dataset: &Dataset,
     workers: NonZero<usize>,
     progress: &(dyn Fn() + Sync),
-) -> Result<Verified, VerifyError> {
-    let ruleset = made_here(dataset)?;
-    let mut feed = Feed::open(dataset)?;
-    let mut totals = Totals::new(dataset, feed.steps_of_tasks());
+) -> Result<VerifiedDataset, VerifyError> {
+    let ruleset = check_reproducible(dataset)?;
+    let mut reader = EpisodeReader::open(dataset)?;
+    let mut totals = Totals::new(dataset, reader.steps_of_tasks());
     let manifest = dataset.manifest();
     let arena = Arena::with_ruleset(
         ruleset,
@@ -71,42 +70,42 @@ pub fn verify(
         manifest.seed,
         manifest.mismatch_seed,
     );
-    let replay = Replay::new(ruleset, arena);
+    let replay = Replayer::new(ruleset, arena);
     let pool = ThreadPoolBuilder::new()
         .num_threads(workers.get())
         .thread_name(|index| format!("verify-{index}"))
         .build()?;
     let ahead = READ_AHEAD * workers.get();
     pool.install(|| {
-        let mut episodes = feed.next_episodes(ahead);
-        while !episodes.read.is_empty() {
-            let simulate = || -> Vec<Result<Replayed, Difference>> {
-                let replayed = episodes.read.par_iter().map(|recorded| {
+        let mut episodes = reader.next_episodes(ahead);
+        while !episodes.episodes.is_empty() {
+            let simulate = || -> Vec<Result<ReplayedEpisode, Difference>> {
+                let replayed = episodes.episodes.par_iter().map(|recorded| {
                     let replayed = replay.episode(recorded);
                     progress();
                     replayed
                 });
                 replayed.collect()
             };
-            let (replayed, next) = match episodes.then {
-                Ok(()) => rayon::join(simulate, || feed.next_episodes(ahead)),
-                // What was read before the trouble comes first.
-                Err(_) => (simulate(), feed::Episodes::default()),
+            let (replayed, next) = match episodes.result {
+                Ok(()) => rayon::join(simulate, || reader.next_episodes(ahead)),
+                // Episodes before the error are reported first.
+                Err(_) => (simulate(), episode_reader::EpisodeBatch::default()),
             };
-            for (replayed, recorded) in replayed.into_iter().zip(&episodes.read) {
+            for (replayed, recorded) in replayed.into_iter().zip(&episodes.episodes) {
                 totals.add(recorded, replayed?);
             }
-            episodes.then?;
+            episodes.result?;
             episodes = next;
         }
-        episodes.then
+        episodes.result
     })?;
     totals.finish(ruleset, dataset)
 }
 
-/// Only the same rules and the same simulator can make the states again, and only magnitudes that a world can have.
-fn made_here(dataset: &Dataset) -> Result<Ruleset, DatasetError> {
-    let (manifest, here) = (dataset.manifest(), simulator_id());
+/// Checks that this version can reproduce the states: same ruleset, same simulator, valid magnitudes.
+fn check_reproducible(dataset: &Dataset) -> Result<Ruleset, DatasetError> {
+    let (manifest, current) = (dataset.manifest(), simulator_id());
     let ruleset = manifest
         .ruleset
         .parse()
@@ -116,25 +115,25 @@ fn made_here(dataset: &Dataset) -> Result<Ruleset, DatasetError> {
         .perturbations
         .check()
         .map_err(|error| DatasetError::Foreign(format!("perturbations.{error}")))?;
-    if &manifest.simulator != here {
+    if &manifest.simulator != current {
         return Err(DatasetError::Foreign(format!(
             "the dataset was simulated by version {} (fingerprint {}), this is version {} \
              (fingerprint {}): verify it with the version that made it",
             manifest.simulator.version,
             manifest.simulator.fingerprint,
-            here.version,
-            here.fingerprint
+            current.version,
+            current.fingerprint
         )));
     }
     Ok(ruleset)
 }
 
-/// What the episodes add up to, in order of play.
+/// Sums over the episodes, in order of play.
 struct Totals {
     episodes: u32,
     steps: u64,
     host_noise_reruns: u32,
-    played: BTreeMap<Task, Tally>,
+    tallies: BTreeMap<Task, Tally>,
 }
 
 impl Totals {
@@ -147,15 +146,15 @@ impl Totals {
             episodes: 0,
             steps: 0,
             host_noise_reruns: 0,
-            played: dataset.manifest().episodes.keys().map(tally).collect(),
+            tallies: dataset.manifest().episodes.keys().map(tally).collect(),
         }
     }
 
-    fn add(&mut self, recorded: &Recorded, replayed: Replayed) {
+    fn add(&mut self, recorded: &RecordedEpisode, replayed: ReplayedEpisode) {
         self.episodes += 1;
         self.steps += u64::from(replayed.outcome.steps);
         self.host_noise_reruns += replayed.host_noise_reruns;
-        if let Some(tally) = self.played.get_mut(&recorded.task) {
+        if let Some(tally) = self.tallies.get_mut(&recorded.task) {
             for (step, measured) in (0..).zip(&replayed.steps) {
                 tally.add_step(recorded.episode, step, measured);
             }
@@ -163,7 +162,7 @@ impl Totals {
         }
     }
 
-    fn finish(self, ruleset: Ruleset, dataset: &Dataset) -> Result<Verified, VerifyError> {
+    fn finish(self, ruleset: Ruleset, dataset: &Dataset) -> Result<VerifiedDataset, VerifyError> {
         let manifest = dataset.manifest();
         let timing = dataset.calibration()?.worst();
         let counted = timing.map_or(0, |timing| timing.host_noise_reruns);
@@ -175,19 +174,19 @@ impl Totals {
                 rally: None,
                 step: None,
                 field: "host_noise_reruns".to_owned(),
-                recorded: format!("{counted} in all"),
-                expected: format!("{}, as the episodes say", self.host_noise_reruns),
+                recorded: format!("{counted} in total"),
+                expected: format!("{}, the sum over the episodes", self.host_noise_reruns),
             }
             .into());
         }
         let (profile, seed) = (manifest.profile, manifest.seed);
-        let Scored { result, violations } = score(
+        let ScoredEvaluation { result, violations } = score(
             ruleset,
             profile,
             &manifest.variation,
             seed,
             dataset.layout(),
-            self.played,
+            self.tallies,
             timing,
         );
         for (name, expected) in [
@@ -195,11 +194,11 @@ impl Totals {
             (RESULTS_FILE, json_file(&result)),
         ] {
             let expected = expected.map_err(DatasetError::unreadable(name))?;
-            if let Some(difference) = compare::json(name, &dataset.bytes(name)?, &expected) {
+            if let Some(difference) = compare::json_difference(name, &dataset.bytes(name)?, &expected) {
                 return Err(difference.into());
             }
         }
-        Ok(Verified {
+        Ok(VerifiedDataset {
             episodes: self.episodes,
             steps: self.steps,
             result,

@@ -33,7 +33,7 @@ impl Arena {
         let factors = profile.factors();
         Self {
             bounds: Bounds::of(ruleset),
-            plant: Plant::under(factors, magnitudes, mismatch_seed),
+            plant: Plant::for_factors(factors, magnitudes, mismatch_seed),
             factors,
             settings: magnitudes.clone(),
             seed,
@@ -62,7 +62,7 @@ impl Arena {
             &self.plant,
             self.seed(task, index),
         )
-        .within(self.bounds)
+        .with_bounds(self.bounds)
     }
 
     /// A game at the start of its first rally. The arena's seed must be the game's.
@@ -75,6 +75,6 @@ impl Arena {
             plant: self.plant.clone(),
             seed: self.seed,
         })
-        .within(self.bounds)
+        .with_bounds(self.bounds)
     }
 }

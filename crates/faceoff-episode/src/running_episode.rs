@@ -147,7 +147,7 @@ impl<S: StepSink> RunningEpisode<S> {
             impacts: self.world.world().impacts(),
         });
         let detail = match self.world.divergence() {
-            Some(divergence) => Some(divergence.what.to_string()),
+            Some(divergence) => Some(divergence.cause.to_string()),
             None if !are_finite(self.world.observation()) => {
                 Some("an observation is not finite".to_owned())
             }

@@ -140,7 +140,7 @@ impl<S: GameSink> RunningGame<S> {
         for ((robot, side), entry) in self.sides.iter_mut().enumerate().zip(&entries) {
             side.start_rally(entry, number, game_step);
             if let Some(interpolation) = entry.interpolation() {
-                self.game.interpolate(robot, interpolation);
+                self.game.set_interpolation(robot, interpolation);
             }
         }
         self.sink.begin_rally(&RallyStart {
@@ -260,7 +260,7 @@ impl<S: GameSink> RunningGame<S> {
             .filter(|(side_state, named)| *named && side_state.fault().is_none())
         {
             let kind = AgentFaultKind::Diverged {
-                detail: divergence.what.to_string(),
+                detail: divergence.cause.to_string(),
             };
             let fault = SideFault { kind, line: None };
             side_state.fail(fault, Phase::Step, rally, step, game_step);

@@ -10,7 +10,7 @@ use axum::{
     response::{IntoResponse, Response},
     routing::{get, put},
 };
-use faceoff_dataset::files_of;
+use faceoff_dataset::writable_files;
 use faceoff_service::{
     services::bundle_stream,
     app::App,
@@ -82,7 +82,7 @@ async fn store_file(
     Path(name): Path<String>,
     body: Body,
 ) -> Result<StatusCode, Problem> {
-    let is_expected = files_of(&grant).contains(&&*name);
+    let is_expected = writable_files(&grant).contains(&&*name);
     let key = grant.storage_key(&name).filter(|_| is_expected);
     let key = key.ok_or_else(|| Problem::not_found("file of this job's recording"))?;
     if let Err(problem) = free_space::check(&app) {

@@ -50,8 +50,8 @@ struct Page {
     sees_observed: bool,
     has_filter: bool,
     tasks: Vec<SelectOption>,
-    went: Vec<SelectOption>,
-    broke: Vec<SelectOption>,
+    outcomes: Vec<SelectOption>,
+    violated: Vec<SelectOption>,
     ends: Vec<SelectOption>,
     table: TableOutline,
     start_maps: Vec<StartMap>,
@@ -157,13 +157,13 @@ pub(super) async fn page(
             .clone()
             .map(|task| option(&query.task, task.as_str(), task.as_str()))
             .collect(),
-        went: [("success", "success"), ("failure", "no success")]
-            .map(|(value, label)| option(&query.went, value, label))
+        outcomes: [("success", "success"), ("failure", "no success")]
+            .map(|(value, label)| option(&query.outcome, value, label))
             .into(),
-        broke: groups
+        violated: groups
             .into_iter()
             .chain(late)
-            .map(|(value, label)| option(&query.broke, value, label))
+            .map(|(value, label)| option(&query.violated, value, label))
             .collect(),
         ends: ends
             .map(|end| option(&query.end, end.as_str(), end_label(end)))

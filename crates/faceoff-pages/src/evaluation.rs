@@ -201,7 +201,7 @@ struct Page {
     team: String,
     agent: Option<String>,
     voided: Option<RulingView>,
-    extra_turn: Option<String>,
+    extra_evaluation: Option<String>,
     day: civil::Date,
     profile: Profile,
     /// Path of the ablation of the submission, if there is one.
@@ -278,7 +278,7 @@ pub(super) async fn page(
         team: view.team_name.to_string(),
         agent: submission.agent_name,
         voided: view.voided.clone(),
-        extra_turn: view.extra_turn.clone(),
+        extra_evaluation: view.extra_evaluation.clone(),
         day: view.day,
         profile: view.profile,
         has_episodes: clips.is_some(),

@@ -155,7 +155,7 @@ pub(super) async fn page(
         is_round_game: matches!(view.purpose, PurposeView::Round { .. }),
         purpose: purpose_text(&view.purpose),
         state: state_text(&view.status, is_hidden),
-        withdrawn_team: view.taken_out_by.map(|team| team.to_string()),
+        withdrawn_team: view.excluded_by.map(|team| team.to_string()),
         next: view.next,
         is_open: matches!(view.status, GameStatus::Queued | GameStatus::Running { .. }),
         has_result: matches!(view.status, GameStatus::Played { .. }),

@@ -59,7 +59,7 @@ impl GameRow {
             is_second_half: second_half,
             state: game_state(&view.status, &teams, is_hidden),
             summary: summary(&view.status, is_hidden),
-            withdrawn_team: view.taken_out_by.clone(),
+            withdrawn_team: view.excluded_by.clone(),
             team_ids: sides.map(|side| side.team),
             teams,
         })

@@ -23,7 +23,7 @@ pub(super) struct SubmissionRow {
 
 impl From<&SubmissionView> for SubmissionRow {
     fn from(view: &SubmissionView) -> Self {
-        let is_deleted = view.archive_removed.is_some();
+        let is_deleted = view.bundle_removed.is_some();
         let is_valid = matches!(view.status, SubmissionStatus::Valid { .. });
         let is_withdrawn = view.withdrawn_at.is_some();
         let (state, class, reason) = match &view.status {
@@ -45,7 +45,7 @@ impl From<&SubmissionView> for SubmissionRow {
             };
             format!(
                 "Position {} of {} in the validation queue; {expected}",
-                queue.place, queue.of
+                queue.position, queue.total
             )
         });
         let name = view.label.clone().or_else(|| view.agent_name.clone());

@@ -131,7 +131,7 @@ pub(super) async fn page(
     };
     let unplayed = view.entrants.iter().filter(|entrant| {
         let is_in = |table: &Standings| table.rows.iter().any(|row| row.team_id == entrant.team);
-        !is_hidden && entrant.left.is_none() && !standings.iter().any(is_in)
+        !is_hidden && entrant.departure.is_none() && !standings.iter().any(is_in)
     });
     let page = Page {
         frame: Frame::for_app(&app, season.name, format!("/tournaments/{id}")),

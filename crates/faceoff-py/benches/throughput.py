@@ -1,9 +1,9 @@
-"""Control steps per second of the Python environments, beside the simulator's own batch in the same run.
+"""Control steps per second of the Python environments, compared with the simulator's batch.
 
     python crates/faceoff-py/benches/throughput.py [--worlds 256] [--threads 2] [--seconds 3] [--task prepare]
 
-Arms are held (actions of 0). A control step is 20 physics steps. What is timed takes turns, so that a busy machine
-slows all down alike; the median of the turns is told.
+Arms hold still (actions of 0). A control step is 20 physics steps. Measurements alternate, so that a busy machine
+affects all alike; prints the median over the rounds.
 """
 
 from __future__ import annotations
@@ -18,85 +18,85 @@ import numpy as np
 from faceoff import _native
 from faceoff.gym import AirHockeyEnv, AirHockeyVectorEnv
 
-TURNS = 7
+ROUNDS = 7
 
 
 def main() -> None:
-    """Times all and prints a table."""
+    """Measures all variants and prints a table."""
     parser = argparse.ArgumentParser()
     parser.add_argument("--worlds", type=int, default=256)
     parser.add_argument("--threads", type=int, default=2)
     parser.add_argument("--seconds", type=float, default=3.0)
     parser.add_argument("--task", default="prepare")
-    given = parser.parse_args()
+    options = parser.parse_args()
     rows = {
-        "one world, Python": (1, one(given.task)),
-        "vector environment, copy": (given.worlds, many(given, copy=True)),
-        "vector environment, no copy": (given.worlds, many(given, copy=False)),
-        "vector environment, send/recv": (given.worlds, sent(given)),
-        "the simulator's batch, Rust": (given.worlds, batch(given)),
+        "one world, Python": (1, step_one(options.task)),
+        "vector environment, copy": (options.worlds, step_many(options, copy=True)),
+        "vector environment, no copy": (options.worlds, step_many(options, copy=False)),
+        "vector environment, send/recv": (options.worlds, send_and_receive(options)),
+        "the simulator's batch, Rust": (options.worlds, step_batch(options)),
     }
-    turn_s = given.seconds / TURNS
+    round_s = options.seconds / ROUNDS
     rates: dict[str, list[float]] = {name: [] for name in rows}
-    for _ in range(TURNS):
+    for _ in range(ROUNDS):
         for name, (worlds, step) in rows.items():
-            count, begun = 0, time.perf_counter()
-            while (taken := time.perf_counter() - begun) < turn_s:
+            count, started_s = 0, time.perf_counter()
+            while (elapsed_s := time.perf_counter() - started_s) < round_s:
                 step()
                 count += worlds
-            rates[name].append(count / taken)
-    whole = statistics.median(rates["the simulator's batch, Rust"])
+            rates[name].append(count / elapsed_s)
+    batch_rate = statistics.median(rates["the simulator's batch, Rust"])
     for name, measured in rates.items():
         rate = statistics.median(measured)
         print(
             f"{name:32} {rate:>10,.0f} control steps/s {20 * rate:>12,.0f} physics steps/s "
-            f"{rate / whole:6.1%} of the batch"
+            f"{rate / batch_rate:6.1%} of the batch"
         )
 
 
-def one(task: str) -> Callable[[], object]:
-    """A step of one world."""
+def step_one(task: str) -> Callable[[], object]:
+    """A function that steps one world."""
     env = AirHockeyEnv(task)  # type: ignore[arg-type]
     env.reset(seed=0)
-    still = np.zeros(7)
+    zeros = np.zeros(7)
 
     def step() -> None:
-        *_, terminated, truncated, _ = env.step(still)
+        *_, terminated, truncated, _ = env.step(zeros)
         if terminated or truncated:
             env.reset()
 
     return step
 
 
-def make(given: argparse.Namespace, *, copy: bool) -> tuple[AirHockeyVectorEnv, np.ndarray]:
-    """Worlds at their start, and actions of 0."""
+def make_worlds(options: argparse.Namespace, *, copy: bool) -> tuple[AirHockeyVectorEnv, np.ndarray]:
+    """Worlds after a reset, and actions of 0."""
     envs = AirHockeyVectorEnv(
-        given.worlds, given.task, threads=given.threads, copy=copy, interpolation=3, autoreset_mode="SameStep"
+        options.worlds, options.task, threads=options.threads, copy=copy, interpolation=3, autoreset_mode="SameStep"
     )
     envs.reset(seed=0)
-    return envs, np.zeros((given.worlds, 14))
+    return envs, np.zeros((options.worlds, 14))
 
 
-def many(given: argparse.Namespace, *, copy: bool) -> Callable[[], object]:
-    """A step of many worlds."""
-    envs, still = make(given, copy=copy)
-    return lambda: envs.step(still)
+def step_many(options: argparse.Namespace, *, copy: bool) -> Callable[[], object]:
+    """A function that steps many worlds."""
+    envs, zeros = make_worlds(options, copy=copy)
+    return lambda: envs.step(zeros)
 
 
-def sent(given: argparse.Namespace) -> Callable[[], object]:
-    """The same, sent and received."""
-    envs, still = make(given, copy=False)
+def send_and_receive(options: argparse.Namespace) -> Callable[[], object]:
+    """A function that steps many worlds by `send` and `recv`."""
+    envs, zeros = make_worlds(options, copy=False)
 
     def step() -> None:
-        envs.send(still)
+        envs.send(zeros)
         envs.recv()
 
     return step
 
 
-def batch(given: argparse.Namespace) -> Callable[[], object]:
-    """The same without Python's half: worlds, episodes and actions alike, no rewards."""
-    worlds = _native.Batch(given.task, given.worlds, given.threads)
+def step_batch(options: argparse.Namespace) -> Callable[[], object]:
+    """A function that steps the simulator's batch: the same worlds and actions, without rewards."""
+    worlds = _native.Batch(options.task, options.worlds, options.threads)
     return worlds.step
 
 

@@ -56,7 +56,7 @@ impl Evaluation {
             .map_err(|error| argument_error("perturbations", "magnitudes of factors", error))?;
         magnitudes
             .check()
-            .map_err(|error| argument_error("perturbations", "magnitudes that a world has", error))?;
+            .map_err(|error| argument_error("perturbations", "valid magnitudes", error))?;
         let arena = py.detach(|| {
             catch_panic(|| {
                 let ruleset = Ruleset::CURRENT;
@@ -121,7 +121,7 @@ impl Evaluation {
         let mut by_task = BTreeMap::<Task, Vec<EpisodeOutcome>>::new();
         for outcome in &outcomes {
             let outcome: EpisodeOutcome = serde_json::from_str(outcome)
-                .map_err(|error| argument_error("outcomes", "what episodes returned", error))?;
+                .map_err(|error| argument_error("outcomes", "outcomes of episodes", error))?;
             by_task.entry(outcome.task).or_default().push(outcome);
         }
         let result = catch_panic(|| {

@@ -47,11 +47,11 @@ impl Game {
     #[new]
     fn new(setup: &str) -> PyResult<Self> {
         let setup: Setup = serde_json::from_str(setup)
-            .map_err(|error| argument_error("setup", "what the environments write", error))?;
+            .map_err(|error| argument_error("setup", "a setup in JSON", error))?;
         setup
             .perturbations
             .check()
-            .map_err(|error| argument_error("perturbations", "magnitudes that a world has", error))?;
+            .map_err(|error| argument_error("perturbations", "valid magnitudes", error))?;
         let actions = [0, 1].map(|robot| Actions {
             mode: setup.action_mode[robot],
             interpolation: setup.interpolation[robot],
@@ -90,7 +90,7 @@ impl Game {
                     interpolation: setup.interpolation,
                     factors,
                     settings: setup.perturbations.clone(),
-                    plant: Plant::under(factors, &setup.perturbations, season),
+                    plant: Plant::for_factors(factors, &setup.perturbations, season),
                     seed: match number {
                         0 => root,
                         _ => root.derive("game", &number.to_le_bytes()),

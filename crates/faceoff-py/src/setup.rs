@@ -40,7 +40,7 @@ impl Setup {
     /// If the setup is invalid.
     pub fn read(json: &str) -> PyResult<Self> {
         let setup: Self = serde_json::from_str(json)
-            .map_err(|error| argument_error("setup", "what the environments write", error))?;
+            .map_err(|error| argument_error("setup", "a setup in JSON", error))?;
         if !(1..=EPISODE_STEPS).contains(&setup.max_episode_steps) {
             return Err(argument_error(
                 "max_episode_steps",
@@ -51,7 +51,7 @@ impl Setup {
         setup
             .perturbations
             .check()
-            .map_err(|error| argument_error("perturbations", "magnitudes that a world has", error))?;
+            .map_err(|error| argument_error("perturbations", "valid magnitudes", error))?;
         let magnitudes = &setup.perturbations;
         let is_drawn = setup.factors.contains(&Factor::ModelMismatch);
         // Thousands of unsuccessful draws would look like a hang.
@@ -61,8 +61,8 @@ impl Setup {
         {
             return Err(argument_error(
                 "perturbations",
-                "magnitudes of model_mismatch under which a plant has such a static error",
-                "some under which none was found",
+                "magnitudes of model_mismatch that allow a plant with this static error",
+                "magnitudes for which no plant was found",
             ));
         }
         Ok(setup)
@@ -92,7 +92,7 @@ impl Setup {
     /// The plant of a world with this seed.
     pub fn plant(&self, seed: Seed) -> Plant {
         let season = self.mismatch_seed.unwrap_or_else(|| seed.model_mismatch());
-        Plant::under(self.factor_set(), &self.perturbations, season)
+        Plant::for_factors(self.factor_set(), &self.perturbations, season)
     }
 
     /// A new episode; `puck` replaces its initial state of the puck.
@@ -109,7 +109,7 @@ impl Setup {
         match puck {
             None => Episode::new(task, interpolation, factors, settings, plant, seed),
             Some(puck) => {
-                Episode::starting_with(task, interpolation, factors, settings, plant, seed, puck)
+                Episode::with_initial_puck(task, interpolation, factors, settings, plant, seed, puck)
             }
         }
     }

@@ -83,7 +83,7 @@ impl Snapshot {
             actions: self.world.actions.clone(),
         };
         let json = serde_json::to_vec(&saved)
-            .map_err(|error| argument_error("state", "one that can be saved", error))?;
+            .map_err(|error| argument_error("state", "a state that can be serialised", error))?;
         let load = py.import("faceoff._native")?.getattr("load_snapshot")?;
         Ok((load, (PyBytes::new(py, &json),)))
     }
@@ -93,7 +93,7 @@ impl Snapshot {
 #[pyfunction]
 pub fn load_snapshot(py: Python<'_>, data: &[u8]) -> PyResult<Snapshot> {
     let saved: SavedState = serde_json::from_slice(data)
-        .map_err(|error| argument_error("state", "one that faceoff has pickled", error))?;
+        .map_err(|error| argument_error("state", "a state pickled by faceoff", error))?;
     let own_version = env!("CARGO_PKG_VERSION");
     if saved.faceoff != own_version {
         return Err(argument_error(
@@ -108,7 +108,7 @@ pub fn load_snapshot(py: Python<'_>, data: &[u8]) -> PyResult<Snapshot> {
         ));
     }
     let setup = serde_json::to_string(&saved.setup)
-        .map_err(|error| argument_error("state", "a setup that can be read", error))?;
+        .map_err(|error| argument_error("state", "a valid setup", error))?;
     let setup = Setup::read(&setup)?;
     if let Some(puck) = &saved.puck {
         check_puck(setup.task, puck)?;

@@ -5,7 +5,7 @@ use crate::{
     setup::Setup,
     world::World,
 };
-use faceoff_sim::{ConstraintValues, Episode, StepOutcome, step_together};
+use faceoff_sim::{ConstraintValues, Episode, StepOutcome, step_episodes};
 use faceoff_types::EpisodeEnd;
 use serde::Deserialize;
 
@@ -45,7 +45,7 @@ pub fn step(
             reader.command(action, &mut world.commanded, command);
         }
     }
-    let outcomes = step_episodes(worlds, &is_stepped, &commands, len);
+    let outcomes = step_marked(worlds, &is_stepped, &commands, len);
     let stepped = worlds
         .iter_mut()
         .enumerate()
@@ -68,7 +68,7 @@ pub fn step(
 }
 
 /// Steps the episodes of the worlds marked in `is_stepped`; returns an outcome for each of them.
-fn step_episodes(
+fn step_marked(
     worlds: &mut [World],
     is_stepped: &[bool],
     commands: &[f64],
@@ -86,6 +86,6 @@ fn step_episodes(
         constraints: ConstraintValues::default(),
     };
     let mut outcomes = vec![unknown; episodes.len()];
-    step_together(&mut episodes, &commands, &mut outcomes);
+    step_episodes(&mut episodes, &commands, &mut outcomes);
     outcomes
 }

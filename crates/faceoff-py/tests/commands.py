@@ -1,4 +1,4 @@
-"""Commands that several tests give."""
+"""Commands shared by several tests."""
 
 import numpy as np
 
@@ -6,13 +6,13 @@ from faceoff.gym import AirHockeyEnv
 
 
 def pump(q: np.ndarray, dq: np.ndarray) -> np.ndarray:
-    """(420,) a whole trajectory, raw, that pushes every joint on in the direction in which it moves."""
+    """A raw trajectory action, (420,), that accelerates every joint in its direction of motion."""
     sign = np.where(dq >= 0.0, 1.0, -1.0)
     return np.tile(np.concatenate([q + 3.0 * sign, 1e4 * sign, 1e4 * sign]), 20)
 
 
-def diverging() -> tuple[AirHockeyEnv, list[np.ndarray]]:
-    """An environment at the start of episode 0 of ``prepare``, seed 0, and actions by which its world diverges."""
+def diverging_actions() -> tuple[AirHockeyEnv, list[np.ndarray]]:
+    """An environment at the start of episode 0 of ``prepare``, seed 0, and actions that make its world diverge."""
     env = AirHockeyEnv("prepare", interpolation=None, action_mode="raw")
     env.reset(seed=0)
     start = env.save()

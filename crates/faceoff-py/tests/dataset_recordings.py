@@ -1,4 +1,4 @@
-"""Recordings that the tests of `faceoff.dataset` share, made by the program once per run."""
+"""Recordings that the tests of `faceoff.dataset` share, made by the program `faceoff` once per run."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ ROOT = Path(__file__).parents[3]
 FIXTURES = ROOT / "tests" / "fixtures"
 PROGRAM = Path(os.environ.get("FACEOFF_BIN", ROOT / "target" / "debug" / "faceoff"))
 
-# Answers with the interpolations 5 and null, breaks limits, answers nonsense in an episode, and does not
-# begin another.
+# An agent with the interpolations 5 and null that violates limits, sends an invalid answer in one episode, and
+# exits at the reset of another.
 ODD_AGENT = """
 import json, sys
 for line in sys.stdin:
@@ -49,14 +49,14 @@ ODD_MANIFEST = 'name = "odd"\ncommand = ["python3", "agent.py"]\nruntime = "pyth
 
 @cache
 def folder() -> Path:
-    """A folder that goes with the tests."""
+    """A temporary folder that is removed after the tests."""
     path = Path(tempfile.mkdtemp(prefix="faceoff-dataset-"))
     atexit.register(shutil.rmtree, path, ignore_errors=True)
     return path
 
 
 def faceoff(*arguments: str | Path) -> str:
-    """Runs the program; gives what it printed."""
+    """Runs the program; returns its output."""
     done = subprocess.run(
         [PROGRAM, *arguments], cwd=folder(), capture_output=True, text=True, check=False
     )
@@ -66,7 +66,7 @@ def faceoff(*arguments: str | Path) -> str:
 
 @cache
 def hold() -> Path:
-    """Three episodes of each task of an agent that holds still."""
+    """Three episodes per task of an agent that holds still."""
     out = folder() / "hold"
     faceoff(
         *("eval", ROOT / "agents" / "hold", "--no-sandbox", "--episodes", "3", "--seed", "5"),
@@ -77,7 +77,7 @@ def hold() -> Path:
 
 @cache
 def odd() -> Path:
-    """Three episodes of `hit` and `defend`: one breaks off, one never begins, one goes on."""
+    """Three episodes of `hit` and `defend`: one is aborted, one never begins, one is complete."""
     bundle, out = folder() / "odd-agent", folder() / "odd"
     bundle.mkdir()
     (bundle / "agent.py").write_text(ODD_AGENT)
@@ -99,7 +99,7 @@ def game() -> Path:
 
 
 def slice_of(dataset: Path, task: str, episode: int) -> list[dict[str, Any]]:
-    """The control steps of an episode as the program reads them, bit for bit."""
+    """The control steps of an episode in the program's output, bit for bit."""
     lines = faceoff(
         *("dataset", "slice", dataset, "--task", task, "--episode", str(episode)),
         *("--format", "jsonl"),
@@ -107,6 +107,6 @@ def slice_of(dataset: Path, task: str, episode: int) -> list[dict[str, Any]]:
     return [json.loads(line) for line in lines.splitlines()]
 
 
-def listed(dataset: Path) -> list[dict[str, Any]]:
-    """The episodes as the program reads them."""
-    return [json.loads(x) for x in faceoff("dataset", "list", dataset, "--json").splitlines()]
+def list_episodes(dataset: Path) -> list[dict[str, Any]]:
+    """The episodes in the program's output."""
+    return [json.loads(line) for line in faceoff("dataset", "list", dataset, "--json").splitlines()]

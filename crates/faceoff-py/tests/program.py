@@ -1,4 +1,4 @@
-"""The program `faceoff`, asked for the numbers that the tests hold the package to."""
+"""Runs the program `faceoff` for the reference values of the tests."""
 
 import json
 import os
@@ -12,25 +12,25 @@ PROGRAM = Path(os.environ.get("FACEOFF_BIN", REPOSITORY / "target" / "debug" / "
 
 
 def faceoff(*arguments: str, stdin: str = "") -> str:
-    """What the program prints; it must succeed."""
+    """The output of the program, which must succeed."""
     done = subprocess.run([PROGRAM, *arguments], input=stdin, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     return done.stdout
 
 
 @cache
-def exported(form: str, model: str = "plant") -> str:
-    """`faceoff sim export`."""
-    return faceoff("sim", "export", "--format", form, "--model", model)
+def exported_model(format_: str, model: str = "plant") -> str:
+    """The output of `faceoff sim export`."""
+    return faceoff("sim", "export", "--format", format_, "--model", model)
 
 
 def kinematics(poses: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """`faceoff sim kinematics`: an answer per pose."""
+    """The results of `faceoff sim kinematics`, one per pose."""
     return lines(faceoff("sim", "kinematics", stdin="\n".join(map(json.dumps, poses))))
 
 
 def trace(scenario: dict[str, Any]) -> list[dict[str, Any]]:
-    """`faceoff sim trace`."""
+    """The states of `faceoff sim trace`."""
     return lines(faceoff("sim", "trace", stdin=json.dumps(scenario)))
 
 

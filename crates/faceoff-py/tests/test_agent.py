@@ -1,4 +1,4 @@
-"""The protocol's loop, as a library in this process and as a program over pipes."""
+"""The protocol loop, as a library in this process and as a program over pipes."""
 
 from __future__ import annotations
 
@@ -31,14 +31,14 @@ def lines(*messages: dict[str, Any]) -> list[bytes]:
     return [json.dumps(message).encode() + b"\n" for message in messages]
 
 
-def answers(agent: type[Agent], *messages: dict[str, Any]) -> list[dict[str, Any]]:
+def answers_of(agent: type[Agent], *messages: dict[str, Any]) -> list[dict[str, Any]]:
     output = io.BytesIO()
     run(agent, lines(*messages), output)
     return [json.loads(line) for line in output.getvalue().splitlines()]
 
 
-def error(agent: type[Agent], *messages: dict[str, Any]) -> str:
-    """What the evaluator is told by an agent that fails; the program ends with status 1."""
+def error_of(agent: type[Agent], *messages: dict[str, Any]) -> str:
+    """The error message that a failing agent sends; the program must end with status 1."""
     output = io.BytesIO()
     with pytest.raises(SystemExit) as ended:
         run(agent, lines(*messages), output)
@@ -50,33 +50,33 @@ def error(agent: type[Agent], *messages: dict[str, Any]) -> str:
     return text
 
 
-def acting(action: Any, order: int | None = 3) -> type[Agent]:
-    class Acting(Agent):
-        interpolation = order
+def constant_agent(action: Any, code: int | None = 3) -> type[Agent]:
+    class ConstantAgent(Agent):
+        interpolation = code
 
         def act(self, observation: list[float]) -> Any:
             return action
 
-    return Acting
+    return ConstantAgent
 
 
-def test_a_conversation_from_hello_to_bye() -> None:
+def test_conversation_runs_from_hello_to_bye() -> None:
     end = {"type": "end", "episode": 17, "steps": 1}
-    said = answers(Hold, HELLO, RESET, STEP, end, RESET, STEP, {"type": "bye"}, STEP)
+    sent = answers_of(Hold, HELLO, RESET, STEP, end, RESET, STEP, {"type": "bye"}, STEP)
     ready = {"type": "ready", "episode": 17}
     act = {"type": "act", "step": 0, "action": [POSE, [0.0] * 7]}
-    assert said == [{"type": "ready", "protocol": 1, "interpolation": 3}, ready, act, ready, act]
+    assert sent == [{"type": "ready", "protocol": 1, "interpolation": 3}, ready, act, ready, act]
 
 
-def test_an_agent_knows_what_it_plays_before_it_starts() -> None:
-    class Knowing(Hold):
+def test_agent_has_task_id_and_env_in_start() -> None:
+    class Probe(Hold):
         def start(self) -> None:
             assert (self.task, self.agent_id, self.env) == ("defend", 2, {"dt": 0.02})
 
-    assert len(answers(Knowing, HELLO, RESET)) == 2
+    assert len(answers_of(Probe, HELLO, RESET)) == 2
 
 
-def test_observations_are_told_apart() -> None:
+def test_observation_accessors_return_their_parts() -> None:
     agent = Hold("hit", 1, {})
     assert agent.puck_state(OBSERVATION) == [1.0, 0.1, 0.2, -1.0, -0.1, -0.2]
     assert agent.joint_positions(OBSERVATION) == POSE
@@ -85,27 +85,27 @@ def test_observations_are_told_apart() -> None:
     assert agent.opponent_position([*OBSERVATION, 2.4, 0.1, 0.16]) == [2.4, 0.1, 0.16]
 
 
-@pytest.mark.parametrize("order", SHAPES)
-def test_every_interpolation_has_its_shape(order: int | None) -> None:
+@pytest.mark.parametrize("code", SHAPES)
+def test_interpolations_accept_actions_of_their_shape(code: int | None) -> None:
     action: Any = 0.5
-    for length in reversed(SHAPES[order]):
+    for length in reversed(SHAPES[code]):
         action = [action] * length
-    said = answers(acting(action, order), HELLO, RESET, STEP)
-    assert said[0]["interpolation"] == order
-    assert said[2]["action"] == action
+    sent = answers_of(constant_agent(action, code), HELLO, RESET, STEP)
+    assert sent[0]["interpolation"] == code
+    assert sent[2]["action"] == action
 
 
-def test_arrays_are_actions_too() -> None:
+def test_arrays_are_accepted_as_actions() -> None:
     numpy = pytest.importorskip("numpy")
     whole = numpy.arange(14, dtype=numpy.float32).reshape(2, 7)
-    in_pieces = [numpy.arange(7), [numpy.float64(7 + i) for i in range(7)]]
-    for action in (whole, in_pieces, tuple(whole)):
-        said = answers(acting(action), HELLO, RESET, STEP)
-        assert said[2]["action"] == whole.tolist()
+    mixed = [numpy.arange(7), [numpy.float64(7 + i) for i in range(7)]]
+    for action in (whole, mixed, tuple(whole)):
+        sent = answers_of(constant_agent(action), HELLO, RESET, STEP)
+        assert sent[2]["action"] == whole.tolist()
 
 
 @pytest.mark.parametrize(
-    ("action", "words"),
+    ("action", "message"),
     [
         ([0.0] * 14, "expected an action of shape [2, 7] for interpolation 3, got [14]"),
         ([[0.0] * 7, [0.0] * 6], "got [2]"),
@@ -115,32 +115,32 @@ def test_arrays_are_actions_too() -> None:
         ([[0.0] * 7, [0.0] * 6 + ["x"]], "action[1][6]: expected a number, got 'x'"),
     ],
 )
-def test_an_action_that_would_be_refused_is_named(action: Any, words: str) -> None:
-    assert words in error(acting(action), HELLO, RESET, STEP)
+def test_invalid_action_error_says_expected_and_got(action: Any, message: str) -> None:
+    assert message in error_of(constant_agent(action), HELLO, RESET, STEP)
 
 
-def test_what_goes_wrong_inside_reaches_log_and_evaluator(capfd: pytest.CaptureFixture[str]) -> None:
+def test_exception_reaches_log_and_evaluator(capfd: pytest.CaptureFixture[str]) -> None:
     class Broken(Hold):
         def act(self, observation: list[float]) -> Any:
             return 1 / 0
 
-    told = error(Broken, HELLO, RESET, STEP)
-    assert told.startswith("ZeroDivisionError: division by zero (test_agent.py, line ")
-    assert told.endswith(", in act)")
+    message = error_of(Broken, HELLO, RESET, STEP)
+    assert message.startswith("ZeroDivisionError: division by zero (test_agent.py, line ")
+    assert message.endswith(", in act)")
     log = capfd.readouterr().err
     assert "Traceback" in log and "return 1 / 0" in log
 
 
-def test_what_an_agent_cannot_answer_is_said() -> None:
-    assert "no act(self, observation)" in error(Agent, HELLO, RESET, STEP)
-    assert "expected hello first, got 'reset'" in error(Hold, RESET)
-    assert "expected hello, reset, step, end or bye, got 'dance'" in error(Hold, HELLO, {"type": "dance"})
-    assert "speaks protocol 1, the evaluator 2" in error(Hold, {**HELLO, "protocol": 2})
-    assert "interpolation: expected one of" in error(acting([], 7), HELLO)
+def test_invalid_messages_end_with_an_error() -> None:
+    assert "no act(self, observation)" in error_of(Agent, HELLO, RESET, STEP)
+    assert "expected hello first, got 'reset'" in error_of(Hold, RESET)
+    assert "expected hello, reset, step, end or bye, got 'dance'" in error_of(Hold, HELLO, {"type": "dance"})
+    assert "expected protocol 1, got 2 from the evaluator" in error_of(Hold, {**HELLO, "protocol": 2})
+    assert "interpolation: expected one of" in error_of(constant_agent([], 7), HELLO)
 
 
-def test_a_stray_print_does_not_reach_the_evaluator(tmp_path: Path) -> None:
-    """Not even one of a library in C, which knows nothing of sys.stdout."""
+def test_print_goes_to_the_log_instead_of_the_evaluator(tmp_path: Path) -> None:
+    """Output of C libraries, which do not use sys.stdout, is redirected, too."""
     (tmp_path / "protocol.py").write_bytes(AGENT_FILE.read_bytes())
     (tmp_path / "agent.py").write_text(
         "import os\n"
@@ -152,7 +152,7 @@ def test_a_stray_print_does_not_reach_the_evaluator(tmp_path: Path) -> None:
         "        return [[0.0] * 7] * 2\n"
         "run(Chatty)\n"
     )
-    # Without site packages: the file stands alone.
+    # Without site packages: the file needs nothing else.
     command = [sys.executable, "-I", "-S", "-c", "import sys; sys.path[0:0] = ['.']; import agent"]
     ended = subprocess.run(
         command, cwd=tmp_path, input=b"".join(lines(HELLO, RESET, STEP)), capture_output=True, check=True

@@ -1,4 +1,4 @@
-"""What cannot be is refused by an exception that names the argument, what was expected and what came."""
+"""Invalid input is refused with an exception that names the argument, the expected and the actual value."""
 
 import pickle
 import subprocess
@@ -11,7 +11,7 @@ import pytest
 
 import faceoff
 import faceoff.gym
-from commands import diverging
+from commands import diverging_actions
 from faceoff import _native
 from faceoff.game import AirHockeyGame, SelfPlayEnv
 from faceoff.gym import AirHockeyEnv, AirHockeyVectorEnv
@@ -41,23 +41,23 @@ ARGUMENTS: list[tuple[dict[str, Any], str]] = [
 ]
 
 
-@pytest.mark.parametrize(("arguments", "words"), ARGUMENTS)
-@pytest.mark.parametrize("make", [AirHockeyEnv, lambda **given: AirHockeyVectorEnv(2, **given)])
-def test_arguments_of_environments(make: Callable[..., Any], arguments: dict[str, Any], words: str) -> None:
+@pytest.mark.parametrize(("arguments", "message"), ARGUMENTS)
+@pytest.mark.parametrize("make", [AirHockeyEnv, lambda **arguments: AirHockeyVectorEnv(2, **arguments)])
+def test_environment_arguments_are_checked(make: Callable[..., Any], arguments: dict[str, Any], message: str) -> None:
     with pytest.raises(faceoff.Error) as caught:
         make(**arguments)
-    assert words in str(caught.value)
+    assert message in str(caught.value)
     assert isinstance(caught.value, (ValueError, TypeError))
 
 
-def test_magnitudes_that_no_robot_has_are_refused_at_once() -> None:
-    nowhere = {"model_mismatch": {"static_error_m": [0.9, 1.0]}}
+def test_impossible_mismatch_magnitudes_are_refused_at_once() -> None:
+    impossible = {"model_mismatch": {"static_error_m": [0.9, 1.0]}}
     with pytest.raises(faceoff.ArgumentError, match="static error"):
-        AirHockeyEnv(profile="model_mismatch", perturbations=nowhere)
+        AirHockeyEnv(profile="model_mismatch", perturbations=impossible)
 
 
 @pytest.mark.parametrize(
-    ("arguments", "words"),
+    ("arguments", "message"),
     [
         ({"num_envs": 0}, "num_envs: expected a whole number from 1"),
         ({"num_envs": 2.0}, "num_envs: expected"),
@@ -66,8 +66,8 @@ def test_magnitudes_that_no_robot_has_are_refused_at_once() -> None:
         ({"render_mode": "human"}, "render_mode: expected one of rgb_array"),
     ],
 )
-def test_arguments_of_many_worlds(arguments: dict[str, Any], words: str) -> None:
-    with pytest.raises(faceoff.Error, match=words):
+def test_vector_environment_arguments_are_checked(arguments: dict[str, Any], message: str) -> None:
+    with pytest.raises(faceoff.Error, match=message):
         AirHockeyVectorEnv(**arguments)
 
 
@@ -85,20 +85,20 @@ ACTIONS: list[tuple[Any, str]] = [
 ]
 
 
-@pytest.mark.parametrize(("action", "words"), ACTIONS)
-def test_actions_of_one_world(action: Any, words: str) -> None:
+@pytest.mark.parametrize(("action", "message"), ACTIONS)
+def test_invalid_actions_are_refused_without_a_step(action: Any, message: str) -> None:
     env = AirHockeyEnv("hit")
     env.reset(seed=0)
     before = env.save()
     with pytest.raises(faceoff.Error) as caught:
         env.step(action)
-    assert words in str(caught.value)
+    assert message in str(caught.value)
     assert str(caught.value).startswith("action: ")
-    # Nothing has happened to the world.
+    # The world is unchanged.
     assert pickle.dumps(env.save()) == pickle.dumps(before)
 
 
-def test_actions_of_many_worlds_name_the_world() -> None:
+def test_invalid_action_error_names_the_world() -> None:
     envs = AirHockeyVectorEnv(3, "hit")
     envs.reset(seed=0)
     actions = np.zeros((3, 7))
@@ -111,7 +111,7 @@ def test_actions_of_many_worlds_name_the_world() -> None:
     envs.step(np.zeros((3, 7)))
 
 
-def test_numbers_out_of_bounds_can_be_clipped_but_no_nan() -> None:
+def test_clipping_accepts_large_numbers_but_not_infinity() -> None:
     env, other = AirHockeyEnv("hit", clip_actions=True), AirHockeyEnv("hit")
     env.reset(seed=0)
     other.reset(seed=0)
@@ -120,15 +120,15 @@ def test_numbers_out_of_bounds_can_be_clipped_but_no_nan() -> None:
         env.step(np.full(7, np.inf))
 
 
-def test_raw_actions_are_bounded_as_on_the_server() -> None:
+def test_raw_actions_have_the_bounds_of_the_server() -> None:
     env = AirHockeyEnv("hit", action_mode="raw")
     env.reset(seed=0)
     with pytest.raises(faceoff.ArgumentError, match="expected numbers from -10000 to 10000, got 10001"):
         env.step(np.full(7, 10001.0))
 
 
-def test_commands_that_make_the_world_diverge_end_the_episode() -> None:
-    env, actions = diverging()
+def test_diverging_commands_end_the_episode_as_agent_fault() -> None:
+    env, actions = diverging_actions()
     for action in actions:
         observation, reward, terminated, truncated, info = env.step(action)
         assert observation in env.observation_space
@@ -139,7 +139,7 @@ def test_commands_that_make_the_world_diverge_end_the_episode() -> None:
 
 
 @pytest.mark.parametrize("make", [AirHockeyEnv, lambda: AirHockeyVectorEnv(2)])
-def test_calls_at_the_wrong_time(make: Callable[[], Any]) -> None:
+def test_calls_before_reset_and_after_close_are_refused(make: Callable[[], Any]) -> None:
     env = make()
     action = np.zeros(env.action_space.shape)
     for call in (lambda: env.step(action), env.save, lambda: env.state):
@@ -154,7 +154,7 @@ def test_calls_at_the_wrong_time(make: Callable[[], Any]) -> None:
             call()
 
 
-def test_a_step_after_the_end_is_refused() -> None:
+def test_step_after_the_end_is_refused() -> None:
     env = AirHockeyEnv("hit", max_episode_steps=1)
     env.reset(seed=0)
     env.step(np.zeros(7))
@@ -165,7 +165,7 @@ def test_a_step_after_the_end_is_refused() -> None:
 
 
 @pytest.mark.parametrize(
-    ("arguments", "words"),
+    ("arguments", "message"),
     [
         ({"seed": -1}, "seed: expected a whole number from 0"),
         ({"seed": 2**63}, "seed: expected"),
@@ -179,13 +179,13 @@ def test_a_step_after_the_end_is_refused() -> None:
     ],
 )
 @pytest.mark.parametrize("make", [AirHockeyEnv, lambda: AirHockeyVectorEnv(2)])
-def test_resets(make: Callable[[], Any], arguments: dict[str, Any], words: str) -> None:
-    with pytest.raises(faceoff.Error, match=words):
+def test_reset_arguments_are_checked(make: Callable[[], Any], arguments: dict[str, Any], message: str) -> None:
+    with pytest.raises(faceoff.Error, match=message):
         make().reset(**arguments)
 
 
 @pytest.mark.parametrize(
-    ("arguments", "words"),
+    ("arguments", "message"),
     [
         ({"seed": [1]}, "one for each of 2 worlds, got 1"),
         ({"seed": "12"}, "seed: expected"),
@@ -196,20 +196,20 @@ def test_resets(make: Callable[[], Any], arguments: dict[str, Any], words: str) 
         ({"options": {"reset_mask": np.array([False, False])}}, "at least one"),
     ],
 )
-def test_resets_of_many_worlds(arguments: dict[str, Any], words: str) -> None:
+def test_vector_reset_arguments_are_checked(arguments: dict[str, Any], message: str) -> None:
     envs = AirHockeyVectorEnv(2)
     envs.reset(seed=0)
-    with pytest.raises(faceoff.Error, match=words):
+    with pytest.raises(faceoff.Error, match=message):
         envs.reset(**arguments)
 
 
-def test_the_first_reset_is_of_all_worlds() -> None:
+def test_first_reset_of_some_worlds_is_refused() -> None:
     mask = np.array([True, False])
     with pytest.raises(faceoff.OrderError, match="all worlds first"):
         AirHockeyVectorEnv(2).reset(options={"reset_mask": mask})
 
 
-def test_states_of_others_and_garbage() -> None:
+def test_foreign_and_invalid_states_are_refused() -> None:
     env = AirHockeyEnv("hit")
     env.reset(seed=0)
     other = AirHockeyEnv("hit", interpolation=3)
@@ -217,25 +217,25 @@ def test_states_of_others_and_garbage() -> None:
         other.restore(env.save())
     with pytest.raises(faceoff.ArgumentTypeError, match="state: expected what save"):
         env.restore(b"state")  # type: ignore[arg-type]
-    (written,) = env.save().__reduce__()[1]
-    for garbage, words in [
-        (b"", "one that faceoff has pickled"),
-        (b"\x80\x04garbage", "one that faceoff has pickled"),
-        (written[: len(written) // 2], "one that faceoff has pickled"),
-        (written.replace(b'"seed":0', b'"seed":-1'), "one that faceoff has pickled"),
-        (written.replace(b'"faceoff":"', b'"faceoff":"9.'), "one pickled by this version"),
-        (written.replace(b'"actions":[]', b'"actions":[1.0]'), "actions of 7 numbers each"),
-        (written.replace(b'"actions":[]', b'"actions":[5,5,5,5,5,5,5]'), "expected numbers from -1 to 1"),
-        (written.replace(b'"puck":null', b'"puck":[9,0,0,0,0,0]'), "puck: expected"),
-        (written.replace(b'"max_episode_steps":500', b'"max_episode_steps":4000000'), "max_episode_steps"),
+    (pickled,) = env.save().__reduce__()[1]
+    for data, message in [
+        (b"", "a state pickled by faceoff"),
+        (b"\x80\x04garbage", "a state pickled by faceoff"),
+        (pickled[: len(pickled) // 2], "a state pickled by faceoff"),
+        (pickled.replace(b'"seed":0', b'"seed":-1'), "a state pickled by faceoff"),
+        (pickled.replace(b'"faceoff":"', b'"faceoff":"9.'), "one pickled by this version"),
+        (pickled.replace(b'"actions":[]', b'"actions":[1.0]'), "actions of 7 numbers each"),
+        (pickled.replace(b'"actions":[]', b'"actions":[5,5,5,5,5,5,5]'), "expected numbers from -1 to 1"),
+        (pickled.replace(b'"puck":null', b'"puck":[9,0,0,0,0,0]'), "puck: expected"),
+        (pickled.replace(b'"max_episode_steps":500', b'"max_episode_steps":4000000'), "max_episode_steps"),
     ]:
-        assert garbage != written
-        with pytest.raises(faceoff.ArgumentError, match=words):
-            _native.load_snapshot(garbage)
+        assert data != pickled
+        with pytest.raises(faceoff.ArgumentError, match=message):
+            _native.load_snapshot(data)
 
 
 @pytest.mark.parametrize("value", [np.nan, "much", None, np.zeros(2)])
-def test_rewards_of_one_world(value: Any) -> None:
+def test_invalid_rewards_are_refused(value: Any) -> None:
     env = AirHockeyEnv("hit", reward=lambda transition: value)
     env.reset(seed=0)
     with pytest.raises(faceoff.Error, match="reward: expected"):
@@ -243,22 +243,22 @@ def test_rewards_of_one_world(value: Any) -> None:
 
 
 @pytest.mark.parametrize("value", [1.0, np.zeros(3), np.full(2, np.inf), "much"])
-def test_rewards_of_many_worlds(value: Any) -> None:
+def test_invalid_vector_rewards_are_refused(value: Any) -> None:
     envs = AirHockeyVectorEnv(2, "hit", reward=lambda transition: value)
     envs.reset(seed=0)
     with pytest.raises(faceoff.Error, match="reward: expected"):
         envs.step(np.zeros((2, 7)))
 
 
-def test_a_picture_without_a_mode() -> None:
+def test_render_without_a_mode_is_refused() -> None:
     for env in (AirHockeyEnv("hit"), AirHockeyVectorEnv(2)):
         env.reset(seed=0)
         with pytest.raises(faceoff.ArgumentError, match="render_mode"):
             env.render()
 
 
-def test_games() -> None:
-    for arguments, words in [
+def test_game_arguments_and_actions_are_checked() -> None:
+    for arguments, message in [
         ({"max_steps": 0}, "max_steps"),
         ({"interpolation": (1, 2, 3)}, "a pair"),
         ({"interpolation": (1, 9)}, "interpolation: expected"),
@@ -266,43 +266,43 @@ def test_games() -> None:
         ({"profile": "x"}, "profile"),
         ({"reward": 1}, "reward"),
     ]:
-        with pytest.raises(faceoff.Error, match=words):
+        with pytest.raises(faceoff.Error, match=message):
             AirHockeyGame(**arguments)  # type: ignore[arg-type]
     game = AirHockeyGame()
     with pytest.raises(faceoff.OrderError, match="reset"):
         game.step({})
     game.reset(seed=0)
     zeros = np.zeros(7)
-    for actions, words in [
+    for actions, message in [
         ({"robot_1": zeros}, "got none for robot_2"),
         ({"robot_1": zeros, "robot_2": zeros, "robot_3": zeros}, "got 'robot_3'"),
         ({"robot_1": zeros, "robot_2": np.zeros(3)}, "action of robot_2: expected an array of shape"),
         ({"robot_1": zeros, "robot_2": np.full(7, np.nan)}, "of robot 2"),
         (None, "expected a mapping"),
     ]:
-        with pytest.raises(faceoff.Error, match=words):
+        with pytest.raises(faceoff.Error, match=message):
             game.step(actions)  # type: ignore[arg-type]
     with pytest.raises(faceoff.Error, match="agent: expected"):
-        game.observation_space("nobody")
+        game.observation_space("robot_3")
     game.close()
     with pytest.raises(faceoff.ClosedError):
         game.reset()
 
 
-def test_pools_of_opponents() -> None:
-    for pool, words in [([], "at least one"), ([3], r"opponents\[0\]: expected a function")]:
-        with pytest.raises(faceoff.Error, match=words):
+def test_opponent_pools_are_checked() -> None:
+    for pool, message in [([], "at least one"), ([3], r"opponents\[0\]: expected a function")]:
+        with pytest.raises(faceoff.Error, match=message):
             SelfPlayEnv(pool)  # type: ignore[arg-type]
     env = SelfPlayEnv([lambda observation: np.zeros(7)])
     with pytest.raises(faceoff.ArgumentError, match="options"):
         env.reset(options={"opponent": 1})
 
 
-def test_evaluations() -> None:
+def test_evaluate_arguments_and_policies_are_checked() -> None:
     def hold(observation: np.ndarray) -> np.ndarray:
         return np.zeros(7)
 
-    for arguments, words in [
+    for arguments, message in [
         ({"tasks": "score"}, "tasks: expected one of"),
         ({"tasks": []}, "tasks: expected"),
         ({"episodes": 0}, "episodes: expected"),
@@ -314,25 +314,25 @@ def test_evaluations() -> None:
         ({"workers": 0}, "workers: expected"),
         ({"perturbations": {"x": 1}}, "perturbations: expected"),
     ]:
-        with pytest.raises(faceoff.Error, match=words):
+        with pytest.raises(faceoff.Error, match=message):
             faceoff.evaluate(hold, **arguments)  # type: ignore[arg-type]
-    for policy, words in [
+    for policy, message in [
         (3, "policy: expected a function"),
         ({"hit": hold}, "got none for defend"),
         (lambda observation: np.zeros(6), "action: expected an array of shape"),
         (lambda observation: np.full(7, np.nan), "action: expected finite"),
         (lambda observation: None, "action: expected"),
     ]:
-        with pytest.raises(faceoff.Error, match=words):
+        with pytest.raises(faceoff.Error, match=message):
             faceoff.evaluate(policy, episodes=1)  # type: ignore[arg-type]
 
 
-def test_a_panic_becomes_an_error() -> None:
+def test_panic_becomes_an_error() -> None:
     with pytest.raises(faceoff.Error, match="the simulator failed.*provoked"):
         _native.provoke_panic()
 
 
-def test_every_error_can_be_caught_by_its_kind_or_as_any() -> None:
+def test_errors_have_standard_and_common_base_classes() -> None:
     assert issubclass(faceoff.ArgumentError, (faceoff.Error, ValueError))
     assert issubclass(faceoff.ArgumentError, faceoff.Error)
     assert issubclass(faceoff.ArgumentTypeError, faceoff.Error)
@@ -341,10 +341,10 @@ def test_every_error_can_be_caught_by_its_kind_or_as_any() -> None:
     assert issubclass(faceoff.ClosedError, faceoff.OrderError)
 
 
-def test_importing_the_package_imports_nothing_else() -> None:
+def test_import_of_the_package_loads_no_dependency() -> None:
     script = (
         "import sys, faceoff; "
         "print([name for name in ('numpy', 'gymnasium', 'pettingzoo', 'faceoff._native') if name in sys.modules])"
     )
-    told = subprocess.run([sys.executable, "-c", script], check=True, capture_output=True, text=True)
-    assert told.stdout.strip() == "[]"
+    result = subprocess.run([sys.executable, "-c", script], check=True, capture_output=True, text=True)
+    assert result.stdout.strip() == "[]"

@@ -1,4 +1,4 @@
-"""`faceoff.dataset` reads the same numbers as the program, whatever the recording's layout."""
+"""`faceoff.dataset` reads the same numbers as the program in all layouts."""
 
 from __future__ import annotations
 
@@ -13,41 +13,41 @@ import pytest
 pytest.importorskip("pyarrow")
 
 import faceoff.dataset as fd  # noqa: E402
-from dataset_recordings import FIXTURES, hold, listed, odd, slice_of  # noqa: E402
+from dataset_recordings import FIXTURES, hold, list_episodes, odd, slice_of  # noqa: E402
 
-OLD = FIXTURES / "dataset-layout-2.zip"
-BEFORE = FIXTURES / "dataset-layout-3.zip"
+LAYOUT_2 = FIXTURES / "dataset-layout-2.zip"
+LAYOUT_3 = FIXTURES / "dataset-layout-3.zip"
 
 
 def recordings() -> list[Path]:
-    return [hold(), odd(), OLD, BEFORE]
+    return [hold(), odd(), LAYOUT_2, LAYOUT_3]
 
 
-@pytest.mark.parametrize("which", range(4))
-def test_every_number_is_the_one_that_the_program_reads(which: int) -> None:
-    path = recordings()[which]
+@pytest.mark.parametrize("index", range(4))
+def test_tables_equal_those_of_the_program(index: int) -> None:
+    path = recordings()[index]
     dataset = fd.open_dataset(path)
     for episode in dataset:
         rows = slice_of(path, episode.task, episode.index)
         table = episode.table().to_pylist()
-        # What an earlier layout did not tell apart is 0 here and not a column there.
+        # Earlier layouts have no such column in the program's output, and 0 in the package.
         rows = [row if "host_time_ns" in row else {**row, "host_time_ns": 0} for row in rows]
         assert table == rows
 
 
-@pytest.mark.parametrize("which", range(4))
-def test_episodes_are_told_as_the_program_tells_them(which: int) -> None:
-    path = recordings()[which]
+@pytest.mark.parametrize("index", range(4))
+def test_episodes_equal_those_of_the_program(index: int) -> None:
+    path = recordings()[index]
     dataset = fd.open_dataset(path)
-    assert len(dataset) == len(listed(path))
-    for episode, told in zip(dataset, listed(path), strict=True):
-        assert (episode.task, episode.index) == (told["task"], told["episode"])
-        assert (episode.seed, episode.interpolation) == (told["seed"], told["interpolation"])
-        assert (episode.steps, episode.end) == (told["steps"], told["end"])
-        assert (episode.success, episode.penalty_points) == (told["success"], told["penalty_points"])
-        assert episode.violated == {k for k, broken in told["violations"].items() if broken}
-        assert episode.computation_time_max_s == told["computation_time"]["max_s"]
-        assert episode.fault == told["fault"]
+    assert len(dataset) == len(list_episodes(path))
+    for episode, expected in zip(dataset, list_episodes(path), strict=True):
+        assert (episode.task, episode.index) == (expected["task"], expected["episode"])
+        assert (episode.seed, episode.interpolation) == (expected["seed"], expected["interpolation"])
+        assert (episode.steps, episode.end) == (expected["steps"], expected["end"])
+        assert (episode.success, episode.penalty_points) == (expected["success"], expected["penalty_points"])
+        assert episode.violated == {group for group, violated in expected["violations"].items() if violated}
+        assert episode.computation_time_max_s == expected["computation_time"]["max_s"]
+        assert episode.fault == expected["fault"]
         assert episode.terminated != episode.truncated
     results = dataset.results["tasks"]
     for task in dataset.tasks:
@@ -55,7 +55,7 @@ def test_episodes_are_told_as_the_program_tells_them(which: int) -> None:
         assert sum(e.success for e in dataset.episodes(task)) == results[task]["successes"]
 
 
-def test_an_episode_has_an_observation_more_than_actions() -> None:
+def test_episode_has_one_more_observation_than_actions() -> None:
     dataset = fd.open_dataset(hold())
     for task, width in (("hit", 23), ("defend", 20), ("prepare", 20)):
         episode = dataset.episode(task, 1)
@@ -70,12 +70,12 @@ def test_an_episode_has_an_observation_more_than_actions() -> None:
         assert arrays.constraints.shape == (steps, 4)
         assert (arrays.opponent_ee is not None) == (task == "hit")
         assert (arrays.computation_time_s > 0).all()
-        # The true state and what was told of it are close, and in their frames.
+        # The true state is close to the observed one, in the documented frames.
         assert np.abs(arrays.joint_pos - arrays.observations[:, 6:13]).max() < 0.01
         assert np.allclose(arrays.ee[:, 2], 0.1645, atol=0.02)
 
 
-def test_arrays_hold_what_the_rows_do() -> None:
+def test_arrays_equal_the_rows() -> None:
     path = hold()
     episode = fd.open_dataset(path).episode("hit", 2)
     rows, arrays = slice_of(path, "hit", 2), episode.to_numpy()
@@ -89,22 +89,22 @@ def test_arrays_hold_what_the_rows_do() -> None:
         assert arrays.computation_time_s[step] == row["computation_time_ns"] / 1e9
 
 
-def test_broken_off_episodes_have_what_was_answered() -> None:
+def test_aborted_episodes_have_their_answered_steps() -> None:
     dataset = fd.open_dataset(odd())
-    broken, missing, whole = dataset.episodes("hit")
-    assert (broken.end, broken.steps, broken.action_shape) == ("agent_fault", 7, (3, 7))
-    assert broken.fault is not None and broken.truncated
-    assert broken.to_numpy().observations.shape == (8, 23)
+    aborted, missing, complete = dataset.episodes("hit")
+    assert (aborted.end, aborted.steps, aborted.action_shape) == ("agent_fault", 7, (3, 7))
+    assert aborted.fault is not None and aborted.truncated
+    assert aborted.to_numpy().observations.shape == (8, 23)
     assert (missing.end, missing.steps) == ("agent_fault", 0)
-    nothing = missing.to_numpy()
-    assert nothing.observations.shape == (0, 23) and len(nothing.actions) == 0
-    assert nothing.puck.shape == (1, 6)
-    assert whole.to_numpy().actions.shape == (whole.steps, 3, 7)
-    assert whole.violated >= {"ee"}
+    empty = missing.to_numpy()
+    assert empty.observations.shape == (0, 23) and len(empty.actions) == 0
+    assert empty.puck.shape == (1, 6)
+    assert complete.to_numpy().actions.shape == (complete.steps, 3, 7)
+    assert complete.violated >= {"ee"}
     assert dataset.episode("defend", 2).to_numpy().actions.shape[1:] == (20, 3, 7)
 
 
-def test_tables_are_cut_by_task_and_column() -> None:
+def test_tables_are_filtered_by_task_and_column() -> None:
     dataset = fd.open_dataset(hold())
     defend = dataset.table(task="defend", columns=["step", "action", "puck_x"])
     assert defend.column_names == ["step", "action", "puck_x"]
@@ -113,12 +113,12 @@ def test_tables_are_cut_by_task_and_column() -> None:
     assert defend["step"].to_pylist() == [step for count in steps for step in range(count)]
     assert dataset.table("episodes", task="prepare")["task"].to_pylist() == ["prepare"] * 3
     assert dataset.table().num_rows == sum(episode.steps for episode in dataset)
-    # Layout 2 has no such column; it is where one asks for it.
-    old = fd.open_dataset(OLD).table(columns=["host_time_ns", "step"])
+    # The column is missing in layout 2; it is added at the requested position.
+    old = fd.open_dataset(LAYOUT_2).table(columns=["host_time_ns", "step"])
     assert old.column_names == ["host_time_ns", "step"] and set(old[0].to_pylist()) == {0}
 
 
-def test_pandas_and_polars_get_the_same() -> None:
+def test_pandas_and_polars_frames_equal_the_table() -> None:
     pytest.importorskip("pandas")
     pytest.importorskip("polars")
     dataset = fd.open_dataset(hold())
@@ -135,10 +135,10 @@ def test_folders_and_repacked_archives_are_read(tmp_path: Path) -> None:
     expected = fd.open_dataset(hold()).table()
     with zipfile.ZipFile(hold() / "dataset.zip") as packed:
         packed.extractall(tmp_path / "folder")
-        with zipfile.ZipFile(tmp_path / "again.zip", "w", zipfile.ZIP_DEFLATED) as again:
+        with zipfile.ZipFile(tmp_path / "repacked.zip", "w", zipfile.ZIP_DEFLATED) as repacked:
             for name in packed.namelist():
-                again.writestr(name, packed.read(name))
-    for path in (tmp_path / "folder", tmp_path / "again.zip", hold() / "dataset.zip"):
+                repacked.writestr(name, packed.read(name))
+    for path in (tmp_path / "folder", tmp_path / "repacked.zip", hold() / "dataset.zip"):
         dataset = fd.open_dataset(path)
         dataset.check()
         assert dataset.table().equals(expected)
@@ -146,7 +146,7 @@ def test_folders_and_repacked_archives_are_read(tmp_path: Path) -> None:
         assert dataset.calibration["shards"] and isinstance(dataset.log, str)
 
 
-def test_importing_it_needs_neither_the_simulator_nor_pandas() -> None:
+def test_import_loads_neither_simulator_nor_pandas() -> None:
     program = (
         "import sys, faceoff.dataset\n"
         "loaded = {'faceoff._native', 'pandas', 'polars', 'minari', 'gymnasium'} & set(sys.modules)\n"

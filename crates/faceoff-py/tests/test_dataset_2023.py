@@ -25,7 +25,7 @@ def load(path: Path) -> Any:
 
 
 def digest(folder: Path) -> dict[str, Any]:
-    """Of each file what its readers get: JSON as it is, of arrays and transitions type and hash."""
+    """The content of each file: JSON as it is, types and hashes of arrays and transitions."""
     out: dict[str, Any] = {}
     for path in sorted(folder.rglob("*.*")):
         name = path.relative_to(folder).as_posix()
@@ -46,12 +46,12 @@ def digest(folder: Path) -> dict[str, Any]:
 
 
 @pytest.mark.parametrize("name", ["dataset-layout-2.zip", "dataset-layout-3.zip"])
-def test_it_is_what_faceoff_has_always_written(name: str, tmp_path: Path) -> None:
+def test_export_equals_the_golden_one(name: str, tmp_path: Path) -> None:
     fd.to_2023(fd.open_dataset(FIXTURES / name), tmp_path)
     assert digest(tmp_path) == json.loads(GOLDEN.read_text())[name]
 
 
-def test_transitions_are_chained_and_hold_the_recorded_numbers(tmp_path: Path) -> None:
+def test_transitions_are_chained_and_equal_the_recording(tmp_path: Path) -> None:
     dataset = fd.open_dataset(hold())
     folders = fd.to_2023(dataset, tmp_path)
     assert [folder.name for folder in folders] == ["7dof-hit", "7dof-defend", "7dof-prepare"]
@@ -63,8 +63,8 @@ def test_transitions_are_chained_and_hold_the_recorded_numbers(tmp_path: Path) -
         for number, ((state, action, reward, after, absorbing, last), row) in enumerate(
             zip(steps, rows, strict=True)
         ):
-            told = [row[name] for name in observed if row[name] is not None]
-            assert state.shape == after.shape == (width,) and state.tolist() == told
+            expected = [row[name] for name in observed if row[name] is not None]
+            assert state.shape == after.shape == (width,) and state.tolist() == expected
             assert action.shape == (2, 7) and action.reshape(-1).tolist() == row["action"]
             assert reward == 0.0
             assert last or np.array_equal(after, steps[number + 1][0])
@@ -99,16 +99,16 @@ def test_faults_do_not_absorb_and_violations_are_counted(tmp_path: Path) -> None
     summary = violations.pop("violation summary")
     episodes = dataset.episodes("hit")
     for group in GROUPS:
-        broken = [e for e in episodes if group in e.violated]
-        assert summary.get(f"{group}_constr", 0) == len(broken)
-        for episode in broken:
+        violating = [e for e in episodes if group in e.violated]
+        assert summary.get(f"{group}_constr", 0) == len(violating)
+        for episode in violating:
             assert f"{group}_constr violated" in violations[f"Episode {episode.index}"]
     slow = [e for e in episodes if e.computation_time_max_s > 0.02 or e.computation_time_mean_s > 0.02]
     assert summary.get("Computation Time", 0) == len(slow)
-    assert summary["Total"] == sum(len(words) for words in violations.values())
+    assert summary["Total"] == sum(len(messages) for messages in violations.values())
 
 
-def test_the_pickle_names_nothing_that_another_numpy_lacks(tmp_path: Path) -> None:
+def test_pickle_names_nothing_specific_to_a_numpy_version(tmp_path: Path) -> None:
     dataset = fd.open_dataset(FIXTURES / "dataset-layout-3.zip")
     (hit, _) = fd.to_2023(dataset, tmp_path)
     named = {
@@ -119,7 +119,7 @@ def test_the_pickle_names_nothing_that_another_numpy_lacks(tmp_path: Path) -> No
     assert named == {"numpy array", "__builtin__ list"}
 
 
-def test_an_export_is_not_written_over_another(tmp_path: Path) -> None:
+def test_existing_export_is_not_overwritten(tmp_path: Path) -> None:
     dataset = fd.open_dataset(FIXTURES / "dataset-layout-3.zip")
     fd.to_2023(dataset, tmp_path)
     before = digest(tmp_path)

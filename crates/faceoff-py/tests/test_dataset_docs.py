@@ -1,4 +1,4 @@
-"""What `docs/dataset.md` shows can be run as it stands."""
+"""The programs and commands in `docs/dataset.md` run unchanged."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def blocks(language: str) -> list[str]:
 
 @pytest.fixture
 def beside_recordings(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """The working folder of the document's reader."""
+    """A working folder with the recordings that the document uses."""
     (tmp_path / "result").symlink_to(hold())
     (tmp_path / "game").symlink_to(game())
     monkeypatch.chdir(tmp_path)
@@ -33,18 +33,18 @@ def beside_recordings(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-def test_python(beside_recordings: Path) -> None:
-    for needed in ("pandas", "polars", "minari"):
-        pytest.importorskip(needed)
+def test_python_blocks_run(beside_recordings: Path) -> None:
+    for package in ("pandas", "polars", "minari"):
+        pytest.importorskip(package)
     names: dict[str, Any] = {}
-    found = blocks("python")
-    assert len(found) >= 6
-    for block in found:
+    programs = blocks("python")
+    assert len(programs) >= 6
+    for block in programs:
         exec(compile(block, "docs/dataset.md", "exec"), names)
     assert (beside_recordings / "old" / "7dof-hit" / "dataset.pkl").exists()
 
 
-def test_commands(beside_recordings: Path) -> None:
+def test_shell_commands_run(beside_recordings: Path) -> None:
     pytest.importorskip("minari")
     (commands,) = (block for block in blocks("sh") if "faceoff.dataset" in block)
     for line in commands.splitlines():
@@ -54,11 +54,11 @@ def test_commands(beside_recordings: Path) -> None:
     assert (beside_recordings / "lerobot-2" / "prepare" / "meta" / "info.json").exists()
 
 
-def test_sql(beside_recordings: Path) -> None:
+def test_sql_queries_run(beside_recordings: Path) -> None:
     duckdb = pytest.importorskip("duckdb")
     with zipfile.ZipFile("result/dataset.zip") as packed:
         packed.extractall(beside_recordings)
     (queries,) = blocks("sql")
     counts = [len(duckdb.sql(query).fetchall()) for query in queries.split(";") if query.strip()]
-    # An agent that holds still breaks no limit of speed.
+    # An agent that holds still violates no speed limit.
     assert len(counts) == 2 and counts[0] >= 3 and counts[1] == 0

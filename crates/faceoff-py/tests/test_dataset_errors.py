@@ -1,4 +1,4 @@
-"""What cannot be read is said with the file and the cause, and the commands end with 1."""
+"""Errors of recordings name the file and the cause; failing commands return 1."""
 
 from __future__ import annotations
 
@@ -23,27 +23,27 @@ HOLD = FIXTURES / "dataset-layout-3.zip"
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    """An unpacked dataset, to be broken."""
+    """An unpacked dataset for damaging."""
     with zipfile.ZipFile(HOLD) as packed:
         packed.extractall(tmp_path / "dataset")
     return tmp_path / "dataset"
 
 
-def altered(path: Path, at: int) -> None:
-    """Turns one bit of a file."""
+def flip_bit(path: Path, at: int) -> None:
+    """Flips the lowest bit of a byte of a file."""
     data = bytearray(path.read_bytes())
     data[at] ^= 1
     path.write_bytes(data)
 
 
-def test_what_is_not_there(tmp_path: Path) -> None:
+def test_missing_recordings_are_refused(tmp_path: Path) -> None:
     with pytest.raises(fd.DatasetError, match="none: there is no such file or folder"):
         fd.open(tmp_path / "none")
     with pytest.raises(fd.DatasetError, match="expected one of manifest.json, dataset.zip, game.zip"):
         fd.open(tmp_path)
 
 
-def test_archives_that_are_cut_or_altered(tmp_path: Path) -> None:
+def test_truncated_and_altered_archives_are_refused(tmp_path: Path) -> None:
     copy = tmp_path / "dataset.zip"
     copy.write_bytes(HOLD.read_bytes()[:-1000])
     with pytest.raises(fd.DatasetError, match="dataset.zip: expected a zip archive .* again"):
@@ -52,7 +52,7 @@ def test_archives_that_are_cut_or_altered(tmp_path: Path) -> None:
     with pytest.raises(fd.DatasetError, match="expected a zip archive"):
         fd.open(copy)
     shutil.copy(HOLD, copy)
-    altered(copy, 5000)
+    flip_bit(copy, 5000)
     with pytest.raises(fd.DatasetError, match=r"dataset.zip: \w+\.\w+ is damaged or altered"):
         fd.open_dataset(copy).check()
     with pytest.raises(fd.DatasetError, match="is damaged or altered"):
@@ -61,7 +61,7 @@ def test_archives_that_are_cut_or_altered(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", ["steps.parquet", "episodes.parquet"])
-def test_tables_that_are_missing_or_broken(name: str, folder: Path) -> None:
+def test_missing_and_damaged_tables_are_refused(name: str, folder: Path) -> None:
     path = folder / name
     whole = path.read_bytes()
     for content in (b"", b"PAR1", whole[:-10], b"PAR1" + b"\0" * 100 + b"PAR1"):
@@ -75,7 +75,7 @@ def test_tables_that_are_missing_or_broken(name: str, folder: Path) -> None:
         fd.open_dataset(folder).table()
 
 
-def test_pages_that_are_broken(folder: Path) -> None:
+def test_damaged_pages_are_refused(folder: Path) -> None:
     path = folder / "steps.parquet"
     data = bytearray(path.read_bytes())
     data[4 : len(data) // 2] = b"\xff" * (len(data) // 2 - 4)
@@ -84,10 +84,10 @@ def test_pages_that_are_broken(folder: Path) -> None:
         fd.open_dataset(folder).table()
 
 
-def test_manifests_that_say_something_else(folder: Path) -> None:
+def test_invalid_manifests_are_refused(folder: Path) -> None:
     path = folder / "manifest.json"
     manifest = json.loads(path.read_text())
-    for content, words in (
+    for content, message in (
         ("{", "manifest.json is not JSON"),
         ("[]", "manifest.json: expected a JSON object, got a list"),
         ("{}", "layout: expected one of faceoff-dataset/4, .*, got None"),
@@ -99,11 +99,11 @@ def test_manifests_that_say_something_else(folder: Path) -> None:
         (json.dumps({**manifest, "schema": "faceoff-game/1"}), "expected 'agents' to be a list"),
     ):
         path.write_text(content)
-        with pytest.raises(fd.DatasetError, match=words):
+        with pytest.raises(fd.DatasetError, match=message):
             fd.open(folder)
 
 
-def test_tables_that_do_not_belong_together(folder: Path) -> None:
+def test_tables_of_different_datasets_are_refused(folder: Path) -> None:
     other = folder.parent / "other"
     with zipfile.ZipFile(FIXTURES / "dataset-layout-2.zip") as packed:
         packed.extractall(other)
@@ -115,7 +115,7 @@ def test_tables_that_do_not_belong_together(folder: Path) -> None:
         fd.open_dataset(folder).episodes()
 
 
-def test_arguments_that_are_wrong() -> None:
+def test_invalid_arguments_are_refused() -> None:
     dataset = fd.open_dataset(HOLD)
     for index in (-1, 2):
         with pytest.raises(ValueError, match=f"expected an episode of hit from 0 to 1, got {index}"):
@@ -132,15 +132,15 @@ def test_arguments_that_are_wrong() -> None:
         dataset.episode("hit", "0")  # type: ignore[arg-type]
 
 
-def test_all_of_them_are_errors_of_faceoff(tmp_path: Path) -> None:
-    for wrong in (
+def test_errors_derive_from_faceoff_error(tmp_path: Path) -> None:
+    for call in (
         lambda: fd.open(tmp_path),
         lambda: fd.open_dataset(HOLD).episodes("prepare"),
         lambda: fd.open_dataset(HOLD).table("step"),  # type: ignore[arg-type]
         lambda: fd.to_lerobot(fd.open_dataset(HOLD), tmp_path, "hit"),
     ):
         with pytest.raises(Error):
-            wrong()
+            call()
 
 
 def command(*arguments: object) -> tuple[int, str, str]:
@@ -153,10 +153,10 @@ def command(*arguments: object) -> tuple[int, str, str]:
     return done.returncode, done.stdout, done.stderr
 
 
-def test_commands(tmp_path: Path) -> None:
+def test_commands_summarise_and_export(tmp_path: Path) -> None:
     code, out, _ = command("info", HOLD, "--json")
-    told = json.loads(out)
-    assert code == 0 and told["agent"] == "hold" and told["tasks"]["hit"]["episodes"] == 2
+    summary = json.loads(out)
+    assert code == 0 and summary["agent"] == "hold" and summary["tasks"]["hit"]["episodes"] == 2
     code, out, _ = command("export", HOLD, "--layout", "2023", "--out", tmp_path / "old")
     assert code == 0 and out.splitlines() == [
         str(tmp_path / "old" / "7dof-hit"),
@@ -166,9 +166,9 @@ def test_commands(tmp_path: Path) -> None:
     assert code == 0 and (tmp_path / "new" / "defend" / "meta" / "info.json").exists()
 
 
-def test_commands_that_fail(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_failing_commands_print_one_line_and_return_1(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = str(tmp_path / "out")
-    for arguments, words in (
+    for arguments, message in (
         (["info", "none"], "error: none: there is no such file or folder"),
         (["export", str(HOLD), "--layout", "2023"], "--out: expected a folder for the layout 2023"),
         (["export", str(HOLD), "--layout", "minari"], "--id: expected an id such as faceoff/hit/"),
@@ -179,14 +179,14 @@ def test_commands_that_fail(tmp_path: Path, capsys: pytest.CaptureFixture[str]) 
         ),
     ):
         assert main(arguments) == 1
-        told = capsys.readouterr()
-        assert told.out == "" and told.err.startswith("error: ") and words in told.err
-        assert len(told.err.splitlines()) == 1
+        output = capsys.readouterr()
+        assert output.out == "" and output.err.startswith("error: ") and message in output.err
+        assert len(output.err.splitlines()) == 1
     assert main(["info", str(game())]) == 0
     assert "layout: faceoff-game/1" in capsys.readouterr().out
 
 
-def test_minari_by_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_command_exports_a_minari_dataset(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     pytest.importorskip("minari")
     arguments = ["--layout", "minari", "--id", "faceoff/hit/hold-v0", "--out", str(tmp_path)]
     assert main(["export", str(HOLD), *arguments]) == 0

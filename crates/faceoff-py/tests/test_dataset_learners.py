@@ -1,4 +1,4 @@
-"""Datasets for learners: Minari's, opened by Minari, and LeRobot's, looked at piece by piece.
+"""Exports for learners: Minari datasets opened by Minari, and LeRobot datasets checked file by file.
 
 LeRobot itself opens them in `tests_learning/test_lerobot.py`: it needs torch.
 """
@@ -22,7 +22,7 @@ STRIKER = FIXTURES / "dataset-layout-2.zip"
 HOLD = FIXTURES / "dataset-layout-3.zip"
 
 
-def needs_layout_2() -> fd.Dataset:
+def open_layout_2() -> fd.Dataset:
     dataset = fd.open_dataset(STRIKER)
     try:
         dataset.table(columns=["step"])
@@ -37,60 +37,60 @@ def test_minari_loads_every_episode(
 ) -> None:
     minari = pytest.importorskip("minari")
     monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path))
-    dataset = needs_layout_2()
+    dataset = open_layout_2()
     fd.to_minari(dataset, "faceoff/hit/striker-v0", data_format=data_format)
     read = minari.load_dataset("faceoff/hit/striker-v0")
     episodes = dataset.episodes("hit")
     assert read.total_episodes == len(episodes)
     assert read.total_steps == sum(episode.steps for episode in episodes)
     metadata = list(read.storage.get_episode_metadata(range(read.total_episodes)))
-    for ours, theirs, about in zip(episodes, read.iterate_episodes(), metadata, strict=True):
-        arrays, steps = ours.to_numpy(), ours.steps
-        assert theirs.observations.shape == (steps + 1, 23)
-        assert np.array_equal(theirs.observations, arrays.observations.astype(np.float32))
-        assert np.array_equal(theirs.actions, arrays.actions.reshape(steps, 14).astype(np.float32))
-        assert theirs.rewards.tolist() == [0.0] * (steps - 1) + [float(ours.success)]
-        assert theirs.terminations[-1] == ours.terminated
-        assert theirs.truncations[-1] == ours.truncated
-        assert not theirs.terminations[:-1].any() and not theirs.truncations[:-1].any()
-        assert np.array_equal(theirs.infos["puck"], arrays.puck)
-        assert np.array_equal(theirs.infos["constraints"][1:], arrays.constraints)
-        assert (about["seed_hex"], about["end"]) == (ours.seed, ours.end)
-        assert bool(about["success"]) == ours.success
-        assert read.observation_space.contains(theirs.observations[0])
-        assert read.action_space.contains(theirs.actions[0])
+    for episode, exported, attributes in zip(episodes, read.iterate_episodes(), metadata, strict=True):
+        arrays, steps = episode.to_numpy(), episode.steps
+        assert exported.observations.shape == (steps + 1, 23)
+        assert np.array_equal(exported.observations, arrays.observations.astype(np.float32))
+        assert np.array_equal(exported.actions, arrays.actions.reshape(steps, 14).astype(np.float32))
+        assert exported.rewards.tolist() == [0.0] * (steps - 1) + [float(episode.success)]
+        assert exported.terminations[-1] == episode.terminated
+        assert exported.truncations[-1] == episode.truncated
+        assert not exported.terminations[:-1].any() and not exported.truncations[:-1].any()
+        assert np.array_equal(exported.infos["puck"], arrays.puck)
+        assert np.array_equal(exported.infos["constraints"][1:], arrays.constraints)
+        assert (attributes["seed_hex"], attributes["end"]) == (episode.seed, episode.end)
+        assert bool(attributes["success"]) == episode.success
+        assert read.observation_space.contains(exported.observations[0])
+        assert read.action_space.contains(exported.actions[0])
     assert read.storage.metadata["algorithm_name"] == "striker"
 
 
-def test_minari_takes_another_reward_type_and_folder(tmp_path: Path) -> None:
+def test_minari_export_accepts_reward_dtype_and_folder(tmp_path: Path) -> None:
     minari = pytest.importorskip("minari")
-    dataset = needs_layout_2()
+    dataset = open_layout_2()
 
     def speed(episode: fd.Episode, arrays: fd.EpisodeArrays) -> Any:
         return arrays.puck[1:, 3]
 
-    won = [episode for episode in dataset.episodes("hit") if episode.success]
-    made = fd.to_minari(
+    successes = [episode for episode in dataset.episodes("hit") if episode.success]
+    exported = fd.to_minari(
         dataset,
         "faceoff/hit/won-v1",
-        episodes=won,
+        episodes=successes,
         reward=speed,
         dtype="float64",
         root=tmp_path,
         author="a team",
     )
-    assert made.total_episodes == len(won) == 1
+    assert exported.total_episodes == len(successes) == 1
     assert (tmp_path / "faceoff" / "hit" / "won-v1").is_dir()
-    (read,) = made.iterate_episodes()
-    assert np.array_equal(read.rewards, won[0].to_numpy().puck[1:, 3])
-    assert np.array_equal(read.observations, won[0].to_numpy().observations)
-    assert made.storage.metadata["author"] == {"a team"}
+    (read,) = exported.iterate_episodes()
+    assert np.array_equal(read.rewards, successes[0].to_numpy().puck[1:, 3])
+    assert np.array_equal(read.observations, successes[0].to_numpy().observations)
+    assert exported.storage.metadata["author"] == {"a team"}
     with pytest.raises(ValueError, match="already"):
         fd.to_minari(dataset, "faceoff/hit/won-v1", root=tmp_path)
     assert minari.__version__
 
 
-def test_minari_is_told_which_task(tmp_path: Path) -> None:
+def test_minari_export_needs_an_unambiguous_task(tmp_path: Path) -> None:
     pytest.importorskip("minari")
     dataset = fd.open_dataset(HOLD)
     with pytest.raises(ValueError, match="task: expected one of hit, defend, got none"):
@@ -105,24 +105,24 @@ def test_minari_is_told_which_task(tmp_path: Path) -> None:
         )
     with pytest.raises(ValueError, match="dtype: expected 'float32' or 'float64', got 'int8'"):
         fd.to_minari(dataset, "faceoff/hit/hold-v0", dtype="int8", root=tmp_path)
-    made = fd.to_minari(dataset, "faceoff/hold-v0", task="defend", root=tmp_path)
-    assert made.observation_space.shape == (20,)
+    exported = fd.to_minari(dataset, "faceoff/hold-v0", task="defend", root=tmp_path)
+    assert exported.observation_space.shape == (20,)
 
 
 def test_episodes_without_a_step_are_left_out(tmp_path: Path) -> None:
     pytest.importorskip("minari")
     dataset = fd.open_dataset(odd())
-    made = fd.to_minari(dataset, "faceoff/hit/odd-v0", root=tmp_path / "minari")
-    kept = [episode for episode in dataset.episodes("hit") if episode.steps]
-    assert [len(e.actions) for e in made] == [episode.steps for episode in kept]
-    assert [bool(e.truncations[-1]) for e in made] == [True] * len(kept)
+    exported = fd.to_minari(dataset, "faceoff/hit/odd-v0", root=tmp_path / "minari")
+    remaining = [episode for episode in dataset.episodes("hit") if episode.steps]
+    assert [len(e.actions) for e in exported] == [episode.steps for episode in remaining]
+    assert [bool(e.truncations[-1]) for e in exported] == [True] * len(remaining)
     root = fd.to_lerobot(dataset, tmp_path / "lerobot", "hit")
-    told = pq.read_table(root / "meta/episodes/chunk-000/file-000.parquet").to_pylist()
-    assert [row["source_episode"] for row in told] == [episode.index for episode in kept]
+    rows = pq.read_table(root / "meta/episodes/chunk-000/file-000.parquet").to_pylist()
+    assert [row["source_episode"] for row in rows] == [episode.index for episode in remaining]
 
 
 @pytest.mark.parametrize("task", ["hit", "defend"])
-def test_lerobots_files_fit_each_other(task: str, tmp_path: Path) -> None:
+def test_lerobot_files_are_consistent(task: str, tmp_path: Path) -> None:
     dataset = fd.open_dataset(HOLD)
     root = fd.to_lerobot(dataset, tmp_path / "lerobot", task)
     info = json.loads((root / "meta/info.json").read_text())
@@ -147,24 +147,24 @@ def test_lerobots_files_fit_each_other(task: str, tmp_path: Path) -> None:
     assert set(stats) == set(info["features"])
     for number, (episode, row) in enumerate(zip(episodes, rows, strict=True)):
         arrays = episode.to_numpy()
-        mine = frames[row["dataset_from_index"] : row["dataset_to_index"]]
-        assert len(mine) == row["length"] == episode.steps and row["seed"] == episode.seed
-        assert {frame["episode_index"] for frame in mine} == {number}
-        told = arrays.observations[:-1].astype(np.float32)
-        assert np.array_equal([f["observation.state"] for f in mine], told[:, 6:20])
-        assert np.array_equal([f["observation.environment_state"] for f in mine][0][:6], told[0, :6])
-        assert [f["next.done"] for f in mine] == [False] * (episode.steps - 1) + [True]
-        assert np.allclose([f["timestamp"] for f in mine], np.arange(episode.steps) * 0.02)
+        own_frames = frames[row["dataset_from_index"] : row["dataset_to_index"]]
+        assert len(own_frames) == row["length"] == episode.steps and row["seed"] == episode.seed
+        assert {frame["episode_index"] for frame in own_frames} == {number}
+        observations = arrays.observations[:-1].astype(np.float32)
+        assert np.array_equal([f["observation.state"] for f in own_frames], observations[:, 6:20])
+        assert np.array_equal([f["observation.environment_state"] for f in own_frames][0][:6], observations[0, :6])
+        assert [f["next.done"] for f in own_frames] == [False] * (episode.steps - 1) + [True]
+        assert np.allclose([f["timestamp"] for f in own_frames], np.arange(episode.steps) * 0.02)
         assert row["stats/action/count"] == [episode.steps]
         assert np.allclose(
-            row["stats/observation.state/q50"], np.median(told[:, 6:20].astype(float), axis=0)
+            row["stats/observation.state/q50"], np.median(observations[:, 6:20].astype(float), axis=0)
         )
     assert [frame["index"] for frame in frames] == list(range(info["total_frames"]))
     whole = np.array([frame["action"] for frame in frames])
     assert stats["action"]["max"] == whole.max(axis=0).tolist()
 
 
-def test_lerobots_tasks_are_the_index_of_a_data_frame(tmp_path: Path) -> None:
+def test_lerobot_tasks_are_the_index_of_a_data_frame(tmp_path: Path) -> None:
     pandas = pytest.importorskip("pandas")
     root = fd.to_lerobot(fd.open_dataset(HOLD), tmp_path / "lerobot", "hit")
     tasks = pandas.read_parquet(root / "meta/tasks.parquet")
@@ -172,7 +172,7 @@ def test_lerobots_tasks_are_the_index_of_a_data_frame(tmp_path: Path) -> None:
     assert tasks.iloc[0].name == "Hit the puck into the opponent's goal."
 
 
-def test_lerobots_frames_are_spread_over_files(tmp_path: Path) -> None:
+def test_lerobot_frames_are_split_into_files(tmp_path: Path) -> None:
     dataset = fd.open_dataset(HOLD)
     root = fd.to_lerobot(dataset, tmp_path / "lerobot", "hit", data_file_mb=0)
     files = sorted(path.name for path in (root / "data/chunk-000").iterdir())

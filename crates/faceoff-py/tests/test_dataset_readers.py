@@ -1,6 +1,6 @@
 """Recordings and exports are read by old Parquet readers and an old NumPy.
 
-They are installed into an environment of their own, once: `FACEOFF_OLD_READERS` names its folder
+They are installed once, in a separate environment: `FACEOFF_OLD_READERS` names its folder
 (default: `target/python/old-readers`).
 """
 
@@ -57,7 +57,7 @@ print(len(steps))
 
 @cache
 def python() -> Path:
-    """The interpreter beside the old readers."""
+    """The interpreter of the environment with the old readers."""
     folder = Path(os.environ.get("FACEOFF_OLD_READERS", ROOT / "target" / "python" / "old-readers"))
     interpreter, mark = folder / "bin" / "python", folder / "installed.txt"
     if mark.exists() and mark.read_text() == REQUIREMENTS.read_text():
@@ -96,7 +96,7 @@ def test_pyarrow_12_and_duckdb_read_recordings() -> None:
     assert rows > 1149 + len(fd.open_dataset(hold()).table())
 
 
-def test_todays_duckdb_reads_them_too(tmp_path: Path) -> None:
+def test_current_duckdb_reads_recordings(tmp_path: Path) -> None:
     duckdb = pytest.importorskip("duckdb")
     with zipfile.ZipFile(hold() / "dataset.zip") as packed:
         path = packed.extract("steps.parquet", tmp_path)
@@ -112,7 +112,7 @@ def test_numpy_1_24_reads_the_layout_of_2023(tmp_path: Path) -> None:
     assert int(run("-c", READ_EXPORT, tmp_path)) == steps
 
 
-def test_the_package_works_beside_them() -> None:
+def test_package_works_with_old_readers() -> None:
     program = """
 import sys, faceoff.dataset as fd
 from faceoff.dataset.__main__ import main

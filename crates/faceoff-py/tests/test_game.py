@@ -1,4 +1,4 @@
-"""The game of two robots, by PettingZoo's own book."""
+"""The game of two robots, with PettingZoo's checks."""
 
 import warnings
 from typing import Any
@@ -13,7 +13,7 @@ from pettingzoo.test import parallel_api_test, parallel_seed_test
 from faceoff.game import AGENTS, AirHockeyGame, GameTransition, SelfPlayEnv
 
 
-def rest(observation: np.ndarray) -> np.ndarray:
+def hold(observation: np.ndarray) -> np.ndarray:
     return np.zeros(7)
 
 
@@ -21,14 +21,14 @@ def both(value: float = 0.0) -> dict[str, np.ndarray]:
     return {agent: np.full(7, value) for agent in AGENTS}
 
 
-def test_pettingzoos_checks_have_nothing_to_say() -> None:
+def test_pettingzoo_checks_pass() -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         parallel_api_test(AirHockeyGame(max_steps=120), num_cycles=300)
         parallel_seed_test(lambda: AirHockeyGame(max_steps=60))
 
 
-def test_a_game_is_cut_off_for_both_who_leave_it() -> None:
+def test_game_is_truncated_for_both_agents() -> None:
     game = AirHockeyGame(max_steps=3)
     observations, infos = game.reset(seed=1)
     assert infos["robot_2"] == {"seed": 1, "game_number": 0}
@@ -42,15 +42,15 @@ def test_a_game_is_cut_off_for_both_who_leave_it() -> None:
     assert game.agents == []
 
 
-def test_both_see_the_table_from_their_own_side() -> None:
+def test_observations_are_from_the_own_side() -> None:
     game = AirHockeyGame()
     observations, _ = game.reset(seed=1)
-    one, other = observations["robot_1"], observations["robot_2"]
-    np.testing.assert_allclose(one[0] + other[0], 2 * 1.51, rtol=1e-6)
-    np.testing.assert_allclose(one[1], -other[1], rtol=1e-6)
+    first, second = observations["robot_1"], observations["robot_2"]
+    np.testing.assert_allclose(first[0] + second[0], 2 * 1.51, rtol=1e-6)
+    np.testing.assert_allclose(first[1], -second[1], rtol=1e-6)
 
 
-def test_without_a_seed_another_game_of_the_same_seed_follows() -> None:
+def test_reset_without_seed_begins_the_next_game_of_the_seed() -> None:
     game, twin = AirHockeyGame(), AirHockeyGame()
     first, _ = game.reset(seed=1)
     second, infos = game.reset()
@@ -60,7 +60,7 @@ def test_without_a_seed_another_game_of_the_same_seed_follows() -> None:
     np.testing.assert_array_equal(twin.reset()[0]["robot_1"], second["robot_1"])
 
 
-def test_a_puck_that_nobody_plays_is_a_foul_and_the_next_rally_follows() -> None:
+def test_idle_puck_is_a_foul_and_begins_the_next_rally() -> None:
     game = AirHockeyGame()
     game.reset(seed=1)
     for _ in range(800):
@@ -73,7 +73,7 @@ def test_a_puck_that_nobody_plays_is_a_foul_and_the_next_rally_follows() -> None
     game.step(both())
 
 
-def test_points_are_the_reward() -> None:
+def test_reward_is_the_difference_of_points() -> None:
     """Every third foul is a point for the other side."""
     game = AirHockeyGame()
     game.reset(seed=1)
@@ -84,12 +84,12 @@ def test_points_are_the_reward() -> None:
             total[agent] += rewards[agent]
         if sum(infos["robot_1"]["score"]) > 0:
             break
-    one, other = infos["robot_1"]["score"]
-    assert one + other == 1
-    assert (total["robot_1"], total["robot_2"]) == (one - other, other - one)
+    first, second = infos["robot_1"]["score"]
+    assert first + second == 1
+    assert (total["robot_1"], total["robot_2"]) == (first - second, second - first)
 
 
-def test_who_makes_the_world_diverge_is_out_and_the_other_plays_on() -> None:
+def test_diverging_robot_is_terminated_and_the_other_continues() -> None:
     game = AirHockeyGame(interpolation=(None, 1), action_mode=("raw", "delta"))
     observations, _ = game.reset(seed=1)
     for _ in range(1_500):
@@ -104,7 +104,7 @@ def test_who_makes_the_world_diverge_is_out_and_the_other_plays_on() -> None:
     assert list(observations) == ["robot_2"]
 
 
-def test_the_reward_can_be_replaced() -> None:
+def test_custom_reward_replaces_the_default() -> None:
     def reward(transition: GameTransition) -> tuple[float, float]:
         return float(transition.puck[0]), float(transition.robots[1, 14])
 
@@ -130,16 +130,16 @@ def test_pictures_show_both_robots() -> None:
 
 
 @pytest.mark.parametrize("side", ["robot_1", "robot_2", "random"])
-def test_one_side_of_a_game_is_an_environment(side: str) -> None:
+def test_side_of_a_game_is_a_gymnasium_environment(side: str) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        # Spaces, seeds and determinism; it was not made by its name, so that there is no spec.
+        # Checks spaces, seeds and determinism. There is no spec, because it is not made by an id.
         warnings.filterwarnings("ignore", message=".*spec.*")
-        check_env(SelfPlayEnv([rest], side=side, max_steps=50), skip_render_check=True)
+        check_env(SelfPlayEnv([hold], side=side, max_steps=50), skip_render_check=True)
 
 
-def test_opponents_are_drawn_from_a_pool_that_may_grow() -> None:
-    class Named:
+def test_opponents_are_drawn_from_a_growing_pool() -> None:
+    class CountingOpponent:
         def __init__(self) -> None:
             self.games = self.steps = 0
 
@@ -151,8 +151,8 @@ def test_opponents_are_drawn_from_a_pool_that_may_grow() -> None:
             self.steps += 1
             return np.zeros(7)
 
-    one, other, late = Named(), Named(), Named()
-    env = SelfPlayEnv([one, other], max_steps=5)
+    first, second, late = CountingOpponent(), CountingOpponent(), CountingOpponent()
+    env = SelfPlayEnv([first, second], max_steps=5)
     stats: Any = RecordEpisodeStatistics(env)
     drawn = []
     for game in range(12):
@@ -164,14 +164,14 @@ def test_opponents_are_drawn_from_a_pool_that_may_grow() -> None:
             ended = terminated or truncated
     assert info["episode"]["l"] == 5
     assert set(drawn) == {0, 1}
-    assert (one.games, other.games) == (drawn.count(0), drawn.count(1))
-    assert one.steps + other.steps == 12 * 5
+    assert (first.games, second.games) == (drawn.count(0), drawn.count(1))
+    assert first.steps + second.steps == 12 * 5
     env.opponents.append(late)
     assert env.reset(options={"opponent": 2})[1]["opponent"] == 2
     assert late.games == 1
 
 
-def test_sides_are_drawn() -> None:
-    env = SelfPlayEnv([rest], side="random")
+def test_random_side_is_drawn_per_game() -> None:
+    env = SelfPlayEnv([hold], side="random")
     sides = {env.reset(seed=0 if game == 0 else None)[1]["side"] for game in range(12)}
     assert sides == set(AGENTS)

@@ -1,4 +1,4 @@
-"""One world, by Gymnasium's own book."""
+"""The environment of one world, with Gymnasium's checks."""
 
 import copy
 import pickle
@@ -19,13 +19,13 @@ TASKS = ("hit", "defend", "prepare")
 
 
 def play(env: Any, actions: np.ndarray) -> list[Any]:
-    """Steps until the episode's end, or the last action."""
-    told = []
+    """The results of steps until the episode's end or the last action."""
+    results = []
     for action in actions:
-        told.append(env.step(action))
-        if told[-1][2] or told[-1][3]:
+        results.append(env.step(action))
+        if results[-1][2] or results[-1][3]:
             break
-    return told
+    return results
 
 
 def some_actions(env: Any, steps: int, seed: int = 0) -> np.ndarray:
@@ -35,7 +35,7 @@ def some_actions(env: Any, steps: int, seed: int = 0) -> np.ndarray:
 
 @pytest.mark.parametrize("task", TASKS)
 @pytest.mark.parametrize("profile", ["ideal", "evaluation"])
-def test_gymnasiums_checker_has_nothing_to_say(task: str, profile: str) -> None:
+def test_gymnasium_checker_passes(task: str, profile: str) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         env = gymnasium.make(f"faceoff/AirHockey-{task.capitalize()}-v0", profile=profile)
@@ -44,7 +44,7 @@ def test_gymnasiums_checker_has_nothing_to_say(task: str, profile: str) -> None:
 
 @pytest.mark.parametrize("interpolation", [1, 2, 3, 4, 5, -1, None])
 @pytest.mark.parametrize("action_mode", ["delta", "absolute", "raw"])
-def test_every_interpolation_and_kind_of_action_is_played(interpolation: Any, action_mode: str) -> None:
+def test_interpolations_and_action_modes_can_be_stepped(interpolation: Any, action_mode: str) -> None:
     env = AirHockeyEnv(
         "defend", interpolation=interpolation, action_mode=action_mode, max_episode_steps=5
     )
@@ -53,30 +53,30 @@ def test_every_interpolation_and_kind_of_action_is_played(interpolation: Any, ac
     assert env.action_space.dtype == np.float32
     assert env.action_space.is_bounded()
     env.reset(seed=1)
-    told = play(env, np.array([env.action_space.sample() for _ in range(5)]))
-    for observation, reward, *_ in told:
+    results = play(env, np.array([env.action_space.sample() for _ in range(5)]))
+    for observation, reward, *_ in results:
         assert observation in env.observation_space
         assert np.isfinite(reward)
 
 
 @pytest.mark.parametrize("task", TASKS)
-def test_observations_are_finite_singles_of_one_dimension(task: str) -> None:
+def test_observations_are_bounded_float32_vectors(task: str) -> None:
     env = AirHockeyEnv(task, profile="evaluation")
     assert env.observation_space.shape == ((23,) if task == "hit" else (20,))
     assert env.observation_space.is_bounded()
     observation, _ = env.reset(seed=5)
     assert observation.dtype == np.float32
-    for one, *_ in play(env, some_actions(env, 60)):
-        assert one.dtype == np.float32
-        assert one in env.observation_space
+    for observation, *_ in play(env, some_actions(env, 60)):
+        assert observation.dtype == np.float32
+        assert observation in env.observation_space
 
 
-def test_a_horizon_truncates_and_everything_else_terminates() -> None:
+def test_horizon_truncates_and_other_ends_terminate() -> None:
     env = AirHockeyEnv("prepare")
     env.reset(seed=0)
-    told = play(env, np.zeros((600, 7)))
-    assert len(told) == 500
-    *_, terminated, truncated, info = told[-1]
+    results = play(env, np.zeros((600, 7)))
+    assert len(results) == 500
+    *_, terminated, truncated, info = results[-1]
     assert (terminated, truncated) == (False, True)
     assert info["end"] == "horizon"
     assert info["steps"] == 500
@@ -88,14 +88,14 @@ def test_a_horizon_truncates_and_everything_else_terminates() -> None:
     assert info["end"] in ("crossed_middle", "left_table", "stopped")
 
 
-def test_an_episode_may_be_cut_off_sooner() -> None:
+def test_max_episode_steps_truncates_earlier() -> None:
     env = AirHockeyEnv("prepare", max_episode_steps=7)
     env.reset(seed=0)
-    assert [told[3] for told in play(env, np.zeros((20, 7)))] == [False] * 6 + [True]
+    assert [result[3] for result in play(env, np.zeros((20, 7)))] == [False] * 6 + [True]
 
 
-def test_no_action_keeps_the_arm_in_its_start_pose() -> None:
-    """A position of 0 is the last commanded one, or the start pose, so that the arm does not creep."""
+def test_zero_actions_keep_the_arm_in_its_start_pose() -> None:
+    """A position of 0 is the last commanded one, or the start pose, so the arm does not drift."""
     for action_mode in ("delta", "absolute"):
         env = AirHockeyEnv("prepare", action_mode=action_mode)
         env.reset(seed=0)
@@ -106,16 +106,16 @@ def test_no_action_keeps_the_arm_in_its_start_pose() -> None:
 
 
 @pytest.mark.parametrize("action_mode", ["delta", "absolute"])
-def test_full_fractions_command_no_position_beyond_the_constraint(action_mode: str) -> None:
+def test_full_actions_stay_within_position_constraints(action_mode: str) -> None:
     env = AirHockeyEnv("prepare", action_mode=action_mode)
     env.reset(seed=0)
     play(env, np.ones((500, 7)))
     limits = np.array(_native.joint_limits()[0])
-    # The arm stops at 95 %, but for what it sags.
+    # The arm stops at 95 %, except for its sag.
     np.testing.assert_allclose(env.state.q, 0.95 * limits, atol=0.02)
 
 
-def test_episodes_follow_each_other_as_an_evaluation_plays_them() -> None:
+def test_episodes_have_the_order_of_an_evaluation() -> None:
     env = AirHockeyEnv("hit", profile="evaluation")
     first, info = env.reset(seed=9)
     assert info == {"seed": 9, "episode_number": 0}
@@ -128,7 +128,7 @@ def test_episodes_follow_each_other_as_an_evaluation_plays_them() -> None:
     np.testing.assert_array_equal(chosen, second)
 
 
-def test_a_given_puck_is_where_the_episode_starts() -> None:
+def test_puck_option_sets_the_initial_state() -> None:
     env = AirHockeyEnv("defend")
     puck = [0.4, 0.1, 0.0, -2.0, 0.5, 1.0]
     observation, _ = env.reset(seed=0, options={"puck": puck})
@@ -136,79 +136,79 @@ def test_a_given_puck_is_where_the_episode_starts() -> None:
     np.testing.assert_allclose(observation[:2], [1.91, 0.1], rtol=1e-6)
 
 
-def test_an_environment_without_a_seed_draws_one() -> None:
+def test_reset_without_seed_draws_one() -> None:
     seeds = {AirHockeyEnv("hit").reset()[1]["seed"] for _ in range(3)}
     assert len(seeds) == 3
 
 
-def test_another_seed_is_another_robot_unless_the_season_is_given() -> None:
-    def sagged(seed: int, **arguments: Any) -> np.ndarray:
+def test_seeds_have_their_own_robot_without_a_mismatch_seed() -> None:
+    def settled_pose(seed: int, **arguments: Any) -> np.ndarray:
         env = AirHockeyEnv("prepare", profile="model_mismatch", **arguments)
         env.reset(seed=seed)
         play(env, np.zeros((50, 7)))
         return env.state.q.copy()
 
-    assert not np.array_equal(sagged(1), sagged(2))
-    np.testing.assert_array_equal(sagged(1, mismatch_seed=4), sagged(2, mismatch_seed=4))
+    assert not np.array_equal(settled_pose(1), settled_pose(2))
+    np.testing.assert_array_equal(settled_pose(1, mismatch_seed=4), settled_pose(2, mismatch_seed=4))
 
 
-def test_factors_can_be_named_one_by_one() -> None:
+def test_profile_accepts_names_of_factors() -> None:
     def first(profile: Any, **arguments: Any) -> np.ndarray:
         return AirHockeyEnv("defend", profile=profile, **arguments).reset(seed=3)[0]
 
     ideal, noisy = first("ideal"), first(["observation_noise", "tracking_loss"])
     assert not np.array_equal(ideal, noisy)
     np.testing.assert_array_equal(noisy, first("observation_noise"))
-    still = {"puck_position_m", "puck_yaw_rad", "puck_velocity_m_s", "puck_yaw_rate_rad_s"}
-    still |= {"joint_position_rad", "joint_velocity_rad_s"}
-    calm = {"observation_noise": dict.fromkeys(still, 0.0)}
-    np.testing.assert_array_equal(ideal, first("observation_noise", perturbations=calm))
+    names = {"puck_position_m", "puck_yaw_rad", "puck_velocity_m_s", "puck_yaw_rate_rad_s"}
+    names |= {"joint_position_rad", "joint_velocity_rad_s"}
+    zero_noise = {"observation_noise": dict.fromkeys(names, 0.0)}
+    np.testing.assert_array_equal(ideal, first("observation_noise", perturbations=zero_noise))
 
 
-def test_a_saved_state_is_come_back_to_exactly() -> None:
+def test_saved_state_is_restored_exactly() -> None:
     env = AirHockeyEnv("hit", profile="evaluation", interpolation=3)
     env.reset(seed=2)
     play(env, some_actions(env, 40))
     saved = env.save()
-    after = play(env, some_actions(env, 30, seed=1))
+    expected = play(env, some_actions(env, 30, seed=1))
     env.reset(seed=77)
     env.restore(saved)
-    again = play(env, some_actions(env, 30, seed=1))
-    for one, other in zip(after, again, strict=True):
-        np.testing.assert_array_equal(one[0], other[0])
-        assert one[1:4] == other[1:4]
+    repeated = play(env, some_actions(env, 30, seed=1))
+    for first, second in zip(expected, repeated, strict=True):
+        np.testing.assert_array_equal(first[0], second[0])
+        assert first[1:4] == second[1:4]
 
 
-@pytest.mark.parametrize("how", ["pickle", "copy"])
-def test_a_pickled_environment_goes_on_as_the_original_does(how: str) -> None:
+@pytest.mark.parametrize("method", ["pickle", "copy"])
+def test_pickled_environment_continues_like_the_original(method: str) -> None:
     env = gymnasium.make("faceoff/AirHockey-Defend-v0", profile="evaluation", interpolation=5)
     env.reset(seed=4)
     play(env, some_actions(env, 20))
-    twin = pickle.loads(pickle.dumps(env)) if how == "pickle" else copy.deepcopy(env)
-    for one, other in zip(
+    twin = pickle.loads(pickle.dumps(env)) if method == "pickle" else copy.deepcopy(env)
+    for original, copied in zip(
         play(env, some_actions(env, 20, seed=1)), play(twin, some_actions(env, 20, seed=1)), strict=True
     ):
-        np.testing.assert_array_equal(one[0], other[0])
-        assert one[1:4] == other[1:4]
+        np.testing.assert_array_equal(original[0], copied[0])
+        assert original[1:4] == copied[1:4]
 
 
-def test_a_pickled_state_survives_and_garbage_does_not() -> None:
+def test_pickled_state_is_restored_exactly() -> None:
     env = AirHockeyEnv("prepare")
     env.reset(seed=4)
     play(env, some_actions(env, 25))
     state = env.save()
-    again = pickle.loads(pickle.dumps(state))
-    assert (again.seed, again.episode_number, again.steps) == (4, 0, 25)
+    loaded = pickle.loads(pickle.dumps(state))
+    assert (loaded.seed, loaded.episode_number, loaded.steps) == (4, 0, 25)
     env.reset(seed=5)
-    env.restore(again)
+    env.restore(loaded)
     np.testing.assert_array_equal(env.save().__reduce__()[1][0], state.__reduce__()[1][0])
 
 
-def test_the_reward_can_be_replaced() -> None:
-    told: list[Transition] = []
+def test_custom_reward_replaces_the_default() -> None:
+    transitions: list[Transition] = []
 
     def reward(transition: Transition) -> float:
-        told.append(transition)
+        transitions.append(transition)
         return -float(np.abs(transition.next_state.puck[1]))
 
     env = AirHockeyEnv("prepare", reward=reward)
@@ -216,22 +216,22 @@ def test_the_reward_can_be_replaced() -> None:
     second, value, *_ = env.step(np.zeros(7))
     third, *_ = env.step(np.zeros(7))
     assert value == -abs(env.state.puck[1])
-    np.testing.assert_array_equal(told[0].observation, first)
-    np.testing.assert_array_equal(told[0].next_observation, second)
-    np.testing.assert_array_equal(told[1].observation, second)
-    np.testing.assert_array_equal(told[1].next_observation, third)
-    np.testing.assert_array_equal(told[0].next_state.array, told[1].state.array)
+    np.testing.assert_array_equal(transitions[0].observation, first)
+    np.testing.assert_array_equal(transitions[0].next_observation, second)
+    np.testing.assert_array_equal(transitions[1].observation, second)
+    np.testing.assert_array_equal(transitions[1].next_observation, third)
+    np.testing.assert_array_equal(transitions[0].next_state.array, transitions[1].state.array)
 
 
-def test_the_default_reward_adds_up_to_success_less_penalty_points() -> None:
-    """What is left is how much more promising the last state is than the first: at most a few points."""
+def test_default_reward_sums_to_success_minus_penalty_points() -> None:
+    """The remainder is the change of the potential, at most a few points."""
     env = AirHockeyEnv("defend")
     for seed in range(5):
         env.reset(seed=seed)
-        told = play(env, some_actions(env, 500, seed=seed))
-        info = told[-1][4]
+        results = play(env, some_actions(env, 500, seed=seed))
+        info = results[-1][4]
         points = float(np.dot(info["violations"], [3, 3, 2, 1]))
-        shaped = sum(reward for _, reward, *_ in told) - 10 * info["success"] + points
+        shaped = sum(reward for _, reward, *_ in results) - 10 * info["success"] + points
         assert abs(shaped) < 6
 
 
@@ -240,8 +240,8 @@ def test_statistics_wrappers_work() -> None:
         RecordEpisodeStatistics(gymnasium.make("faceoff/AirHockey-Defend-v0"))
     )
     env.reset(seed=0)
-    told = play(env, some_actions(env, 500))
-    assert told[-1][4]["episode"]["l"] == len(told)
+    results = play(env, some_actions(env, 500))
+    assert results[-1][4]["episode"]["l"] == len(results)
 
 
 def test_pictures_show_the_table() -> None:
@@ -255,7 +255,7 @@ def test_pictures_show_the_table() -> None:
     assert (env.render() != before).any()
 
 
-def test_a_window_without_a_display_says_what_to_do(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_human_mode_without_display_suggests_rgb_array(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("DISPLAY", raising=False)
     env = AirHockeyEnv("hit", render_mode="human")
     with pytest.raises(faceoff.Error, match="rgb_array"):

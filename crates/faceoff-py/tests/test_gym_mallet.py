@@ -1,4 +1,4 @@
-"""Actions that move the mallet over the table."""
+"""Wrappers whose actions are mallet velocities."""
 
 import warnings
 from typing import Any
@@ -14,7 +14,7 @@ from faceoff.kinematics import MalletMotion, native
 
 
 @pytest.mark.parametrize("direction", [(1.0, 0.0), (0.0, 1.0), (0.5, -1.0)])
-def test_the_mallet_goes_where_it_is_sent_and_breaks_nothing(direction: tuple[float, float]) -> None:
+def test_mallet_follows_commands_within_constraints(direction: tuple[float, float]) -> None:
     base = AirHockeyEnv("prepare", action_mode="raw", interpolation=3)
     env = MalletPlane(base, max_speed_m_s=0.5)
     assert env.action_space.shape == (2,)
@@ -24,11 +24,11 @@ def test_the_mallet_goes_where_it_is_sent_and_breaks_nothing(direction: tuple[fl
         *_, info = env.step(np.array(direction))
         assert (info["constraints"] < 0).all()
     moved = base.state.mallet - start
-    # It gains speed first, and the arm lags a little behind.
+    # The mallet accelerates first, and the arm lags a little.
     np.testing.assert_allclose(moved[:2], 0.3 * np.array(direction), atol=0.03)
 
 
-def test_one_that_is_sent_everywhere_stays_in_its_region() -> None:
+def test_mallet_stays_in_its_region_under_any_command() -> None:
     base = AirHockeyEnv("prepare", action_mode="raw", interpolation=3)
     env = MalletPlane(base, max_speed_m_s=1.0)
     env.reset(seed=0)
@@ -42,40 +42,40 @@ def test_one_that_is_sent_everywhere_stays_in_its_region() -> None:
                 env.reset()
 
 
-def test_gymnasiums_checker_has_nothing_to_say() -> None:
+def test_gymnasium_checker_passes() -> None:
     env = MalletPlane(AirHockeyEnv("defend", action_mode="raw", interpolation=3))
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        # It is a wrapper, and is meant to be checked as one.
+        # The wrapper itself is the object of the check.
         warnings.filterwarnings("ignore", message=".*different from the unwrapped version.*")
         check_env(env, skip_render_check=True)
 
 
 @pytest.mark.parametrize("mode", [AutoresetMode.NEXT_STEP, AutoresetMode.SAME_STEP])
-def test_many_mallets_move_as_each_alone(mode: AutoresetMode) -> None:
+def test_vector_wrapper_equals_the_single_wrapper(mode: AutoresetMode) -> None:
     arguments: dict[str, Any] = {"action_mode": "raw", "interpolation": 3, "max_episode_steps": 9}
     envs = MalletPlaneVector(AirHockeyVectorEnv(3, "defend", autoreset_mode=mode, **arguments))
-    one = MalletPlane(AirHockeyEnv("defend", **arguments))
+    single = MalletPlane(AirHockeyEnv("defend", **arguments))
     envs.reset(seed=4)
-    one.reset(seed=5)
+    single.reset(seed=5)
     draws = np.random.default_rng(0)
     restart = False
     for _ in range(40):
         actions = draws.uniform(-1, 1, (3, 2))
         observations, *_ = envs.step(actions)
         if restart and mode is AutoresetMode.NEXT_STEP:
-            observation, _ = one.reset()
+            observation, _ = single.reset()
             restart = False
         else:
-            observation, _, terminated, truncated, _ = one.step(actions[1])
+            observation, _, terminated, truncated, _ = single.step(actions[1])
             restart = terminated or truncated
             if restart and mode is AutoresetMode.SAME_STEP:
-                observation, _ = one.reset()
+                observation, _ = single.reset()
         np.testing.assert_allclose(observations[1], observation, atol=1e-5)
 
 
 def test_mallets_are_commanded_by_the_compiled_inverse() -> None:
-    """To the last bit, which NumPy's would not give on another machine."""
+    """The results are equal bit for bit, which NumPy does not guarantee on other machines."""
     env = MalletPlane(AirHockeyEnv("hit", action_mode="raw", interpolation=3))
     env.reset(seed=0)
     motion = MalletMotion(1, 1.0, native.inverse)
@@ -83,7 +83,7 @@ def test_mallets_are_commanded_by_the_compiled_inverse() -> None:
         np.testing.assert_array_equal(env.action(action), motion.command(action[None])[0])
 
 
-def test_what_cannot_be_is_refused() -> None:
+def test_invalid_environments_and_actions_are_refused() -> None:
     with pytest.raises(faceoff.ArgumentError, match="action_mode='raw'"):
         MalletPlane(AirHockeyEnv("hit"))
     with pytest.raises(faceoff.ArgumentError, match="max_speed_m_s"):

@@ -1,4 +1,4 @@
-"""Many worlds: each is the single environment, whatever the mode and the threads."""
+"""Many worlds: each equals the single environment, in all modes and with any number of threads."""
 
 import pickle
 import warnings
@@ -20,42 +20,42 @@ def actions_of(envs: Any, seed: int) -> np.ndarray:
     return np.random.default_rng(seed).uniform(-1, 1, envs.action_space.shape).astype(np.float32)
 
 
-def assert_same_infos(one: dict[str, Any], other: dict[str, Any]) -> None:
-    """Where the mask is set; elsewhere there is nothing to be told."""
-    assert set(one) == set(other)
-    for name, values in one.items():
+def assert_same_infos(first: dict[str, Any], second: dict[str, Any]) -> None:
+    """Compares infos where their mask is set; other values are unspecified."""
+    assert set(first) == set(second)
+    for name, values in first.items():
         if name.startswith("_"):
-            np.testing.assert_array_equal(values, other[name], err_msg=name)
+            np.testing.assert_array_equal(values, second[name], err_msg=name)
         elif isinstance(values, dict):
-            assert_same_infos(values, other[name])
+            assert_same_infos(values, second[name])
         else:
-            told = one[f"_{name}"]
-            for mine, theirs in zip(values[told], other[name][told], strict=True):
-                np.testing.assert_array_equal(mine, theirs, err_msg=name)
+            mask = first[f"_{name}"]
+            for actual, expected in zip(values[mask], second[name][mask], strict=True):
+                np.testing.assert_array_equal(actual, expected, err_msg=name)
 
 
 @pytest.mark.parametrize("mode", [AutoresetMode.NEXT_STEP, AutoresetMode.SAME_STEP])
 @pytest.mark.parametrize("threads", [1, 3])
 @pytest.mark.parametrize("task", ["hit", "defend"])
-def test_every_world_is_the_single_environment_to_the_last_bit(
+def test_worlds_equal_the_single_environment_bit_for_bit(
     mode: AutoresetMode, threads: int, task: str
 ) -> None:
     arguments: dict[str, Any] = {"task": task, "profile": "evaluation", "max_episode_steps": 23}
-    ours = AirHockeyVectorEnv(WORLDS, autoreset_mode=mode, threads=threads, **arguments)
-    theirs: Any = SyncVectorEnv([lambda: AirHockeyEnv(**arguments)] * WORLDS, autoreset_mode=mode)
-    for mine, yours in [(ours.reset(seed=3), theirs.reset(seed=3))]:
-        np.testing.assert_array_equal(mine[0], yours[0])
-        assert_same_infos(mine[1], yours[1])
+    envs = AirHockeyVectorEnv(WORLDS, autoreset_mode=mode, threads=threads, **arguments)
+    reference: Any = SyncVectorEnv([lambda: AirHockeyEnv(**arguments)] * WORLDS, autoreset_mode=mode)
+    for actual, expected in [(envs.reset(seed=3), reference.reset(seed=3))]:
+        np.testing.assert_array_equal(actual[0], expected[0])
+        assert_same_infos(actual[1], expected[1])
     for step in range(60):
-        actions = actions_of(ours, step)
-        mine, yours = ours.step(actions), theirs.step(actions)
+        actions = actions_of(envs, step)
+        actual, expected = envs.step(actions), reference.step(actions)
         for index in range(4):
-            np.testing.assert_array_equal(mine[index], yours[index])
-            assert mine[index].dtype == yours[index].dtype
-        assert_same_infos(mine[4], yours[4])
+            np.testing.assert_array_equal(actual[index], expected[index])
+            assert actual[index].dtype == expected[index].dtype
+        assert_same_infos(actual[4], expected[4])
 
 
-def test_a_world_that_waits_is_reset_by_a_mask() -> None:
+def test_ended_worlds_are_reset_by_a_mask() -> None:
     envs = AirHockeyVectorEnv(3, "defend", autoreset_mode="Disabled", max_episode_steps=4)
     envs.reset(seed=[5, 6, 7])
     for _ in range(4):
@@ -90,41 +90,41 @@ def test_make_vec_gives_the_native_batch() -> None:
     assert envs.reset(seed=0)[0] in envs.observation_space
 
 
-def test_without_copies_the_same_memory_is_written_again() -> None:
+def test_memory_is_reused_without_copies() -> None:
     envs = AirHockeyVectorEnv(4, "hit", copy=False)
     first, _ = envs.reset(seed=0)
-    kept = first.copy()
+    initial = first.copy()
     second, rewards, *_ = envs.step(np.ones((4, 7)))
     assert second is first
-    assert not np.array_equal(first, kept)
+    assert not np.array_equal(first, initial)
     assert envs.step(np.ones((4, 7)))[1] is rewards
 
     envs = AirHockeyVectorEnv(4, "hit")
     first, _ = envs.reset(seed=0)
     second, *_ = envs.step(np.ones((4, 7)))
-    np.testing.assert_array_equal(first, kept)
+    np.testing.assert_array_equal(first, initial)
     envs.step(np.ones((4, 7)))
     assert second is not first
 
 
 @pytest.mark.parametrize("copy", [True, False])
-def test_a_step_that_was_sent_is_the_step(copy: bool) -> None:
+def test_sent_step_equals_a_step(copy: bool) -> None:
     arguments: dict[str, Any] = {"task": "defend", "max_episode_steps": 9, "copy": copy}
-    one = AirHockeyVectorEnv(8, threads=2, autoreset_mode="SameStep", **arguments)
-    other = AirHockeyVectorEnv(8, threads=2, autoreset_mode="SameStep", **arguments)
-    one.reset(seed=0)
-    other.reset(seed=0)
+    stepped = AirHockeyVectorEnv(8, threads=2, autoreset_mode="SameStep", **arguments)
+    sent = AirHockeyVectorEnv(8, threads=2, autoreset_mode="SameStep", **arguments)
+    stepped.reset(seed=0)
+    sent.reset(seed=0)
     for step in range(30):
-        actions = actions_of(one, step)
-        mine = one.step(actions)
-        other.send(actions)
-        yours = other.recv()
+        actions = actions_of(stepped, step)
+        actual = stepped.step(actions)
+        sent.send(actions)
+        expected = sent.recv()
         for index in range(4):
-            np.testing.assert_array_equal(mine[index], yours[index])
-        assert_same_infos(mine[4], yours[4])
+            np.testing.assert_array_equal(actual[index], expected[index])
+        assert_same_infos(actual[4], expected[4])
 
 
-def test_nothing_may_come_between_send_and_recv() -> None:
+def test_calls_between_send_and_recv_are_refused() -> None:
     envs = AirHockeyVectorEnv(4, "hit")
     envs.reset(seed=0)
     with pytest.raises(faceoff.OrderError, match="send"):
@@ -145,47 +145,47 @@ def test_nothing_may_come_between_send_and_recv() -> None:
     envs.close()
 
 
-def test_states_of_many_worlds_are_come_back_to_and_go_to_a_single_one() -> None:
+def test_states_are_restored_in_vector_and_single_environments() -> None:
     envs = AirHockeyVectorEnv(4, "prepare", profile="evaluation")
     envs.reset(seed=0)
     for step in range(10):
         envs.step(actions_of(envs, step))
     saved = envs.save()
     actions = actions_of(envs, 99)
-    after = envs.step(actions)
+    expected = envs.step(actions)
     envs.reset(seed=50)
     envs.restore(saved)
-    again = envs.step(actions)
+    repeated = envs.step(actions)
     for index in range(4):
-        np.testing.assert_array_equal(after[index], again[index])
+        np.testing.assert_array_equal(expected[index], repeated[index])
     single = AirHockeyEnv("prepare", profile="evaluation")
     single.restore(pickle.loads(pickle.dumps(saved[2])))
-    np.testing.assert_array_equal(single.step(actions[2])[0], after[0][2])
+    np.testing.assert_array_equal(single.step(actions[2])[0], expected[0][2])
 
 
-def test_pickled_worlds_go_on_as_the_originals_do() -> None:
+def test_pickled_worlds_continue_like_the_originals() -> None:
     envs = AirHockeyVectorEnv(3, "hit", profile="evaluation", autoreset_mode="SameStep")
     envs.reset(seed=[8, 1, 4])
     for step in range(10):
         envs.step(actions_of(envs, step))
     twins = pickle.loads(pickle.dumps(envs))
     for step in range(10):
-        mine, yours = envs.step(actions_of(envs, step)), twins.step(actions_of(envs, step))
+        actual, expected = envs.step(actions_of(envs, step)), twins.step(actions_of(envs, step))
         for index in range(4):
-            np.testing.assert_array_equal(mine[index], yours[index])
+            np.testing.assert_array_equal(actual[index], expected[index])
 
 
 @pytest.mark.parametrize("mode", list(AutoresetMode))
-def test_the_reward_of_all_worlds_can_be_replaced(mode: AutoresetMode) -> None:
-    def of_one(transition: Transition) -> float:
+def test_custom_reward_replaces_the_default(mode: AutoresetMode) -> None:
+    def single_reward(transition: Transition) -> float:
         return float(transition.next_state.puck[0] - transition.state.puck[0] + transition.action.sum())
 
-    def of_all(transition: Transition) -> np.ndarray:
+    def vector_reward(transition: Transition) -> np.ndarray:
         moved = transition.next_state.puck[:, 0] - transition.state.puck[:, 0]
         return moved + transition.action.sum(axis=1)
 
-    envs = AirHockeyVectorEnv(4, "defend", reward=of_all, autoreset_mode=mode, max_episode_steps=11)
-    single = AirHockeyEnv("defend", reward=of_one, max_episode_steps=11)
+    envs = AirHockeyVectorEnv(4, "defend", reward=vector_reward, autoreset_mode=mode, max_episode_steps=11)
+    single = AirHockeyEnv("defend", reward=single_reward, max_episode_steps=11)
     envs.reset(seed=0)
     single.reset(seed=2)
     for step in range(11):
@@ -212,6 +212,6 @@ def test_statistics_wrappers_work(mode: AutoresetMode) -> None:
 def test_pictures_of_all_worlds() -> None:
     envs = AirHockeyVectorEnv(2, "hit", render_mode="rgb_array")
     envs.reset(seed=0)
-    one, other = envs.render()
-    assert one.shape == other.shape == (360, 640, 3)
-    assert (one != other).any()
+    first, second = envs.render()
+    assert first.shape == second.shape == (360, 640, 3)
+    assert (first != second).any()

@@ -20,22 +20,22 @@ def some_poses(count, seed, share=0.95):
 
 
 def over_the_table(count, seed, reach=1.4):
-    """Points where the mallet may be and the arm can be, m."""
-    chance = np.random.default_rng(seed)
-    points = chance.uniform([plain.X_MIN_M, -plain.Y_MAX_M], [reach, plain.Y_MAX_M], (3 * count, 2))
+    """Random points in the mallet's area and the arm's reach, m."""
+    rng = np.random.default_rng(seed)
+    points = rng.uniform([plain.X_MIN_M, -plain.Y_MAX_M], [reach, plain.Y_MAX_M], (3 * count, 2))
     return points[np.hypot(*points.T) < reach][:count]
 
 
-def test_the_plain_file_has_the_models_numbers():
-    mine = {name: value for name, value in vars(plain).items() if name.isupper()}
-    shared = {name for name in mine if hasattr(model, name)}
+def test_plain_file_has_the_constants_of_the_model():
+    constants = {name: value for name, value in vars(plain).items() if name.isupper()}
+    shared = {name for name in constants if hasattr(model, name)}
     for name in shared:
-        assert mine[name] == getattr(model, name), name
+        assert constants[name] == getattr(model, name), name
     assert {"LINK_OFFSET_M", "POSITION_LIMIT_RAD", "VELOCITY_LIMIT_RAD_S", "START_Q"} <= shared
 
 
-def test_the_plain_file_needs_nothing_but_the_standard_library(tmp_path):
-    """As a bundle has it: copied, without this package or NumPy."""
+def test_plain_file_needs_only_the_standard_library(tmp_path):
+    """The file is copied alone, as in a bundle, without this package and NumPy."""
     (tmp_path / "arm.py").write_text(Path(plain.__file__).read_text())
     program = "import arm, sys; print(arm.inverse((0.8, 0.1))[1], 'numpy' in sys.modules)"
     done = subprocess.run(
@@ -67,8 +67,8 @@ class TestAgainstTheSimulator:
         np.testing.assert_allclose(arm.heights(self.q), links[:, [3, 6], 2], atol=1e-12)
         jacobian = np.array([answer["jacobian"] for answer in answers])[:, :3]
         np.testing.assert_allclose(arm.jacobian(self.q), jacobian, atol=1e-12)
-        for q, where, rows in zip(self.q, ee, jacobian):
-            np.testing.assert_allclose(plain.forward(q), where, atol=1e-12)
+        for q, position, rows in zip(self.q, ee, jacobian):
+            np.testing.assert_allclose(plain.forward(q), position, atol=1e-12)
             np.testing.assert_allclose(plain.jacobian(q), rows, atol=1e-12)
 
     def test_constraints(self, answers):
@@ -76,12 +76,12 @@ class TestAgainstTheSimulator:
         for key in ("ee", "link", "joint_pos", "joint_vel"):
             expected = [answer["constraints"][key] for answer in answers]
             np.testing.assert_allclose(worst[key], expected, atol=1e-12)
-            mine = [plain.constraints(q, dq)[key] for q, dq in zip(self.q, self.dq)]
-            np.testing.assert_allclose(mine, expected, atol=1e-12)
+            plain_values = [plain.constraints(q, dq)[key] for q, dq in zip(self.q, self.dq)]
+            np.testing.assert_allclose(plain_values, expected, atol=1e-12)
 
 
 class TestInverse:
-    def test_the_posture_of_a_point_is_there_within_all_bounds(self):
+    def test_postures_reach_their_points_within_all_bounds(self):
         points = over_the_table(2000, seed=3, reach=1.43)
         q, ok = arm.inverse(points)
         assert ok.all()
@@ -90,23 +90,23 @@ class TestInverse:
         values = arm.constraints(q, np.zeros_like(q)).worst()
         assert all((group < 0.0).all() for group in values.values())
 
-    def test_the_start_pose_is_the_posture_of_its_point(self):
+    def test_start_pose_is_the_posture_of_its_point(self):
         q, ok = arm.inverse(arm.forward(model.START_Q))
         assert ok
         np.testing.assert_allclose(q, model.START_Q, atol=1e-12)
 
-    def test_from_a_start_pose_the_point_is_reached_nearby(self):
+    def test_solution_is_near_its_start_pose(self):
         points = over_the_table(500, seed=4)
         start, _ = arm.inverse(points + np.random.default_rng(5).normal(0.0, 0.02, points.shape))
         q, ok = arm.inverse(points, start)
         assert ok.mean() > 0.99, "at the table's edges a start may lie beyond the bounds"
         np.testing.assert_allclose(arm.forward(q[ok])[:, :2], points[ok], atol=1e-9)
         posture, _ = arm.inverse(points)
-        apart = np.linalg.norm(q - start, axis=-1) <= np.linalg.norm(posture - start, axis=-1) + 0.05
-        assert apart[ok].all(), "no farther than the posture is"
+        is_nearer = np.linalg.norm(q - start, axis=-1) <= np.linalg.norm(posture - start, axis=-1) + 0.05
+        assert is_nearer[ok].all(), "at most as far as the posture"
 
-    def test_from_anywhere_most_points_are_reached(self):
-        """A local search from a wild pose may end at a bound; it then says so."""
+    def test_most_points_are_reached_from_any_start_pose(self):
+        """A local search from a distant pose may end at a bound; the flag is then false."""
         points = over_the_table(400, seed=6, reach=1.3)
         q, ok = arm.inverse(points, some_poses(400, seed=7, share=0.6))
         print("reached", ok.mean())
@@ -114,8 +114,8 @@ class TestInverse:
         values = arm.constraints(q[ok], np.zeros_like(q[ok])).worst()
         assert all((group < 0.0).all() for group in values.values())
 
-    def test_a_low_wrist_is_raised(self):
-        """From a pose with a flat hand, whose end effector is where it shall be already."""
+    def test_low_wrist_is_raised(self):
+        """The start pose has a flat hand, with the end effector at the target."""
         reach, hand = 1.3, 1.6
         ahead = reach - plain.HAND_M * math.sin(hand)
         above = model.EE_DESIRED_HEIGHT_M - plain.HAND_M * math.cos(hand) - plain.SHOULDER_M
@@ -133,13 +133,13 @@ class TestInverse:
         assert ok
         assert arm.heights(q)[1] >= model.LINK_HEIGHT_M
 
-    def test_what_cannot_be_reached_is_told(self):
+    def test_unreachable_points_are_flagged(self):
         _, ok = arm.inverse([[2.0, 0.0], [0.8, 0.0], [1.1, 1.1]])
         assert ok.tolist() == [False, True, False]
         _, ok = arm.inverse([2.0, 0.0], model.START_Q)
         assert not ok
 
-    def test_far_from_the_arm_poses_are_numbers_still(self):
+    def test_distant_points_give_finite_poses(self):
         far = [[1e4, 1e4, -1e4], [0.0, 0.0, 0.0], [-1e4, 0.0, 1e4], [1.4, 0.0, 0.1645]]
         for q0 in (None, model.START_Q, [1e4] * 7):
             q, _ = arm.inverse(far, q0)
@@ -180,7 +180,7 @@ class TestInverse:
 
 
 class TestVelocities:
-    def test_on_the_axis_of_joint_1_they_are_finite(self):
+    def test_velocities_on_the_axis_of_joint_1_are_finite(self):
         assert np.isfinite(arm.posture_velocities([0.0, 0.0], [1.0, 1.0])).all()
         assert all(map(math.isfinite, plain.posture_velocities([0.0, 0.0], [1.0, 1.0])))
 
@@ -193,7 +193,7 @@ class TestVelocities:
         expected = (after - before) / (2 * tiny)
         np.testing.assert_allclose(arm.posture_velocities(points, rates), expected, atol=1e-6)
 
-    def test_the_least_velocities_move_the_mallet_as_asked(self):
+    def test_minimum_velocities_move_the_mallet_as_requested(self):
         q, _ = arm.inverse(over_the_table(200, seed=13))
         rates = np.random.default_rng(14).normal(0.0, 1.0, (200, 3))
         dq = arm.velocities(q, rates)
@@ -203,7 +203,7 @@ class TestVelocities:
         least, other = (np.linalg.norm(v / weighted, axis=-1) for v in (dq, along))
         assert (least <= other + 1e-4).all()
 
-    def test_the_share_of_a_velocity_is_what_the_rules_allow(self):
+    def test_speed_share_is_relative_to_the_allowed_velocity(self):
         at_limit = 0.95 * np.array(model.VELOCITY_LIMIT_RAD_S)
         assert arm.speed_share(at_limit) == pytest.approx(1.0)
         assert plain.speed_share(-0.5 * at_limit) == pytest.approx(0.5)
@@ -212,7 +212,7 @@ class TestVelocities:
 class TestTrajectories:
     start, end = (0.65, 0.0), (0.95, 0.3)
 
-    def test_a_motion_takes_as_long_as_the_joints_need(self):
+    def test_trajectory_duration_is_set_by_the_joint_speeds(self):
         motion = arm.minimum_jerk(self.start, self.end)
         assert motion.ok and motion.speed_share <= 0.9
         np.testing.assert_allclose(arm.forward(motion.q[-1])[:2], self.end, atol=1e-9)
@@ -220,7 +220,7 @@ class TestTrajectories:
         faster = arm.minimum_jerk(self.start, self.end, duration_s=motion.duration_s - 0.02)
         assert not faster.ok and faster.speed_share > 0.9
 
-    def test_velocities_and_accelerations_belong_to_the_positions(self):
+    def test_velocities_and_accelerations_are_derivatives(self):
         motion = arm.minimum_jerk(self.start, self.end, end_velocity=(0.5, -0.2))
         dense = motion.dense.reshape(-1, 3, 7)
         for k in (0, 1):
@@ -231,11 +231,11 @@ class TestTrajectories:
         np.testing.assert_allclose(end, [0.5, -0.2, 0.0], atol=1e-9)
 
     @pytest.mark.parametrize("interpolation", [1, 2, 3, 4, 5, -1, None])
-    def test_the_robot_follows_without_a_violation(self, interpolation):
-        """There and back on the simulator: no constraint is broken, the mallet arrives within 5 mm."""
-        out = arm.minimum_jerk(self.start, self.end)
+    def test_robot_follows_without_a_violation(self, interpolation):
+        """Forth and back on the simulator: no violation, and the mallet arrives within 5 mm."""
+        forth = arm.minimum_jerk(self.start, self.end)
         back = arm.minimum_jerk(self.end, self.start)
-        actions = np.concatenate([out.actions(interpolation), back.actions(interpolation)])
+        actions = np.concatenate([forth.actions(interpolation), back.actions(interpolation)])
         states = trace(
             {
                 "puck": [0.8, -0.4, 0, 0, 0, 0],
@@ -248,19 +248,19 @@ class TestTrajectories:
         )
         for state in states:
             assert max(state["constraints"][0].values()) <= 0.0, state
-        for state, goal in ((states[len(out)], self.end), (states[-1], self.start)):
+        for state, goal in ((states[len(forth)], self.end), (states[-1], self.start)):
             assert math.dist(state["ee"][0][:2], goal) < 5e-3
 
     @pytest.mark.parametrize("interpolation", [3, 4, 5, -1, None])
     def test_setpoints_pass_through_the_knots(self, interpolation):
         motion = arm.minimum_jerk(self.start, self.end)
         q = arm.inverse(self.start)[0]
-        told = arm.setpoints(q, motion.actions(interpolation), interpolation)
-        np.testing.assert_allclose(told[:, -1, 0], motion.q, atol=1e-12)
-        np.testing.assert_allclose(told[:, -1, 1], motion.dq, atol=1e-9)
-        np.testing.assert_allclose(told[:, :, 0], motion.dense[:, :, 0], atol=2e-3)
+        points = arm.setpoints(q, motion.actions(interpolation), interpolation)
+        np.testing.assert_allclose(points[:, -1, 0], motion.q, atol=1e-12)
+        np.testing.assert_allclose(points[:, -1, 1], motion.dq, atol=1e-9)
+        np.testing.assert_allclose(points[:, :, 0], motion.dense[:, :, 0], atol=2e-3)
 
-    def test_a_way_out_of_reach_or_over_the_rim_is_not_ok(self):
+    def test_trajectory_out_of_reach_or_bounds_is_not_ok(self):
         assert not arm.minimum_jerk(self.start, (1.6, 0.0), duration_s=2.0).ok
         assert not arm.minimum_jerk(self.start, (0.65, 0.5), duration_s=2.0).ok
         far = arm.minimum_jerk(self.start, (1e4, 0.0), end_velocity=(1e4, 0.0), duration_s=0.02)
@@ -269,7 +269,7 @@ class TestTrajectories:
 
 
 @pytest.mark.parametrize(
-    ("call", "words"),
+    ("call", "message"),
     [
         (lambda: arm.forward([0.0] * 6), "q: expected shape (..., 7), got (6,)"),
         (lambda: arm.forward(0.0), "q: expected shape (..., 7), got ()"),
@@ -292,7 +292,7 @@ class TestTrajectories:
         (lambda: plain.inverse([0.0]), "target: expected 2 or 3 numbers, got 1"),
     ],
 )
-def test_wrong_arguments_are_named(call, words):
-    with pytest.raises(ValueError) as told:
+def test_invalid_argument_errors_name_the_argument(call, message):
+    with pytest.raises(ValueError) as caught:
         call()
-    assert words in str(told.value)
+    assert message in str(caught.value)

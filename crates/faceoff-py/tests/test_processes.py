@@ -1,4 +1,4 @@
-"""Threads and processes: a pool of threads is not inherited."""
+"""Threads and processes: a forked process starts its own thread pool."""
 
 import multiprocessing
 import os
@@ -29,7 +29,7 @@ def make_and_step(_: int) -> np.ndarray:
 
 
 def in_child(work: Any) -> Any:
-    """What ``work`` returns in a process forked from this one; what it raises is returned."""
+    """The result of ``work`` in a forked process; an exception is returned as a value."""
     context = multiprocessing.get_context("fork")
     receiver, sender = context.Pipe(duplex=False)
 
@@ -41,7 +41,7 @@ def in_child(work: Any) -> Any:
 
     child = context.Process(target=run)
     child.start()
-    # A child that hangs is a failure, whose test must not hang with it.
+    # If the child hangs, the test must fail instead of hanging, too.
     answered = receiver.poll(120)
     if not answered:
         child.kill()
@@ -51,22 +51,22 @@ def in_child(work: Any) -> Any:
 
 
 @pytest.mark.parametrize("method", ["fork", "forkserver", "spawn"])
-def test_every_way_to_start_a_process(method: str) -> None:
+def test_environments_work_with_each_start_method(method: str) -> None:
     expected = make_and_step(0)
     with multiprocessing.get_context(method).Pool(2) as pool:
         for result in pool.map_async(make_and_step, range(2)).get(timeout=300):
             np.testing.assert_array_equal(result, expected)
 
 
-def test_an_environment_goes_on_in_a_forked_process_with_threads_of_its_own() -> None:
+def test_environment_continues_in_a_forked_process() -> None:
     envs = AirHockeyVectorEnv(16, "hit", threads=2)
     envs.reset(seed=3)
     envs.step(np.zeros((16, 7)))
-    theirs = in_child(lambda: step_some(envs))
-    np.testing.assert_array_equal(theirs, step_some(envs))
+    child_result = in_child(lambda: step_some(envs))
+    np.testing.assert_array_equal(child_result, step_some(envs))
 
 
-def test_a_forked_process_may_drop_and_close_what_it_inherited() -> None:
+def test_forked_process_can_close_an_inherited_environment() -> None:
     envs = AirHockeyVectorEnv(16, "hit", threads=2)
     envs.reset(seed=3)
     envs.step(np.zeros((16, 7)))
@@ -79,7 +79,7 @@ def test_a_forked_process_may_drop_and_close_what_it_inherited() -> None:
     step_some(envs)
 
 
-def test_a_step_that_the_parent_sent_is_not_waited_for() -> None:
+def test_step_sent_by_the_parent_is_refused_in_the_child() -> None:
     envs = AirHockeyVectorEnv(16, "hit", threads=2)
     envs.reset(seed=3)
     envs.send(np.zeros((16, 7)))
@@ -89,7 +89,7 @@ def test_a_step_that_the_parent_sent_is_not_waited_for() -> None:
     envs.recv()
 
 
-def test_gymnasiums_own_processes_take_the_environment() -> None:
+def test_async_vector_env_runs_the_environment() -> None:
     make = lambda: gymnasium.make("faceoff/AirHockey-Defend-v0")  # noqa: E731
     envs: Any = AsyncVectorEnv([make] * 2)
     envs.reset(seed=0)
@@ -100,7 +100,7 @@ def test_gymnasiums_own_processes_take_the_environment() -> None:
     np.testing.assert_array_equal(step_some(single), observations[1])
 
 
-def test_other_threads_of_python_run_while_a_step_does() -> None:
+def test_python_threads_run_during_a_step() -> None:
     envs = AirHockeyVectorEnv(64, "hit", threads=1)
     envs.reset(seed=0)
     done, counted = threading.Event(), [0]
@@ -111,7 +111,7 @@ def test_other_threads_of_python_run_while_a_step_does() -> None:
             time.sleep(0)
 
     before = sys.getswitchinterval()
-    # From now on nobody gets the interpreter who is not given it.
+    # With this interval the interpreter's lock is only released explicitly.
     sys.setswitchinterval(1e3)
     counter = threading.Thread(target=count)
     try:
@@ -128,7 +128,7 @@ def test_other_threads_of_python_run_while_a_step_does() -> None:
         counter.join()
 
 
-def test_two_calls_at_once_are_refused_or_follow_each_other() -> None:
+def test_concurrent_calls_are_refused_or_serialised() -> None:
     envs = AirHockeyVectorEnv(64, "hit", threads=2)
     envs.reset(seed=0)
     errors: list[BaseException] = []
@@ -150,10 +150,10 @@ def test_two_calls_at_once_are_refused_or_follow_each_other() -> None:
 
 
 def test_results_do_not_depend_on_the_number_of_threads() -> None:
-    seen = []
+    results = []
     for threads in (1, 2, 5, os.cpu_count() or 1):
         envs = AirHockeyVectorEnv(37, "prepare", profile="evaluation", threads=threads)
         envs.reset(seed=3)
-        seen.append(step_some(envs))
-    for other in seen[1:]:
-        np.testing.assert_array_equal(seen[0], other)
+        results.append(step_some(envs))
+    for other in results[1:]:
+        np.testing.assert_array_equal(results[0], other)

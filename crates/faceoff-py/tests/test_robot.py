@@ -1,4 +1,4 @@
-"""The exported model, loaded by others: pinocchio and MuJoCo find the same robot as the simulator.
+"""The exported model in other libraries: pinocchio and MuJoCo agree with the simulator.
 
 The simulator's numbers come from `faceoff sim kinematics` and `faceoff sim trace`.
 """
@@ -9,7 +9,7 @@ import xml.etree.ElementTree as ET
 
 import numpy as np
 import pytest
-from program import PROGRAM, REPOSITORY, exported, faceoff, kinematics, trace
+from program import PROGRAM, REPOSITORY, exported_model, faceoff, kinematics, trace
 
 from faceoff.kinematics import model as numbers
 
@@ -19,11 +19,11 @@ DRIVEN = numbers.JOINTS
 
 def poses(count, dofs, seed):
     """Random joint positions and velocities within the limits, the start pose first."""
-    chance = np.random.default_rng(seed)
+    rng = np.random.default_rng(seed)
     reach = np.array([*numbers.POSITION_LIMIT_RAD, 1.5, 1.5])[:dofs]
-    q = chance.uniform(-reach, reach, (count, dofs))
+    q = rng.uniform(-reach, reach, (count, dofs))
     q[0] = [*numbers.START_Q, *numbers.START_UNIVERSAL_RAD][:dofs]
-    return q, chance.normal(0.0, 1.0, (count, dofs))
+    return q, rng.normal(0.0, 1.0, (count, dofs))
 
 
 def answers(q, dq):
@@ -35,7 +35,7 @@ def dofs_of(model):
 
 
 def dynamics_of(answer, model):
-    """Mass matrix and bias."""
+    """Mass matrix and bias of a result of `faceoff sim kinematics`."""
     part = answer["plant"] if model == "plant" else answer
     return np.array(part["mass"]), np.array(part["bias"])
 
@@ -47,8 +47,8 @@ class TestUrdfInPinocchio:
     @pytest.fixture
     def robot(self, model):
         pin = pytest.importorskip("pinocchio")
-        robot = pin.buildModelFromXML(exported("urdf", model))
-        # URDF cannot tell of rotors.
+        robot = pin.buildModelFromXML(exported_model("urdf", model))
+        # URDF cannot describe rotors.
         armature = np.zeros(robot.nv)
         armature[:DRIVEN] = numbers.ARMATURE_KG_M2
         robot.armature = armature
@@ -77,7 +77,7 @@ class TestUrdfInPinocchio:
             np.testing.assert_allclose(pin.crba(robot, data, pose), mass, atol=1e-10)
             np.testing.assert_allclose(pin.nle(robot, data, pose, rate), bias, atol=1e-10)
 
-    def test_limits_and_friction_are_told(self, robot, model):
+    def test_limits_and_friction_are_exported_model(self, robot, model):
         _, robot, _ = robot
         np.testing.assert_array_equal(robot.upperPositionLimit[:DRIVEN], numbers.POSITION_LIMIT_RAD)
         np.testing.assert_array_equal(-robot.lowerPositionLimit[:DRIVEN], numbers.POSITION_LIMIT_RAD)
@@ -89,7 +89,7 @@ class TestUrdfInPinocchio:
 
 def load(model="plant"):
     mujoco = pytest.importorskip("mujoco")
-    loaded = mujoco.MjModel.from_xml_string(exported("mjcf", model))
+    loaded = mujoco.MjModel.from_xml_string(exported_model("mjcf", model))
     return mujoco, loaded, mujoco.MjData(loaded)
 
 
@@ -118,7 +118,7 @@ def test_mujoco_finds_the_same_positions_mass_matrix_and_bias(model):
 
 
 def full_mass(mujoco, robot, data):
-    """Column by column, by multiplication: the layout of MuJoCo's own matrix is its affair."""
+    """The mass matrix, computed by multiplication with unit vectors: MuJoCo's own layout is internal."""
     columns = []
     for unit in np.eye(robot.nv):
         column = np.zeros(robot.nv)
@@ -127,7 +127,7 @@ def full_mass(mujoco, robot, data):
     return np.array(columns)
 
 
-def test_the_key_frame_is_the_start_pose():
+def test_key_frame_is_the_start_pose():
     mujoco, robot, data = load()
     mujoco.mj_resetDataKeyframe(robot, data, robot.key("start").id)
     np.testing.assert_array_equal(data.qpos[:DRIVEN], numbers.START_Q)
@@ -140,7 +140,7 @@ def test_the_key_frame_is_the_start_pose():
 
 
 class UniversalController:
-    """What keeps the mallet upright, as docs/robot.md tells it: torques from MuJoCo's state."""
+    """The controller of the universal joint as in docs/robot.md, on MuJoCo's state."""
 
     def __init__(self):
         self.filtered = np.zeros(2)
@@ -148,8 +148,8 @@ class UniversalController:
     def torque(self, rotation, angle, rate):
         new = numbers.UNIVERSAL_FILTER_NEW
         self.filtered = new * rate + (1.0 - new) * self.filtered
-        wish = np.clip(self.upright(rotation), -numbers.UNIVERSAL_RANGE_RAD, numbers.UNIVERSAL_RANGE_RAD)
-        torque = numbers.UNIVERSAL_KP_N_M * (wish - angle) - numbers.UNIVERSAL_KD_N_M_S * self.filtered
+        desired = np.clip(self.upright(rotation), -numbers.UNIVERSAL_RANGE_RAD, numbers.UNIVERSAL_RANGE_RAD)
+        torque = numbers.UNIVERSAL_KP_N_M * (desired - angle) - numbers.UNIVERSAL_KD_N_M_S * self.filtered
         limit = numbers.UNIVERSAL_TORQUE_LIMIT_N_M
         return np.clip(torque, -limit, limit)
 
@@ -166,11 +166,11 @@ class UniversalController:
         return np.array([first, angle(y, np.array([turned[1], -turned[0], 0.0]), turned)])
 
 
-def test_an_arm_motion_in_mujoco_is_ours():
+def test_arm_motion_in_mujoco_agrees():
     """One second under the torques of the simulator's controller: joints within 1e-6 rad, universal joint too."""
-    chance = np.random.default_rng(3)
-    steps, amplitude = 50, chance.uniform(0.1, 0.4, DRIVEN)
-    pace = chance.uniform(3.0, 6.0, DRIVEN)
+    rng = np.random.default_rng(3)
+    steps, amplitude = 50, rng.uniform(0.1, 0.4, DRIVEN)
+    pace = rng.uniform(3.0, 6.0, DRIVEN)
     t = 0.02 * np.arange(1, steps + 1)[:, None]
     q = np.array(numbers.START_Q) + amplitude * (1 - np.cos(pace * t)) / 2
     dq = amplitude * pace * np.sin(pace * t) / 2
@@ -180,29 +180,29 @@ def test_an_arm_motion_in_mujoco_is_ours():
         "interpolation": [3],
         "actions": [np.stack([q, dq], axis=1).tolist()],
     }
-    ours = trace(scenario)
+    simulated = trace(scenario)
     mujoco, robot, data = load()
     mujoco.mj_resetDataKeyframe(robot, data, robot.key("start").id)
-    data.qpos[7:9] = ours[0]["universal"][0]
+    data.qpos[7:9] = simulated[0]["universal"][0]
     data.qpos[9:] = scenario["puck"][:3]
     universal = UniversalController()
-    farthest = np.zeros(2)
-    for state in ours[1:]:
+    max_difference = np.zeros(2)
+    for state in simulated[1:]:
         mujoco.mj_kinematics(robot, data)
         rotation = data.body("end_effector").xmat.reshape(3, 3)
         data.ctrl[:DRIVEN] = state["torque"][0]
         data.ctrl[DRIVEN:] = universal.torque(rotation, data.qpos[7:9], data.qvel[7:9])
         mujoco.mj_step(robot, data)
-        farthest[0] = max(farthest[0], np.abs(data.qpos[:7] - state["q"][0]).max())
-        farthest[1] = max(farthest[1], np.abs(data.qpos[7:9] - state["universal"][0]).max())
-    moved = np.abs(np.array(ours[-1]["q"][0]) - numbers.START_Q)
-    print("moved", moved, "differences", farthest)
+        max_difference[0] = max(max_difference[0], np.abs(data.qpos[:7] - state["q"][0]).max())
+        max_difference[1] = max(max_difference[1], np.abs(data.qpos[7:9] - state["universal"][0]).max())
+    moved = np.abs(np.array(simulated[-1]["q"][0]) - numbers.START_Q)
+    print("moved", moved, "differences", max_difference)
     assert moved.max() > 0.1
-    assert farthest.max() < 1e-6
+    assert max_difference.max() < 1e-6
 
 
-def test_a_sliding_puck_in_mujoco_is_ours():
-    """Free for half a second: within 1e-9 m."""
+def test_sliding_puck_in_mujoco_agrees():
+    """Half a second without contacts: within 1e-9 m."""
     scenario = {"puck": [-0.4, 0.1, 0.2, 1.0, 0.3, 4.0], "duration_ms": 500}
     last = trace(scenario)[-1]["puck"]
     mujoco, robot, data = load()
@@ -213,29 +213,29 @@ def test_a_sliding_puck_in_mujoco_is_ours():
 
 
 @pytest.mark.parametrize("vy", [0.8, 1.5, 2.5])
-def test_a_bounce_off_a_long_rim_in_mujoco_is_near_ours(vy):
-    """The same law of contact: velocity after the bounce within 2 % of the speed before."""
+def test_bounce_off_a_long_rim_in_mujoco_agrees_roughly(vy):
+    """The contact law is the same: velocity after the bounce within 2 % of the speed before."""
     scenario = {"puck": [0.2, 0.4, 0.0, 0.5, vy, 0.0], "duration_ms": 200}
-    ours = trace(scenario)[-1]["puck"]
+    simulated = trace(scenario)[-1]["puck"]
     mujoco, robot, data = load()
     data.qpos[9:], data.qvel[9:] = scenario["puck"][:3], scenario["puck"][3:]
     for _ in range(200):
         mujoco.mj_step(robot, data)
-    assert ours[4] < 0.0, "it bounced"
-    difference = np.array(ours[3:5]) - data.qvel[9:11]
-    print(ours, data.qvel[9:], difference)
+    assert simulated[4] < 0.0, "the puck must bounce"
+    difference = np.array(simulated[3:5]) - data.qvel[9:11]
+    print(simulated, data.qvel[9:], difference)
     assert np.linalg.norm(difference) < 0.02 * math.hypot(0.5, vy)
 
 
 DOCUMENT = (REPOSITORY / "docs" / "robot.md").read_text()
 
 
-def test_the_document_tells_the_universal_joints_controller():
-    """The rest of the page's numbers is held by the simulator's own tests."""
-    words = " ".join(DOCUMENT.split())
+def test_document_describes_the_universal_joint_controller():
+    """The simulator's tests check the other numbers of the page."""
+    text = " ".join(DOCUMENT.split())
     for sentence in (
-        f"{numbers.UNIVERSAL_KP_N_M:g} N m/rad times what is missing",
-        f"less {numbers.UNIVERSAL_KD_N_M_S:g} N m s/rad times the hinge's speed",
+        f"{numbers.UNIVERSAL_KP_N_M:g} N m/rad times the remaining angle",
+        f"minus {numbers.UNIVERSAL_KD_N_M_S:g} N m s/rad times the hinge's speed",
         f"with {numbers.UNIVERSAL_FILTER_NEW:g} of the newest",
         f"at most {numbers.UNIVERSAL_TORQUE_LIMIT_N_M:g} N m",
         f"within ±{numbers.UNIVERSAL_RANGE_RAD / (math.pi / 2):g}·π/2",
@@ -243,14 +243,14 @@ def test_the_document_tells_the_universal_joints_controller():
         f"Elbow and wrist (the origins of links 4 and 7): above {numbers.LINK_HEIGHT_M:g} m",
         f"{100 * numbers.EE_HEIGHT_TOLERANCE_M:g} cm more or less",
     ):
-        assert sentence in words, sentence
+        assert sentence in text, sentence
 
 
-def test_the_documents_programs_run(tmp_path, monkeypatch):
+def test_document_programs_run(tmp_path, monkeypatch):
     pytest.importorskip("pinocchio")
     pytest.importorskip("mujoco")
-    (tmp_path / "robot.urdf").write_text(exported("urdf"))
-    (tmp_path / "robot.xml").write_text(exported("mjcf"))
+    (tmp_path / "robot.urdf").write_text(exported_model("urdf"))
+    (tmp_path / "robot.xml").write_text(exported_model("mjcf"))
     monkeypatch.chdir(tmp_path)
     programs = [part.split("```")[0] for part in DOCUMENT.split("```python\n")[1:]]
     assert len(programs) == 2
@@ -259,29 +259,29 @@ def test_the_documents_programs_run(tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize("model", FIELDS)
-@pytest.mark.parametrize("form", ["urdf", "mjcf"])
-def test_files_need_no_other_files(form, model):
-    tags = {element.tag for element in ET.fromstring(exported(form, model)).iter()}
+@pytest.mark.parametrize("format_", ["urdf", "mjcf"])
+def test_exported_files_need_no_other_files(format_, model):
+    tags = {element.tag for element in ET.fromstring(exported_model(format_, model)).iter()}
     assert not tags & {"mesh", "include", "texture", "asset"}
 
 
-def test_generated_files_are_what_the_program_writes():
-    """Who changes the model writes these anew: faceoff sim export --format … --out …"""
+def test_generated_files_equal_the_export():
+    """After a change of the model, regenerate them: faceoff sim export --format … --out …"""
     package = REPOSITORY / "crates" / "faceoff-py" / "python" / "faceoff" / "kinematics"
-    assert (package / "model.py").read_text() == exported("python")
-    assert (REPOSITORY / "docs" / "images" / "robot.svg").read_text() == exported("svg")
-    ET.fromstring(exported("svg"))
+    assert (package / "model.py").read_text() == exported_model("python")
+    assert (REPOSITORY / "docs" / "images" / "robot.svg").read_text() == exported_model("svg")
+    ET.fromstring(exported_model("svg"))
 
 
-def test_out_writes_what_is_otherwise_printed(tmp_path):
-    for form in ("urdf", "mjcf", "python", "svg"):
-        out = tmp_path / form
-        assert faceoff("sim", "export", "--format", form, "--out", str(out)) == ""
-        assert out.read_text() == exported(form)
+def test_out_option_writes_the_printed_export(tmp_path):
+    for format_ in ("urdf", "mjcf", "python", "svg"):
+        out = tmp_path / format_
+        assert faceoff("sim", "export", "--format", format_, "--out", str(out)) == ""
+        assert out.read_text() == exported_model(format_)
 
 
 @pytest.mark.parametrize(
-    ("options", "words"),
+    ("options", "message"),
     [
         (["--format", "stl"], "urdf, mjcf, python, svg"),
         ([], "--format"),
@@ -290,7 +290,7 @@ def test_out_writes_what_is_otherwise_printed(tmp_path):
         (["--format", "urdf", "--out", "/nowhere/robot.urdf"], "--out /nowhere/robot.urdf"),
     ],
 )
-def test_wrong_options_are_told(options, words):
+def test_invalid_options_are_refused(options, message):
     done = subprocess.run([PROGRAM, "sim", "export", *options], capture_output=True, text=True)
-    assert done.returncode != 0 and words in done.stderr, done.stderr
+    assert done.returncode != 0 and message in done.stderr, done.stderr
     assert done.stdout == ""

@@ -1,4 +1,4 @@
-"""What Stable-Baselines3 asks of a vector environment, without it: it needs torch."""
+"""The vector environment's methods for Stable-Baselines3, tested without that package, which needs torch."""
 
 import numpy as np
 import pytest
@@ -19,7 +19,7 @@ def test_spaces_are_those_of_one_world() -> None:
     assert envs.action_space.shape == (7,)
 
 
-def test_an_end_tells_of_the_terminal_observation_and_of_a_cut() -> None:
+def test_end_info_has_terminal_observation_and_truncation() -> None:
     envs = make(2, task="prepare", max_episode_steps=4)
     assert envs.seed(6) == [6, 7]
     envs.reset()
@@ -41,19 +41,19 @@ def test_an_end_tells_of_the_terminal_observation_and_of_a_cut() -> None:
     np.testing.assert_array_equal(observations[1], single.reset()[0])
 
 
-def test_an_episode_that_ends_by_itself_is_not_cut_off() -> None:
+def test_terminated_episode_is_not_truncated() -> None:
     envs = make(4, task="defend")
     envs.seed(0)
     envs.reset()
-    seen = 0
-    while seen < 4:
+    terminated = 0
+    while terminated < 4:
         envs.step_async(np.zeros((4, 7)))
         _, _, dones, infos = envs.step_wait()
         for done, info in zip(dones, infos, strict=True):
             assert ("terminal_observation" in info) == done
             if done and info["end"] != "horizon":
                 assert info["TimeLimit.truncated"] is False
-                seen += 1
+                terminated += 1
 
 
 def test_attributes_and_methods_of_worlds() -> None:
@@ -69,7 +69,7 @@ def test_attributes_and_methods_of_worlds() -> None:
             call()
 
 
-def test_other_modes_are_refused() -> None:
+def test_other_autoreset_modes_are_refused() -> None:
     with pytest.raises(faceoff.ArgumentTypeError, match="SameStep"):
         VecEnvMethods(AirHockeyVectorEnv(2))
     with pytest.raises(faceoff.ArgumentError, match="autoreset_mode"):

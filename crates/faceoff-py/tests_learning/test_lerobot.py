@@ -1,6 +1,6 @@
-"""The real LeRobot opens what `faceoff.dataset.to_lerobot` writes.
+"""LeRobot itself opens the exports of `faceoff.dataset.to_lerobot`.
 
-Runs in an environment of its own (`requirements.txt`), without network.
+Runs in a separate environment (`requirements.txt`), without network.
 """
 
 from __future__ import annotations
@@ -40,9 +40,9 @@ def test_lerobot_reads_every_frame(task: str, tmp_path: Path) -> None:
         assert read.meta.episodes[number]["dataset_from_index"] == frame
         for step in (0, 1, episode.steps - 1):
             item = read[frame + step]
-            told = arrays.observations[step].astype(np.float32)
-            assert np.array_equal(item["observation.state"].numpy(), told[6:20])
-            expected = np.concatenate([told[:6], told[20:]])
+            observation = arrays.observations[step].astype(np.float32)
+            assert np.array_equal(item["observation.state"].numpy(), observation[6:20])
+            expected = np.concatenate([observation[:6], observation[20:]])
             assert np.array_equal(item["observation.environment_state"].numpy(), expected)
             action = arrays.actions[step].reshape(-1).astype(np.float32)
             assert np.array_equal(item["action"].numpy(), action)
@@ -66,12 +66,12 @@ def test_lerobot_loads_chosen_episodes_with_a_history(tmp_path: Path) -> None:
     assert np.array_equal(read[0]["action"].numpy(), expected)
 
 
-def test_lerobots_statistics_are_those_of_the_frames(tmp_path: Path) -> None:
+def test_lerobot_statistics_equal_those_of_the_frames(tmp_path: Path) -> None:
     dataset = open_dataset(FIXTURES / "dataset-layout-3.zip")
     root = to_lerobot(dataset, tmp_path / "hit", "hit")
     stats = lerobot_dataset.LeRobotDataset("faceoff/hit", root=root).meta.stats
-    told = np.concatenate([e.to_numpy().observations[:-1, 6:20] for e in dataset.episodes("hit")])
-    told = told.astype(np.float32).astype(np.float64)
-    assert np.allclose(stats["observation.state"]["mean"], told.mean(axis=0))
-    assert np.allclose(stats["observation.state"]["std"], told.std(axis=0))
-    assert np.array_equal(stats["observation.state"]["count"], [len(told)])
+    states = np.concatenate([e.to_numpy().observations[:-1, 6:20] for e in dataset.episodes("hit")])
+    states = states.astype(np.float32).astype(np.float64)
+    assert np.allclose(stats["observation.state"]["mean"], states.mean(axis=0))
+    assert np.allclose(stats["observation.state"]["std"], states.std(axis=0))
+    assert np.array_equal(stats["observation.state"]["count"], [len(states)])

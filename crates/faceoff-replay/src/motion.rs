@@ -4,7 +4,7 @@ use crate::{
     column::Column,
     header::{Contact, ContactWith},
 };
-use faceoff_sim::{EpisodeState, GameState, Impact, JOINTS, Met, model::CONTROL_STEP_S};
+use faceoff_sim::{EpisodeState, GameState, Impact, JOINTS, ContactBody, model::CONTROL_STEP_S};
 
 /// m: a tenth of a pixel in the largest picture.
 const POSITION: f64 = 1e-4;
@@ -110,10 +110,10 @@ impl Motion {
     pub fn add_contacts(&mut self, step: u32, impacts: &[Impact]) {
         for impact in impacts {
             let t = f64::from(step) * CONTROL_STEP_S + impact.after_s();
-            let what = match impact.met {
-                Met::LongRim | Met::ShortRim => ContactWith::Rim,
-                Met::Mallet(0) => ContactWith::Mallet,
-                Met::Mallet(_) => ContactWith::OpponentMallet,
+            let what = match impact.body {
+                ContactBody::LongRim | ContactBody::ShortRim => ContactWith::Rim,
+                ContactBody::Mallet(0) => ContactWith::Mallet,
+                ContactBody::Mallet(_) => ContactWith::OpponentMallet,
             };
             let is_same_bounce = |earlier: &Contact| earlier.what == what && t - earlier.t < BOUNCE_S;
             if !self.contacts.iter().rev().any(is_same_bounce) {

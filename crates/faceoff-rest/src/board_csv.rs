@@ -81,7 +81,7 @@ macro_rules! common_fields {
             row.finished_at.to_string(),
             escape_formula($division),
             row.evaluations.len().to_string(),
-            escape_formula(row.extra_turn.as_deref().unwrap_or_default()),
+            escape_formula(row.extra_evaluation.as_deref().unwrap_or_default()),
             or_empty(row.released_at),
             row.ruleset.clone(),
             row.profile.to_string(),

@@ -26,7 +26,7 @@ use faceoff_types::SubmissionId;
 
 /// Downloads the bundle as it was uploaded. For its team and organisers.
 #[utoipa::path(
-    get, path = "/submissions/{id}/archive", tag = "team", security(("team" = []), ("organiser" = [])),
+    get, path = "/submissions/{id}/bundle", tag = "team", security(("team" = []), ("organiser" = [])),
     params(("id" = SubmissionId, Path), FileHeaders, LinkQuery),
     responses(
         (status = 200, body = inline(Binary), content_type = "application/octet-stream"),
@@ -35,7 +35,7 @@ use faceoff_types::SubmissionId;
         (status = 410, description = "the bundle was removed, the detail says when and why; or the link has expired"),
     )
 )]
-pub(crate) async fn submission_archive(
+pub(crate) async fn download_bundle(
     LinkOr(caller): LinkOr<Caller>,
     conditions: Conditions,
     State(app): State<App>,
@@ -65,7 +65,7 @@ pub(crate) async fn submission_archive(
 ///
 /// Permissions are checked when the link is used, as for its creator.
 #[utoipa::path(
-    post, path = "/submissions/{id}/archive/link", tag = "team", security(("team" = []), ("organiser" = [])),
+    post, path = "/submissions/{id}/bundle/link", tag = "team", security(("team" = []), ("organiser" = [])),
     params(("id" = SubmissionId, Path)),
     request_body(content = Option<NewLink>, content_type = "application/json"),
     responses(
@@ -75,14 +75,14 @@ pub(crate) async fn submission_archive(
         (status = 422),
     )
 )]
-pub(crate) async fn link_archive(
+pub(crate) async fn link_bundle(
     caller: Caller,
     State(app): State<App>,
     PathParam(id): PathParam<SubmissionId>,
     OptionalJson(wanted): OptionalJson<NewLink>,
 ) -> Result<(StatusCode, Json<LinkView>), Problem> {
     downloadable(&caller, &app, id).await?;
-    let path = format!("{}/archive", paths::submission(id));
+    let path = format!("{}/bundle", paths::submission(id));
     links::link(&app, &caller, &path, wanted).await
 }
 

@@ -1,5 +1,6 @@
 //! The OpenAPI document: everything besides routes and types.
 
+mod deprecated_fields;
 mod files;
 mod integers;
 mod lists;
@@ -70,6 +71,7 @@ pub(super) fn complete(mut document: openapi::OpenApi) -> Value {
     let components = document.components.get_or_insert_default();
     unions::flatten(&mut components.schemas);
     let mut document = serde_json::to_value(document).expect("its keys are strings");
+    deprecated_fields::add(&mut document);
     integers::mark_unsigned(&mut document);
     document
 }

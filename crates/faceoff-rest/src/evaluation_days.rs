@@ -15,7 +15,7 @@ use faceoff_service::{
     responses(
         (status = 200, body = DayView),
         (status = 404, description = "no such stage"),
-        (status = 409, description = "the day has had its cutoff (“next_cut” says when the next one is), the stage is not open, no team has a valid submission, or the season is closed"),
+        (status = 409, description = "the day has had its cutoff (“next_cutoff” says when the next one is), the stage is not open, no team has a valid submission, or the season is closed"),
         (status = 422, description = "several stages are open, and the request names none"),
     )
 )]

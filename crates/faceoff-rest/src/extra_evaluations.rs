@@ -51,7 +51,7 @@ pub(crate) async fn start_missed_day(
 /// Before the day's release it runs on the day's episodes. After the release, when these are public, it runs on
 /// episodes of its own; its board row says so, and it cannot be compared episode by episode.
 #[utoipa::path(
-    post, path = "/stages/{id}/days/{day}/extra-turn", tag = "organiser", security(("organiser" = [])),
+    post, path = "/stages/{id}/days/{day}/extra-evaluation", tag = "organiser", security(("organiser" = [])),
     params(("id" = StageId, Path), ("day" = Date, Path, example = "2026-03-01")), request_body = NewExtraEvaluation,
     responses(
         (status = 201, body = EvaluationView, headers(("Location" = String, description = "path of the new evaluation"))),
@@ -61,7 +61,7 @@ pub(crate) async fn start_missed_day(
         (status = 422),
     )
 )]
-pub(crate) async fn extra_turn(
+pub(crate) async fn grant_extra_evaluation(
     organiser: Organiser,
     State(app): State<App>,
     day: PathParams<String, 2>,

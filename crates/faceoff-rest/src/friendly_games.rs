@@ -106,8 +106,8 @@ pub(crate) async fn order_test_games(
     }
     tracing::info!(tournament = %id, actor = %caller.actor(), games = queued.len(), "test games queued");
     let view = TestGamesView {
-        ordered: queued,
-        not_ordered: skipped,
+        queued,
+        skipped,
     };
     Ok((StatusCode::CREATED, Json(view)))
 }
@@ -161,11 +161,11 @@ pub(crate) async fn order_friendly_game(
 
 /// Lists test and friendly games, newest first: for a team its own, for organisers all.
 #[utoipa::path(
-    get, path = "/tournaments/{id}/free-games", tag = "team", security(("team" = []), ("organiser" = [])),
+    get, path = "/tournaments/{id}/uncounted-games", tag = "team", security(("team" = []), ("organiser" = [])),
     params(("id" = TournamentId, Path), PageQuery),
     responses((status = 200, body = Vec<GameView>), (status = 404))
 )]
-pub(crate) async fn list_free_games(
+pub(crate) async fn list_uncounted_games(
     caller: Caller,
     page: Page<GameId>,
     State(app): State<App>,

@@ -7,7 +7,7 @@ use faceoff_service::{app::App, problem::Problem, views::health};
 /// Readiness: checks that the database is writable (by a test write, at most once a second), the queue makes progress,
 /// and the disks have free space.
 ///
-/// Otherwise the response is a problem whose `database`, `queue` and `room` say what is wrong.
+/// Otherwise the response is a problem whose `database`, `queue` and `free_space` say what is wrong.
 #[utoipa::path(
     get, path = "/health", tag = "public",
     responses(

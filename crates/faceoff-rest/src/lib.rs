@@ -11,6 +11,7 @@ mod clip_response;
 mod clips;
 mod comparisons;
 mod datasets;
+mod deprecated_routes;
 mod evaluation_days;
 mod document;
 mod downloads;
@@ -78,6 +79,7 @@ pub fn router(timeout: Duration) -> (Router<App>, Arc<Value>) {
         .merge(tournament_routes())
         .merge(game_routes())
         .merge(user_routes())
+        .merge(deprecated_routes::router())
         .layer(middleware::from_fn_with_state(timeout, timeouts::time_out))
         .layer(DefaultBodyLimit::max(MAX_JSON_BYTES));
     // An upload may take long as long as it progresses; `upload` itself limits size and pauses.
@@ -90,6 +92,7 @@ pub fn router(timeout: Duration) -> (Router<App>, Arc<Value>) {
         .nest(API_BASE, resources.merge(uploads).merge(archives))
         .split_for_parts();
     document.info = Document::openapi().info;
+    deprecated_routes::describe(&mut document);
     let document = Arc::new(document::complete(document));
     let served = Arc::clone(&document);
     let router = router.route(
@@ -176,7 +179,7 @@ fn stage_routes() -> OpenApiRouter<App> {
         .routes(routes!(sign_off::finalise_stage))
         .routes(routes!(evaluation_days::start_day))
         .routes(routes!(extra_evaluations::start_missed_day))
-        .routes(routes!(extra_evaluations::extra_turn))
+        .routes(routes!(extra_evaluations::grant_extra_evaluation))
         .routes(routes!(board_freezes::freeze_boards))
         .routes(routes!(board_freezes::unfreeze_boards))
         .routes(routes!(proposals::list_proposals))
@@ -202,8 +205,8 @@ fn submission_routes() -> OpenApiRouter<App> {
             submissions::describe_submission,
             bundles::delete_submission
         ))
-        .routes(routes!(bundles::submission_archive))
-        .routes(routes!(bundles::link_archive))
+        .routes(routes!(bundles::download_bundle))
+        .routes(routes!(bundles::link_bundle))
         .routes(routes!(storage::storage))
         .routes(routes!(workers::workers))
         .routes(routes!(workers::ban_worker))
@@ -254,7 +257,7 @@ fn tournament_routes() -> OpenApiRouter<App> {
         .routes(routes!(tournaments::close_tournament))
         .routes(routes!(friendly_games::order_test_games))
         .routes(routes!(friendly_games::order_friendly_game))
-        .routes(routes!(friendly_games::list_free_games))
+        .routes(routes!(friendly_games::list_uncounted_games))
         .routes(routes!(replays::order_replays, replays::cancel_replays))
         .routes(routes!(replays::certainty))
         .routes(routes!(ratings::ratings))

@@ -187,7 +187,7 @@ pub(crate) async fn drop_proposal(
     OptionalJson(Confirmation { confirm }): OptionalJson<Confirmation>,
 ) -> Result<Json<ProposalView>, Problem> {
     let view = proposal::find(&app, id).await?;
-    if view.settled_at.is_none() {
+    if view.decided_at.is_none() {
         let effect = format!(
             "{} evaluations would never count; unfinished ones would be cancelled, and their datasets removed",
             view.evaluations.len()

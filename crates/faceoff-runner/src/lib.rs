@@ -28,7 +28,7 @@ mod wait_breakdown;
 mod wire_env;
 
 pub use config::AgentEnvironment;
-pub use faceoff_dataset::{Assembled, CLIPS_FILE, ShardReport, assemble, game::GameArchives};
+pub use faceoff_dataset::{AssembledDataset, CLIPS_FILE, ShardReport, assemble, game::GameArchives};
 pub use faceoff_types::TimeLimits;
 pub use faceoff_wire::game::{GameCalibration, GameSpec};
 pub use faceoff_wire::job::{EvaluationMeta, ShardSpec, ValidationSpec};

@@ -13,7 +13,7 @@ const RANGE_START: u32 = 0x7000_0000;
 /// Ids per service process: its pid (22 bits) and these 6 bits fill the range.
 const SLOTS: u32 = 64;
 /// Fallback in a container that maps few ids.
-const NOBODY: u32 = 65_534;
+const OVERFLOW_ID: u32 = 65_534;
 static NEXT_SLOT: AtomicU32 = AtomicU32::new(0);
 
 /// The host user of one agent.
@@ -36,14 +36,14 @@ impl AgentUser {
             read_map("/proc/self/uid_map")?,
             read_map("/proc/self/gid_map")?,
         ];
-        [own, NOBODY]
+        [own, OVERFLOW_ID]
             .into_iter()
             .find(|&id| maps.iter().all(|map| is_mapped(map, id)))
             .map(|id| Some(Self { id }))
             .ok_or_else(|| SandboxError::Unavailable {
                 layer: Layer::Namespaces,
                 reason: format!(
-                    "the service runs as root of a user namespace that maps neither id {own} nor {NOBODY}, \
+                    "the service runs as root of a user namespace that maps neither id {own} nor {OVERFLOW_ID}, \
                      so its agents would be root too; run it as an ordinary user, or map more ids"
                 ),
             })

@@ -4,7 +4,7 @@ use crate::{
     paired::{PairedTally, SIGNIFICANCE, overall_p_value},
     summary::EpisodeSummary,
 };
-use faceoff_types::{Profile, Seed, Task, TaskWeights, Variation};
+use faceoff_types::{deprecated_names, Profile, Seed, Task, TaskWeights, Variation};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -82,6 +82,7 @@ pub struct Comparison {
 
 /// Two evaluations on the same episodes of one task.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(remote = "Self")]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct TaskComparison {
     /// Episodes that both solved.
@@ -104,12 +105,13 @@ pub struct TaskComparison {
     /// McNemar's exact test, two-sided.
     pub p_value: f64,
     /// Is `p_value` at most [`SIGNIFICANCE`]?
-    #[serde(rename = "told_apart")]
     pub significant: bool,
 }
+deprecated_names!(TaskComparison { told_apart => significant });
 
 /// The overall scores of two evaluations on the same episodes.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(remote = "Self")]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct OverallComparison {
     /// A's score in percent.
@@ -124,9 +126,9 @@ pub struct OverallComparison {
     /// The exact paired test of the weighted score ([`overall_p_value`]).
     pub p_value: f64,
     /// Is `p_value` at most [`SIGNIFICANCE`]?
-    #[serde(rename = "told_apart")]
     pub significant: bool,
 }
+deprecated_names!(OverallComparison { told_apart => significant });
 
 impl ComparedEvaluation<'_> {
     /// Compares two evaluations on the same episodes.

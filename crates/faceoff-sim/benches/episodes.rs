@@ -1,4 +1,4 @@
-//! Control steps per second of a held arm: of single episodes, of a game, of many worlds together.
+//! Control steps per second of a held arm: single episodes, a game, and many worlds at once.
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use faceoff_sim::{
@@ -18,7 +18,7 @@ fn held_arm(c: &mut Criterion) {
     let mut group = c.benchmark_group("control_step");
     group.throughput(Throughput::Elements(STEPS));
     for (name, factors) in [("ideal", Factors::NONE), ("evaluation", Factors::ALL)] {
-        let plant = Plant::under(factors, &settings, Seed::from_number(0));
+        let plant = Plant::for_factors(factors, &settings, Seed::from_number(0));
         for task in Task::ALL {
             let episode = Episode::new(
                 task,

@@ -1,8 +1,8 @@
-//! Draws how far the simulator is from the reference's recordings: the pictures of `docs/simulator.md`.
+//! Draws the differences between the simulator and the reference's recordings: the figures of `docs/simulator.md`.
 //!
 //! `cargo run -p faceoff-sim --example fidelity -- docs/images/fidelity`
 
-#![expect(clippy::print_stdout, reason = "an example that reports what it drew")]
+#![expect(clippy::print_stdout, reason = "the example reports its results")]
 #![expect(
     clippy::unwrap_used,
     reason = "a recording that cannot be read ends the program"
@@ -11,7 +11,7 @@
 #[path = "../tests/it/reference.rs"]
 mod reference;
 #[path = "../tests/it/replay.rs"]
-#[expect(dead_code, reason = "the tests need more of it")]
+#[expect(dead_code, reason = "only the tests use all of it")]
 mod replay;
 
 use faceoff_sim::{Interpolation, Plant, World};
@@ -20,12 +20,12 @@ use reference::{array, flat, max_difference, quantile, recording, rows};
 use replay::{Replay, bounces, episodes, impacts};
 use std::{error::Error, ops::Range, path::Path};
 
-type Drawn = Result<(), Box<dyn Error>>;
+type DrawResult = Result<(), Box<dyn Error>>;
 type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 /// A named line of a chart.
 type Line = (String, Vec<(f64, f64)>);
 
-/// Differences below this are drawn here: 9 recorded digits say no more.
+/// Differences below this are drawn at this value: the recordings have 9 digits.
 const FLOOR: f64 = 1e-11;
 
 const BLUE_LINE: RGBColor = RGBColor(0, 90, 160);
@@ -36,10 +36,10 @@ const COLOURS: [RGBColor; 4] = [
     RGBColor(140, 60, 150),
 ];
 
-fn main() -> Drawn {
+fn main() -> DrawResult {
     let folder = std::env::args_os()
         .nth(1)
-        .ok_or("expected the folder to draw into, e.g. docs/images/fidelity")?;
+        .ok_or("expected the output folder, for example docs/images/fidelity")?;
     let folder = Path::new(&folder);
     std::fs::create_dir_all(folder)?;
     draw_arm(&folder.join("arm.svg"))?;
@@ -52,7 +52,7 @@ fn main() -> Drawn {
 }
 
 /// Joint differences of the motions over time, and one motion as recorded and as simulated.
-fn draw_arm(file: &Path) -> Drawn {
+fn draw_arm(file: &Path) -> DrawResult {
     let recording = recording("arm_tracking");
     let init: [f64; 7] = array(&recording["init_q"]);
     let mut lines = vec![];
@@ -62,22 +62,22 @@ fn draw_arm(file: &Path) -> Drawn {
         let mut world = World::new(&Plant::nominal(), &[init], [0.5, 0.0, 0.0, 0.0, 0.0, 0.0]);
         let recorded: Vec<[f64; 7]> = rows(&case["q"]);
         let mut line = vec![];
-        let mut ours = vec![];
+        let mut simulated = vec![];
         for (step, action) in case["actions"].as_array().unwrap().iter().enumerate() {
             world.command(0, interpolation, &flat(action));
             world.control_step(|_| [0.0; 2]);
             let t = 0.02 * (step + 1) as f64;
             let difference = max_difference(&recorded[step + 1], &world.joints(0));
             line.push((t, difference.max(FLOOR)));
-            ours.push((t, world.joints(0)));
+            simulated.push((t, world.joints(0)));
         }
         if sample.is_empty() && interpolation == Interpolation::Quintic {
             for joint in 0..4 {
-                let theirs = recorded.iter().enumerate();
-                let theirs = theirs.map(|(k, q)| (0.02 * k as f64, q[joint]));
-                sample.push((format!("joint {}", joint + 1), theirs.collect()));
-                let ours = ours.iter().map(|(t, q)| (*t, q[joint]));
-                sample.push((String::new(), ours.collect()));
+                let recorded_line = recorded.iter().enumerate();
+                let recorded_line = recorded_line.map(|(k, q)| (0.02 * k as f64, q[joint]));
+                sample.push((format!("joint {}", joint + 1), recorded_line.collect()));
+                let simulated_line = simulated.iter().map(|(t, q)| (*t, q[joint]));
+                sample.push((String::new(), simulated_line.collect()));
             }
         }
         lines.push((String::new(), line));
@@ -97,7 +97,7 @@ fn draw_arm(file: &Path) -> Drawn {
         let (left, right) = root.split_horizontally(480);
         overlay(
             &left,
-            "one motion: recorded (wide) and ours (thin)",
+            "one motion: recorded (wide) and simulated (thin)",
             ["t, s", "q, rad"],
             &sample,
         )?;
@@ -113,21 +113,21 @@ fn draw_arm(file: &Path) -> Drawn {
 }
 
 /// Cumulative distributions of the velocity's difference after a contact.
-fn draw_contacts(file: &Path) -> Drawn {
+fn draw_contacts(file: &Path) -> DrawResult {
     let (bounces, impacts) = (bounces(), impacts());
-    let of = |kinds: &[&str]| -> Vec<f64> {
+    let errors_of = |kinds: &[&str]| -> Vec<f64> {
         let of_kind = bounces.iter().filter(|b| kinds.contains(&b.kind.as_str()));
         of_kind.map(|bounce| bounce.errors().0).collect()
     };
-    let by = |arm: bool| -> Vec<f64> {
-        let by_it = impacts.iter().filter(|impact| impact.by_arm() == arm);
-        by_it.map(|impact| impact.velocity).collect()
+    let impacts_by = |arm: bool| -> Vec<f64> {
+        let selected = impacts.iter().filter(|impact| impact.by_arm() == arm);
+        selected.map(|impact| impact.velocity).collect()
     };
     let lines = [
-        ("rim", of(&["wall", "wall_spin"])),
-        ("corner", of(&["corner"])),
-        ("mallet, moved by the arm", by(true)),
-        ("mallet, imposed", by(false)),
+        ("rim", errors_of(&["wall", "wall_spin"])),
+        ("corner", errors_of(&["corner"])),
+        ("mallet, moved by the arm", impacts_by(true)),
+        ("mallet, imposed", impacts_by(false)),
     ]
     .map(|(name, mut errors)| {
         let (median, p90) = (quantile(&mut errors, 0.5), quantile(&mut errors, 0.9));
@@ -175,7 +175,7 @@ fn draw_contacts(file: &Path) -> Drawn {
 }
 
 /// Puck and joints of the replayed episodes, from the first impact on.
-fn draw_episodes(file: &Path, replays: &[Replay]) -> Drawn {
+fn draw_episodes(file: &Path, replays: &[Replay]) -> DrawResult {
     let line = |replay: &Replay, from: usize, value: &dyn Fn(usize) -> f64| -> Line {
         let first = from.saturating_sub(10).min(replay.steps.len());
         let points = (first..replay.steps.len().min(from.saturating_add(60)))
@@ -229,7 +229,7 @@ fn draw_episodes(file: &Path, replays: &[Replay]) -> Drawn {
 }
 
 /// The paths of some pucks over the table.
-fn draw_paths(file: &Path, replays: &[Replay]) -> Drawn {
+fn draw_paths(file: &Path, replays: &[Replay]) -> DrawResult {
     let path = |puck: &[[f64; 6]]| puck.iter().map(|p| (p[0], p[1])).collect();
     let mut lines = vec![];
     for name in ["hit 7", "defend 3", "prepare 0", "defend 14"] {
@@ -240,14 +240,14 @@ fn draw_paths(file: &Path, replays: &[Replay]) -> Drawn {
     picture(file, (960, 520), |root| {
         overlay(
             root,
-            "pucks of four episodes: recorded (wide) and ours (thin)",
+            "pucks of four episodes: recorded (wide) and simulated (thin)",
             ["x, m", "y, m"],
             &lines,
         )
     })
 }
 
-fn picture(file: &Path, size: (u32, u32), draw: impl FnOnce(&Area<'_>) -> Drawn) -> Drawn {
+fn picture(file: &Path, size: (u32, u32), draw: impl FnOnce(&Area<'_>) -> DrawResult) -> DrawResult {
     let root = SVGBackend::new(file, size).into_drawing_area();
     root.fill(&WHITE)?;
     draw(&root)?;
@@ -255,8 +255,8 @@ fn picture(file: &Path, size: (u32, u32), draw: impl FnOnce(&Area<'_>) -> Drawn)
     Ok(())
 }
 
-/// Pairs of lines: the recorded one wide and pale, ours thin on top.
-fn overlay(area: &Area<'_>, caption: &str, [x, y]: [&str; 2], lines: &[Line]) -> Drawn {
+/// Pairs of lines: the recorded one wide and pale, the simulated one thin on top.
+fn overlay(area: &Area<'_>, caption: &str, [x, y]: [&str; 2], lines: &[Line]) -> DrawResult {
     let points = || lines.iter().flat_map(|(_, line)| line);
     let mut chart = ChartBuilder::on(area)
         .caption(caption, ("sans-serif", 16))
@@ -274,7 +274,7 @@ fn overlay(area: &Area<'_>, caption: &str, [x, y]: [&str; 2], lines: &[Line]) ->
         .y_desc(y)
         .draw()?;
     for (pair, colour) in lines.chunks(2).zip(COLOURS) {
-        let [(name, recorded), (_, ours)] = pair else {
+        let [(name, recorded), (_, simulated)] = pair else {
             continue;
         };
         let wide = colour.mix(0.3).stroke_width(6);
@@ -283,7 +283,7 @@ fn overlay(area: &Area<'_>, caption: &str, [x, y]: [&str; 2], lines: &[Line]) ->
             .label(name)
             .legend(move |(x, y)| PathElement::new([(x, y), (x + 18, y)], colour));
         chart.draw_series(LineSeries::new(
-            ours.iter().copied(),
+            simulated.iter().copied(),
             colour.stroke_width(1),
         ))?;
     }
@@ -302,7 +302,7 @@ fn logarithmic(
     height: Range<f64>,
     lines: &[Line],
     bound: Option<(f64, &str)>,
-) -> Drawn {
+) -> DrawResult {
     let width = range(lines.iter().flat_map(|(_, line)| line).map(|(x, _)| *x));
     let mut chart = ChartBuilder::on(area)
         .caption(caption, ("sans-serif", 16))

@@ -1,23 +1,23 @@
-//! Many episodes stepped together, for training.
+//! Many episodes stepped at once, for training.
 //!
-//! Observations and actions lie in one array each, a row per world. A world whose episode ends starts its
-//! next one at once. What a world plays depends on its row alone, not on the threads: they come from
-//! rayon's current pool, so that a caller chooses their number with `ThreadPool::install`.
+//! Observations and actions are one array each, a row per world. A world whose episode ends starts its
+//! next episode at once. The episodes of a world depend only on its row, not on the threads. The threads
+//! come from rayon's current pool: callers set their number with `ThreadPool::install`.
 
 use crate::{
     channel::observation::OBSERVATION_WITH_OPPONENT_LEN,
     dynamics::path::LanePath,
     episode::{Episode, StepOutcome},
     robot::plant::Plant,
-    together::step_together_by,
+    episode_step::step_episodes_on,
 };
 use faceoff_types::{Factors, Interpolation, PerturbationSettings, Seed, Task};
 use rayon::prelude::*;
 
-/// Worlds that a thread takes at a time, and steps together.
-const WORLDS_AT_A_TIME: usize = 4;
+/// Worlds that one thread steps at once.
+const WORLDS_PER_CHUNK: usize = 4;
 
-/// What is played in a batch.
+/// Task, perturbations and seed of a batch.
 #[derive(Debug, Clone)]
 pub struct BatchSetup {
     pub task: Task,
@@ -27,13 +27,13 @@ pub struct BatchSetup {
     pub settings: PerturbationSettings,
     /// The arms; nominal unless the factors contain the model mismatch.
     pub plant: Plant,
-    /// Episodes are those that an evaluation with this seed plays.
+    /// The episodes are those of an evaluation with this seed.
     pub seed: Seed,
     /// Number of worlds; at least 1.
     pub worlds: u32,
 }
 
-/// Worlds of one task. World `w` of `n` plays the episodes w, w + n, w + 2 n, …
+/// Worlds of one task. World `w` of `n` runs the episodes w, w + n, w + 2 n, …
 #[derive(Debug, Clone)]
 pub struct Batch {
     setup: BatchSetup,
@@ -49,21 +49,21 @@ struct World {
     number: u32,
 }
 
-/// What a control step of one world led to.
+/// Result of a control step of one world.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BatchOutcome {
     /// The episode that the step belongs to.
     pub episode: u32,
-    /// Its end, if it came, and constraint values.
+    /// The end of the episode, if this step ended it, and the constraint values.
     pub step: StepOutcome,
-    /// Success, tested on the state after the step; tells something at an end only.
+    /// Success, tested on the state after the step; meaningful only if the episode ended.
     pub success: bool,
-    /// The observation after the step; at an end the batch's row shows the next episode's already.
+    /// The observation after the step. After an end the batch's row already holds the next episode's.
     last_observation: [f64; OBSERVATION_WITH_OPPONENT_LEN],
 }
 
 impl BatchOutcome {
-    /// Before the first step.
+    /// The value before the first step.
     const NONE: Self = Self {
         episode: 0,
         step: StepOutcome::NONE,
@@ -71,8 +71,7 @@ impl BatchOutcome {
         last_observation: [0.0; OBSERVATION_WITH_OPPONENT_LEN],
     };
 
-    /// The observation after the step, of the task's length or longer: 23 numbers, the opponent's zero
-    /// where there is none.
+    /// The observation after the step: 23 numbers; the opponent's are zero in tasks without an opponent.
     #[must_use]
     pub const fn last_observation(&self) -> &[f64; OBSERVATION_WITH_OPPONENT_LEN] {
         &self.last_observation
@@ -100,9 +99,9 @@ impl Batch {
         }
     }
 
-    /// The same batch by another path: all give the same bits.
+    /// The same batch, computed with another instruction set. All of them give the same bits.
     #[must_use]
-    pub fn by(mut self, path: LanePath) -> Self {
+    pub fn with_path(mut self, path: LanePath) -> Self {
         self.path = path;
         self
     }
@@ -119,7 +118,7 @@ impl Batch {
         self.setup.interpolation.len()
     }
 
-    /// What the agents are told: [worlds][[`Batch::observation_len`]].
+    /// The agents' observations: [worlds][[`Batch::observation_len`]].
     #[must_use]
     pub fn observations(&self) -> &[f64] {
         &self.observations
@@ -139,23 +138,23 @@ impl Batch {
             self.worlds.len()
         );
         let (setup, path) = (&self.setup, self.path);
-        let worlds = self.worlds.par_chunks_mut(WORLDS_AT_A_TIME);
-        let actions = actions.par_chunks(WORLDS_AT_A_TIME * action_len);
+        let worlds = self.worlds.par_chunks_mut(WORLDS_PER_CHUNK);
+        let actions = actions.par_chunks(WORLDS_PER_CHUNK * action_len);
         let observations = self
             .observations
-            .par_chunks_mut(WORLDS_AT_A_TIME * observation_len);
-        let outcomes = self.outcomes.par_chunks_mut(WORLDS_AT_A_TIME);
+            .par_chunks_mut(WORLDS_PER_CHUNK * observation_len);
+        let outcomes = self.outcomes.par_chunks_mut(WORLDS_PER_CHUNK);
         worlds
             .zip(actions)
             .zip(observations)
             .zip(outcomes)
             .for_each(|(((worlds, actions), observations), outcomes)| {
-                let mut steps = [StepOutcome::NONE; WORLDS_AT_A_TIME];
+                let mut steps = [StepOutcome::NONE; WORLDS_PER_CHUNK];
                 let steps = &mut steps[..worlds.len()];
                 let mut episodes: Vec<&mut Episode> =
                     worlds.iter_mut().map(|world| &mut world.episode).collect();
                 let actions: Vec<&[f64]> = actions.chunks_exact(action_len).collect();
-                step_together_by(path, &mut episodes, &actions, steps);
+                step_episodes_on(path, &mut episodes, &actions, steps);
                 let rows = observations.chunks_exact_mut(observation_len);
                 for (((world, step), row), outcome) in
                     worlds.iter_mut().zip(steps).zip(rows).zip(outcomes)
@@ -188,7 +187,7 @@ impl BatchSetup {
 }
 
 impl World {
-    /// What a step led to; after an end the next episode starts.
+    /// The result of a step. After an end it starts the next episode.
     fn end_step(&mut self, setup: &BatchSetup, step: StepOutcome) -> BatchOutcome {
         let mut last_observation = [0.0; OBSERVATION_WITH_OPPONENT_LEN];
         let observation = self.episode.observation();

@@ -1,8 +1,8 @@
-//! Golden episodes and games, in which pucks are hit, and the hashes of all that they show. A change of one
-//! hash is a change of the simulator's behaviour, and so of the ruleset.
+//! Golden episodes and games with contacts, and the hashes of their observations and states. A changed hash
+//! means changed behaviour of the simulator, and so of the ruleset.
 //!
 //! `tests/golden/simulator.txt` holds the hashes. This crate's tests compare what the library computes;
-//! `faceoff sim golden` prints what a program computes, so that a release can be asked, too.
+//! `faceoff sim golden` prints the hashes of a built program, so that a release can be checked too.
 
 use crate::{
     channel::Command,
@@ -14,7 +14,7 @@ use crate::{
 use faceoff_types::{Interpolation, PerturbationSettings, Profile, Seed, Task};
 use std::fmt;
 
-/// Without a perturbation, and with all that the evaluation has.
+/// Without perturbations, and with those of the evaluation.
 const PROFILES: [Profile; 2] = [Profile::Ideal, Profile::Evaluation];
 
 /// Control steps of a golden game: several rallies, and goals.
@@ -42,7 +42,7 @@ impl fmt::Display for Golden {
     }
 }
 
-/// All of them, in the order of the file.
+/// All golden episodes and games, in the order of the file.
 pub fn all() -> impl Iterator<Item = Golden> {
     let episodes = PROFILES
         .into_iter()
@@ -51,7 +51,7 @@ pub fn all() -> impl Iterator<Item = Golden> {
     episodes.chain(games)
 }
 
-/// Plays a golden episode to its end.
+/// Runs a golden episode to its end.
 #[must_use]
 pub fn play_episode(task: Task, profile: Profile) -> Golden {
     Golden {
@@ -60,7 +60,7 @@ pub fn play_episode(task: Task, profile: Profile) -> Golden {
     }
 }
 
-/// Plays a golden game; the second value is the game as it then stands.
+/// Runs a golden game; also returns the game in its final state.
 #[must_use]
 pub fn play_game(profile: Profile) -> (Golden, Game) {
     let mut game = start_game(profile);
@@ -76,7 +76,7 @@ pub fn play_game(profile: Profile) -> (Golden, Game) {
 pub fn start_episode(task: Task, profile: Profile) -> Episode {
     let (factors, settings) = (profile.factors(), PerturbationSettings::default());
     let root = Seed::from_number(SEED);
-    let plant = Plant::under(factors, &settings, root.model_mismatch());
+    let plant = Plant::for_factors(factors, &settings, root.model_mismatch());
     Episode::new(
         task,
         Interpolation::Cubic,
@@ -93,13 +93,13 @@ fn start_game(profile: Profile) -> Game {
     Game::new(GameSetup {
         interpolation: [Interpolation::Cubic; 2],
         factors,
-        plant: Plant::under(factors, &settings, seed.model_mismatch()),
+        plant: Plant::for_factors(factors, &settings, seed.model_mismatch()),
         settings,
         seed,
     })
 }
 
-/// Plays an episode to its end with [`strike`]; the hash of every observation and state on the way.
+/// Runs an episode to its end with [`strike`]; returns the hash of all observations and states.
 #[must_use]
 pub fn episode_hash(mut episode: Episode) -> String {
     let mut hash = Hash::default();
@@ -119,8 +119,8 @@ pub fn episode_hash(mut episode: Episode) -> String {
     }
 }
 
-/// Plays on for so many control steps, both robots with [`strike`]; the hash of observations, pucks and
-/// judgements.
+/// Continues a game for `steps` control steps, both robots with [`strike`]; returns the hash of
+/// observations, pucks and judgements.
 pub fn game_hash(game: &mut Game, steps: u32) -> String {
     let mut hash = Hash::default();
     for _ in 0..steps {
@@ -135,7 +135,7 @@ pub fn game_hash(game: &mut Game, steps: u32) -> String {
     hash.digits()
 }
 
-/// A simple agent, so that the hashes cover contacts: it goes behind the puck and through it, again and again.
+/// A simple agent, so that the hashes cover contacts: it repeatedly moves behind the puck and through it.
 /// `observation` is in the robot's own frame; the action is positions and velocities, rad and rad/s.
 #[must_use]
 pub fn strike(observation: &[f64], step: u32) -> [f64; 2 * JOINTS] {
@@ -156,7 +156,7 @@ pub fn strike(observation: &[f64], step: u32) -> [f64; 2 * JOINTS] {
     action
 }
 
-/// BLAKE3 of numbers and words.
+/// BLAKE3 of numbers and text.
 #[derive(Default)]
 struct Hash(blake3::Hasher);
 

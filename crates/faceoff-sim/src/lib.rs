@@ -1,14 +1,14 @@
-//! The air-hockey simulator: two KUKA arms, a table and a puck, as the challenge's reference moves
-//! them (MODEL).
+//! The air-hockey simulator: two KUKA arms, a table and a puck, as in the challenge's reference simulator
+//! (MODEL).
 //!
 //! The arm's dynamics, its 1 kHz torque controller and the soft contacts follow the reference's
-//! equations, so that trajectories agree with its recordings; a test holds each kind of recording.
+//! equations, so that trajectories agree with its recordings; tests check each kind of recording.
 //! Everything is deterministic: the same seed gives the same bits in debug and release builds and on
-//! any number of threads. Sines and cosines are polynomials of its own, other transcendental functions come
-//! from `libm`; none from the platform.
+//! any number of threads. Sines and cosines are its own polynomials; other transcendental functions come from
+//! `libm`, never from the platform.
 //!
-//! This crate reads no clock and no environment and does no I/O. It knows neither agents as processes
-//! nor scores.
+//! This crate reads no clock and no environment and does no I/O. It does not handle agent processes or
+//! scores.
 
 #![expect(
     clippy::needless_range_loop,
@@ -27,7 +27,7 @@ pub mod perturbation;
 pub mod robot;
 pub mod stream;
 pub mod table;
-mod together;
+mod episode_step;
 pub mod world;
 
 pub use batch::{Batch, BatchOutcome, BatchSetup};
@@ -38,9 +38,8 @@ pub use episode::{
     env_info::{EnvInfo, env_info, env_info_for},
 };
 pub use game::{Game, GameSetup, GameState, GameStep, referee::RallyEnd};
-// Actions and joint states are in terms of these.
 pub use dynamics::path::LanePath;
 pub use faceoff_types::{Interpolation, JOINTS, PerturbationSettings, SUBSTEPS};
 pub use robot::plant::Plant;
-pub use together::{step_together, step_together_by};
-pub use world::{Bounds, Divergence, Impact, Impacts, MalletState, Met, Runaway, World};
+pub use episode_step::{step_episodes, step_episodes_on};
+pub use world::{Bounds, Divergence, Impact, Impacts, MalletState, ContactBody, Runaway, World};

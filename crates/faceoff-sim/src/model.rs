@@ -5,8 +5,8 @@ pub use faceoff_types::{CONTROL_STEP_S, JOINTS, SUBSTEPS};
 /// Degrees of freedom of the plant: the driven joints and the two hinges of the universal joint.
 pub const DOFS: usize = 9;
 
-/// How a link's frame is turned against its parent's, before its joint turns. Only exact quarter and
-/// half turns occur, which cost no arithmetic.
+/// Rotation of a link's frame against its parent's at joint angle 0. Only exact quarter and half turns occur,
+/// which cost no arithmetic.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Mount {
     /// Quaternion (1, 0, 0, 0).
@@ -17,7 +17,7 @@ pub enum Mount {
     QuarterTurnX,
 }
 
-/// Where a link sits on its parent.
+/// Position of a link's joint on its parent.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Offset {
     /// Along the parent's y, m.
@@ -217,7 +217,7 @@ pub const LINKS: [Link; JOINTS] = [
     },
 ];
 
-/// What hangs on link 7: the end effector (fixed) and the mallet (on the universal joint).
+/// The tool on link 7: the end effector (fixed) and the mallet (on the universal joint).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Tool {
     /// End effector ("striker joint link") along link 7's z, m.
@@ -263,7 +263,7 @@ pub const SUBSTEP_S: f64 = 0.001;
 /// at (0.65, 0, 0.1645), to the digits of its recordings (RULES, "Tasks").
 pub const INITIAL_Q: [f64; JOINTS] = [0.0, -0.196067345, 0.0, -1.84363898, 0.0, 0.970422238, 0.0];
 
-/// Joint limits count, and are commanded, at this fraction of the physical ones (RULES, "Constraints").
+/// The rules apply joint limits at this fraction of the physical ones (RULES, "Constraints").
 pub const LIMIT_FRACTION: f64 = 0.95;
 
 /// Height of the mallet plane above the robot's base frame, m (ref: `ee_desired_height`).

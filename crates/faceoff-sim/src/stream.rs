@@ -1,12 +1,12 @@
-//! Random draws that are the same everywhere.
+//! Random draws with the same bits on every machine.
 
 use faceoff_types::Seed;
 use rand_chacha::ChaCha8Rng;
 use rand_core::{Rng, SeedableRng};
 use std::f64::consts::TAU;
 
-/// One independent stream of random numbers: ChaCha8 keyed by a seed that is derived by label, so
-/// that what one consumer draws never changes what another one gets.
+/// One independent stream of random numbers: ChaCha8 with a seed that is derived by label, so that draws of one
+/// consumer never affect another.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Stream(ChaCha8Rng);
 

@@ -88,7 +88,7 @@ async fn fill(folder: &Path, stage: StageId) {
                 .to_string();
             if team_number == 0 {
                 sqlx::query(
-                    "INSERT INTO days (stage_id, day, cut_at, released_at) VALUES (?, ?, 0, 0)",
+                    "INSERT INTO days (stage_id, day, cutoff_at, released_at) VALUES (?, ?, 0, 0)",
                 )
                 .bind(&stage)
                 .bind(&day)
@@ -108,7 +108,7 @@ async fn fill(folder: &Path, stage: StageId) {
             .await
             .unwrap();
             sqlx::query(
-                "INSERT INTO units (id, kind, state, claimable_at, worker, nonce)
+                "INSERT INTO jobs (id, kind, state, claimable_at, worker, nonce)
                  VALUES (?, 'shard', 'done', 0, 'w', 'n')",
             )
             .bind(&job)
@@ -116,7 +116,7 @@ async fn fill(folder: &Path, stage: StageId) {
             .await
             .unwrap();
             sqlx::query(
-                "INSERT INTO shards (id, run_id, unit_id, position, task, first_episode, end_episode, committed_at,
+                "INSERT INTO shards (id, run_id, job_id, position, task, first_episode, end_episode, committed_at,
                                      recording, agent_faults, outcomes, log)
                  VALUES (?, ?, ?, 0, 'hit', 0, 1000, 0, 'recordings/x', 0, '[]', '')",
             )

@@ -20,6 +20,7 @@ mod printable;
 mod ids;
 mod interpolation;
 mod departure_kind;
+pub mod deprecated_names;
 mod limits;
 mod live_game;
 mod millionths;
@@ -69,6 +70,7 @@ pub use ids::{
 };
 pub use interpolation::{Interpolation, JOINTS, MAX_ACTION_LEN, SUBSTEPS, UnknownInterpolation};
 pub use departure_kind::DepartureKind;
+pub use deprecated_names::DeprecatedNames;
 pub use limits::{AgentLimits, BundleLimits, ResourceLimits, TimeLimits};
 pub use live_game::{GameEvent, LiveGame, LiveEvent, LivePosition};
 pub use millionths::{Millionths, NotMillionths};

@@ -1,5 +1,5 @@
 use faceoff_runner::{
-    AgentEnvironment, Assembled, LiveFeed, EvaluationMeta, LiveFeedSink, GameReport, GameSpec,
+    AgentEnvironment, AssembledDataset, LiveFeed, EvaluationMeta, LiveFeedSink, GameReport, GameSpec,
     Observer, POSITION_INTERVAL, PlatformFault, ShardReport, ShardSpec, ValidationReport, ValidationSpec,
     bundle::{self, Bundle, BundleError, BundleLimits},
 };
@@ -53,7 +53,7 @@ pub(crate) trait Evaluator: Send + Sync {
         recordings: &[PathBuf],
         archive: &Path,
         clips: &Path,
-    ) -> Result<Assembled, PlatformFault>;
+    ) -> Result<AssembledDataset, PlatformFault>;
 }
 
 /// The evaluator that `faceoff eval` also uses.
@@ -112,7 +112,7 @@ impl Evaluator for Runner {
         recordings: &[PathBuf],
         archive: &Path,
         clips: &Path,
-    ) -> Result<Assembled, PlatformFault> {
+    ) -> Result<AssembledDataset, PlatformFault> {
         let assembled = faceoff_runner::assemble(meta, recordings, archive, Some(clips))?;
         Ok(assembled)
     }

@@ -7,7 +7,7 @@ mod http;
 mod files;
 mod links;
 mod pages;
-mod people;
+mod users;
 mod proposals;
 mod sessions;
 mod sse;
@@ -248,7 +248,7 @@ impl Client {
         day: StageDay,
         extra: &NewExtraEvaluation,
     ) -> anyhow::Result<EvaluationView> {
-        let path = format!("/stages/{}/days/{}/extra-turn", day.stage, day.date);
+        let path = format!("/stages/{}/days/{}/extra-evaluation", day.stage, day.date);
         let request = self.request(Method::POST, &path);
         read_json(self.send(request.json(extra)).await?).await
     }

@@ -34,7 +34,7 @@ while (submission.state === "validating") {
   submission = response.data;
 }
 
-const file = await client.GET("/api/v1/submissions/{id}/archive", { params: { path }, parseAs: "arrayBuffer" });
+const file = await client.GET("/api/v1/submissions/{id}/bundle", { params: { path }, parseAs: "arrayBuffer" });
 if (file.error) throw problemError(file.error);
 await writeFile(downloaded, new Uint8Array(file.data));
 console.log(JSON.stringify(submission));

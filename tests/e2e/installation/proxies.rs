@@ -256,7 +256,7 @@ fn check_proxy(start: impl Fn(&Server, &Path) -> Proxy) {
     let uploaded: serde_json::Value = uploaded.json().expect("the API speaks JSON");
     let id = uploaded["id"].as_str().expect("it has an id");
     let back = visitor
-        .get(proxy.url(&format!("/api/v1/submissions/{id}/archive")))
+        .get(proxy.url(&format!("/api/v1/submissions/{id}/bundle")))
         .bearer_auth(&team.token)
         .send()
         .expect("it answers");

@@ -71,7 +71,7 @@ fn worker_without_required_runtime_gets_no_jobs() {
     let problems = other
         .get("/api/v1/workers", Some(&other.admin_token))
         .json::<Value>();
-    let problems = problems.expect("the API speaks JSON")["troubles"].to_string();
+    let problems = problems.expect("the API speaks JSON")["problems"].to_string();
     assert!(
         problems.contains("is another server's")
             && problems.contains("give each server its own nats.name"),

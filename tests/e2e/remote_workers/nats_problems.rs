@@ -28,7 +28,7 @@ use tokio::runtime::Runtime;
 /// Waits until the server reports a problem with this text to organisers.
 fn wait_for_problem(server: &Server, text: &str) {
     let _ = server.poll("/api/v1/workers", &server.admin_token, |view| {
-        let problems = view["troubles"].as_array().expect("a list of problems");
+        let problems = view["problems"].as_array().expect("a list of problems");
         problems
             .iter()
             .any(|problem| problem.as_str().is_some_and(|found| found.contains(text)))
@@ -37,7 +37,7 @@ fn wait_for_problem(server: &Server, text: &str) {
 
 fn wait_for_no_problem(server: &Server) {
     let _ = server.poll("/api/v1/workers", &server.admin_token, |view| {
-        view["troubles"] == json!([])
+        view["problems"] == json!([])
     });
 }
 
@@ -328,7 +328,7 @@ fn server_without_nats_starts_and_continues_once_connected() {
     let options = ["--drain-after-idle", "1s"];
     Worker::start_with_arguments(scratch.path(), "idle", &worker_config(link.address(), 1), &options).wait_for_exit();
     let workers = server.poll("/api/v1/workers", &server.admin_token, |view| {
-        view["troubles"] == json!([])
+        view["problems"] == json!([])
     });
     let names = [0, 1].map(|index: usize| workers["workers"][index]["name"].clone());
     assert_eq!(names, ["idle", "worker"], "{workers:#}");

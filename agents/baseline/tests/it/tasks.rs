@@ -14,7 +14,7 @@ fn count_successes(task: Task, agent_task: striker::Task) -> u32 {
     let season = Seed::from_number(101);
     let settings = PerturbationSettings::default();
     let factors = Profile::Evaluation.factors();
-    let plant = Plant::under(factors, &settings, season.model_mismatch());
+    let plant = Plant::for_factors(factors, &settings, season.model_mismatch());
     let mut agent = Baseline::new(agent_task, &env(2, 0));
     let mut successes = 0;
     for index in 0..EPISODES {

@@ -76,7 +76,7 @@ pub fn game(profile: Profile, seed: u64) -> Game {
     Game::new(GameSetup {
         interpolation: [Interpolation::Cubic; 2],
         factors: profile.factors(),
-        plant: Plant::under(profile.factors(), &settings, seed.model_mismatch()),
+        plant: Plant::for_factors(profile.factors(), &settings, seed.model_mismatch()),
         settings,
         seed,
     })

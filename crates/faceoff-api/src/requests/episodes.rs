@@ -12,11 +12,11 @@ pub struct EpisodesQuery {
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub task: String,
     /// `success` or `failure`.
-    #[serde(default, skip_serializing_if = "String::is_empty")]
-    pub went: String,
+    #[serde(default, alias = "went", skip_serializing_if = "String::is_empty")]
+    pub outcome: String,
     /// The limit that the episode exceeds: `any`, `ee`, `link`, `joint_pos`, `joint_vel` or `late`.
-    #[serde(default, skip_serializing_if = "String::is_empty")]
-    pub broke: String,
+    #[serde(default, alias = "broke", skip_serializing_if = "String::is_empty")]
+    pub violated: String,
     /// How the episode ended.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub end: String,
@@ -33,7 +33,7 @@ pub struct EpisodeFilter {
     /// Whether the episode succeeded.
     pub success: Option<bool>,
     /// The limit that the episode exceeds.
-    pub broke: Option<BrokenLimit>,
+    pub violated: Option<BrokenLimit>,
     /// How the episode ended.
     pub end: Option<EpisodeEnd>,
 }
@@ -68,17 +68,17 @@ impl EpisodesQuery {
         }
         Ok(EpisodeFilter {
             task: parse_field(&self.task, "task")?,
-            success: match self.went.as_str() {
+            success: match self.outcome.as_str() {
                 "" => None,
                 "success" => Some(true),
                 "failure" => Some(false),
-                _ => return Err("went"),
+                _ => return Err("outcome"),
             },
-            broke: match self.broke.as_str() {
+            violated: match self.violated.as_str() {
                 "" => None,
                 "any" => Some(BrokenLimit::Any),
                 "late" => Some(BrokenLimit::Late),
-                one => parse_field(one, "broke")?.map(BrokenLimit::One),
+                one => parse_field(one, "violated")?.map(BrokenLimit::One),
             },
             end: parse_field(&self.end, "end")?,
         })
@@ -88,14 +88,14 @@ impl EpisodesQuery {
 impl EpisodeFilter {
     /// Whether the episode matches all conditions.
     pub fn matches(self, line: &EpisodeLine) -> bool {
-        let broke = |broke| match broke {
+        let exceeds = |limit| match limit {
             BrokenLimit::Any => !line.broken.is_empty(),
             BrokenLimit::One(group) => line.broken.iter().any(|broken| broken.group == group),
             BrokenLimit::Late => line.late > 0,
         };
         self.task.is_none_or(|task| task == line.task)
             && self.success.is_none_or(|success| success == line.success)
-            && self.broke.is_none_or(broke)
+            && self.violated.is_none_or(exceeds)
             && self.end.is_none_or(|end| end == line.end)
     }
 }

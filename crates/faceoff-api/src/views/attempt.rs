@@ -1,18 +1,20 @@
 //! Attempts at a game: each start on a slot, apart from the game's result.
 
+use faceoff_types::deprecated_names;
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 /// An attempt at a game: one start on a slot, whatever its outcome.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(remote = "Self")]
 pub struct GameAttemptView {
     /// From 1.
     pub number: u32,
     /// The slot that ran it.
     pub worker: String,
     /// When it started.
-    pub begun_at: Timestamp,
+    pub started_at: Timestamp,
     /// When it ended; null while it is running.
     pub ended_at: Option<Timestamp>,
     /// Its outcome; null while it is running.
@@ -21,6 +23,7 @@ pub struct GameAttemptView {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub reason: Option<String>,
 }
+deprecated_names!(GameAttemptView { begun_at => started_at });
 
 /// Outcome of an attempt.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]

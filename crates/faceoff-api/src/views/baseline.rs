@@ -1,7 +1,7 @@
 //! Baselines on a board: reference agents of the organisers, shown unranked.
 
 use crate::views::task::TaskView;
-use faceoff_types::{EvaluationId, Profile, Seed, Task, TeamId, TeamName, Tier};
+use faceoff_types::{deprecated_names, EvaluationId, Profile, Seed, Task, TeamId, TeamName, Tier};
 use jiff::{Timestamp, civil::Date};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -9,6 +9,7 @@ use utoipa::ToSchema;
 
 /// A baseline on a board: a row without a rank of its own.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(remote = "Self")]
 pub struct BaselineRow {
     /// The rank that it would have among the teams, without the other baselines.
     pub would_rank: u32,
@@ -33,7 +34,7 @@ pub struct BaselineRow {
     pub day: Date,
     /// If it is an extra evaluation: the reason for it; absent otherwise.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub extra_turn: Option<String>,
+    pub extra_evaluation: Option<String>,
     /// When the score was stored.
     pub finished_at: Timestamp,
     /// The ruleset of the score.
@@ -51,3 +52,4 @@ pub struct BaselineRow {
     /// Results by task: hit, defend, prepare.
     pub tasks: BTreeMap<Task, TaskView>,
 }
+deprecated_names!(BaselineRow { extra_turn => extra_evaluation });

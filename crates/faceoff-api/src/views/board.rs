@@ -4,7 +4,7 @@ use crate::views::{
     baseline::BaselineRow, sign_off::SignOffView, ruling::RulingView, task::TaskView,
     team::TeamView,
 };
-use faceoff_types::{
+use faceoff_types::{deprecated_names, 
     DivisionName, EvaluationId, PerturbationSettings, Profile, Seed, StageId, StageName, CountingResult,
     Task, TaskWeights, TeamId, TeamName, Tier, TierBounds,
 };
@@ -76,6 +76,7 @@ pub struct BoardView {
 
 /// A team's row on a board.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(remote = "Self")]
 pub struct BoardRow {
     /// Rank on this board, from 1.
     pub rank: u32,
@@ -104,7 +105,7 @@ pub struct BoardRow {
     /// If it is an extra evaluation: the reason for it; absent otherwise. One that was granted after the day's release
     /// ran on other episodes than the day's other rows.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub extra_turn: Option<String>,
+    pub extra_evaluation: Option<String>,
     /// When the score was stored.
     pub finished_at: Timestamp,
     /// The ruleset of the score.
@@ -123,3 +124,4 @@ pub struct BoardRow {
     /// days; rates and points are means per day; the computation times `p99` and `max` are those of the worst day.
     pub tasks: BTreeMap<Task, TaskView>,
 }
+deprecated_names!(BoardRow { extra_turn => extra_evaluation });

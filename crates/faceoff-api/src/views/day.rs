@@ -1,7 +1,7 @@
 //! An evaluation day after its cutoff, and the next cutoff.
 
 use crate::views::{evaluation::EvaluationView, exclusion::ExcludedTeam, team::TeamView};
-use faceoff_types::{StageId, StageName, Zone};
+use faceoff_types::{deprecated_names, StageId, StageName, Zone};
 use jiff::{Timestamp, civil::Date};
 use serde::{Deserialize, Serialize};
 use std::fmt;
@@ -9,6 +9,7 @@ use utoipa::ToSchema;
 
 /// An evaluation day, as organisers see it.
 #[derive(Debug, Clone, Serialize, Deserialize, ToSchema)]
+#[serde(remote = "Self")]
 pub struct DayView {
     /// The day's stage.
     pub stage: StageId,
@@ -20,8 +21,9 @@ pub struct DayView {
     pub without_submission: Vec<TeamView>,
     /// Teams whose active submission the stage excludes, and why; absent if there are none.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub not_taken: Vec<ExcludedTeam>,
+    pub excluded: Vec<ExcludedTeam>,
 }
+deprecated_names!(DayView { not_taken => excluded });
 
 /// The next cutoff: the active submission of each team is evaluated.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, ToSchema)]

@@ -2,13 +2,14 @@
 
 pub use crate::views::evaluation_status::{EvaluationStatus, FaultView, ResultView};
 use crate::views::{queue::QueueView, ruling::RulingView};
-use faceoff_types::{EvaluationId, Profile, StageId, SubmissionId, Task, TeamId, TeamName};
+use faceoff_types::{deprecated_names, EvaluationId, Profile, StageId, SubmissionId, Task, TeamId, TeamName};
 use jiff::{Timestamp, civil::Date};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 /// An evaluation: one run of a submission over all tasks.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(remote = "Self")]
 pub struct EvaluationView {
     /// Id of the evaluation.
     pub id: EvaluationId,
@@ -34,7 +35,7 @@ pub struct EvaluationView {
     /// If it is an extra evaluation: the reason for it; absent otherwise. One that was granted after the day's release
     /// runs on other episodes than the day's.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub extra_turn: Option<String>,
+    pub extra_evaluation: Option<String>,
     /// If it was voided and does not count: when, and why; absent otherwise.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub voided: Option<RulingView>,
@@ -65,6 +66,7 @@ pub struct EvaluationView {
     #[serde(flatten)]
     pub status: EvaluationStatus,
 }
+deprecated_names!(EvaluationView { extra_turn => extra_evaluation });
 
 /// Progress of an evaluation or of an ablation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]

@@ -1,7 +1,7 @@
 //! Games between two submissions: purpose, state and result.
 
 use faceoff_scoring::tournament::{Forfeit, ResultReason};
-use faceoff_types::{
+use faceoff_types::{deprecated_names, 
     ComputationTimeSummary, GameId, RoundNumber, Seed, StageName, SubmissionId, TeamId, TeamName,
     Tier, TournamentId, ViolationCounts,
 };
@@ -11,6 +11,7 @@ use utoipa::ToSchema;
 
 /// A game. In pairs the home side comes first; it controls the first robot.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(remote = "Self")]
 pub struct GameView {
     /// Id of the game.
     pub id: GameId,
@@ -30,13 +31,14 @@ pub struct GameView {
     pub created_at: Timestamp,
     /// The team whose departure excludes the game from the standings; absent otherwise.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub taken_out_by: Option<TeamName>,
+    pub excluded_by: Option<TeamName>,
     /// What happens next, in words.
     pub next: String,
     /// Its state, with the result or the reason of its failure.
     #[serde(flatten)]
     pub status: GameStatus,
 }
+deprecated_names!(GameView { taken_out_by => excluded_by });
 
 /// One side of a game.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
@@ -51,7 +53,7 @@ pub struct GameSideView {
 
 /// Purpose of a game.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
-#[serde(tag = "purpose", rename_all = "snake_case")]
+#[serde(remote = "Self", tag = "purpose", rename_all = "snake_case")]
 pub enum PurposeView {
     /// A game of a round, which counts.
     Round {
@@ -68,12 +70,12 @@ pub enum PurposeView {
     /// A test game against the organisers' baseline.
     Test {
         /// The team that requested it; null: an organiser.
-        asked_by: Option<TeamName>,
+        requested_by: Option<TeamName>,
     },
     /// A friendly game of two teams, before or between rounds.
     Friendly {
         /// The team that requested it.
-        asked_by: TeamName,
+        requested_by: TeamName,
     },
     /// A game of the schedule, replayed with another seed.
     Replay {
@@ -90,6 +92,7 @@ pub enum PurposeView {
         second_half: bool,
     },
 }
+deprecated_names!(PurposeView { asked_by => requested_by });
 
 /// State of a game.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
@@ -192,12 +195,14 @@ pub struct RecordingView {
 
 /// Requested test games against the baseline.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(remote = "Self")]
 pub struct TestGamesView {
     /// The queued games.
-    pub ordered: Vec<GameView>,
+    pub queued: Vec<GameView>,
     /// Teams that get no test game, if an organiser asked for several.
-    pub not_ordered: Vec<SkippedTestGame>,
+    pub skipped: Vec<SkippedTestGame>,
 }
+deprecated_names!(TestGamesView { ordered => queued, not_ordered => skipped });
 
 /// A team that gets no test game now.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, ToSchema)]

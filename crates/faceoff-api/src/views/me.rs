@@ -1,30 +1,32 @@
 //! A team's own status: today's evaluation and the submission for the next cutoff.
 
 use crate::views::{day::NextCutoff, exclusion::StageExclusion, queue::QueueView, team::TeamView};
-use faceoff_types::{EvaluationId, StageId, SubmissionId};
+use faceoff_types::{deprecated_names, EvaluationId, StageId, SubmissionId};
 use jiff::civil::Date;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 /// Status of the calling team.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(remote = "Self")]
 pub struct MeView {
     /// The team.
     pub team: TeamView,
     /// Today's evaluation.
-    pub turn: TodayView,
+    pub today: TodayView,
     /// The submission that the next cutoff evaluates; null while there is no valid one.
     pub active_submission: Option<SubmissionId>,
     /// Stages that have not ended and exclude the active submission, and why; absent if there are none.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub not_taken: Vec<StageExclusion>,
+    pub excluded_by: Vec<StageExclusion>,
     /// Submissions whose validation run is pending or running, newest first.
     pub validating: Vec<PendingValidationView>,
     /// The next cutoff; null if there is none.
-    pub next_cut: Option<NextCutoff>,
+    pub next_cutoff: Option<NextCutoff>,
     /// Largest bundle that the server accepts, packed, in bytes.
     pub max_bundle_bytes: u64,
 }
+deprecated_names!(MeView { turn => today, not_taken => excluded_by, next_cut => next_cutoff });
 
 /// A team's evaluation of a day.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]

@@ -4,7 +4,7 @@ use crate::views::{
     board::BoardView,
     evaluation::{FaultView, Progress, ResultView},
 };
-use faceoff_types::{
+use faceoff_types::{deprecated_names, 
     EvaluationId, ProposalId, StageId, StageName, SubmissionId, TeamId, TeamName, Tier,
 };
 use jiff::{Timestamp, civil::Date};
@@ -14,6 +14,7 @@ use utoipa::ToSchema;
 /// A trial, or a proposed re-evaluation: evaluations of a stage that do not count unless they are applied. Only
 /// organisers see them.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(remote = "Self")]
 pub struct ProposalView {
     /// Id of the proposal.
     pub id: ProposalId,
@@ -34,7 +35,7 @@ pub struct ProposalView {
     /// Its progress or outcome.
     pub state: ProposalStateView,
     /// When it was applied or dropped; null before.
-    pub settled_at: Option<Timestamp>,
+    pub decided_at: Option<Timestamp>,
     /// Its evaluations, in the order in which they were queued; absent in lists.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub evaluations: Vec<ProposedEvaluationView>,
@@ -43,6 +44,7 @@ pub struct ProposalView {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub outcome: Option<OutcomeView>,
 }
+deprecated_names!(ProposalView { settled_at => decided_at });
 
 /// Kind of a proposal.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]

@@ -1,13 +1,14 @@
 //! The season: its commitment, stages and days, and the seeds that are revealed.
 
 use crate::views::{archive::ArchiveView, day::NextCutoff, ruling::RulingView, stage::StageView};
-use faceoff_types::{DivisionName, Seed, StageId};
+use faceoff_types::{deprecated_names, DivisionName, Seed, StageId};
 use jiff::{Timestamp, civil::Date};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 /// The season, as far as it is public.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(remote = "Self")]
 pub struct SeasonView {
     /// Name of the season.
     pub name: String,
@@ -45,20 +46,22 @@ pub struct SeasonView {
     /// The stages, in order of their opening.
     pub stages: Vec<StageView>,
     /// The next cutoff; null if there is none.
-    pub next_cut: Option<NextCutoff>,
+    pub next_cutoff: Option<NextCutoff>,
     /// The evaluation days whose cutoff has passed, newest first.
     pub days: Vec<SeasonDay>,
 }
+deprecated_names!(SeasonView { next_cut => next_cutoff });
 
 /// An evaluation day of the season.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(remote = "Self")]
 pub struct SeasonDay {
     /// The day's stage.
     pub stage: StageId,
     /// The evaluation day, a date in the stage's time zone.
     pub day: Date,
     /// The cutoff: each team's active submission of this moment is evaluated.
-    pub cut_at: Timestamp,
+    pub cutoff_at: Timestamp,
     /// When evaluations that are not finished are ended, and the day is released; null: no deadline.
     pub deadline_at: Option<Timestamp>,
     /// When the day was released, after its last evaluation; null before.
@@ -72,3 +75,4 @@ pub struct SeasonDay {
     /// scores.
     pub seed: Option<Seed>,
 }
+deprecated_names!(SeasonDay { cut_at => cutoff_at });

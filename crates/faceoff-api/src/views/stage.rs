@@ -1,13 +1,14 @@
 //! Stages: opening times, rules and the next cutoff.
 
 use crate::views::{capacity::DayLoad, day::NextCutoff, sign_off::SignOffView, ruling::RulingView};
-use faceoff_types::{Retention, StageId, StageName, StageRules, StageSettings, Zone};
+use faceoff_types::{deprecated_names, Retention, StageId, StageName, StageRules, StageSettings, Zone};
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 /// A part of the season with its own days, rules and board.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(remote = "Self")]
 pub struct StageView {
     /// Id of the stage; the seeds of its days derive from it.
     pub id: StageId,
@@ -22,7 +23,7 @@ pub struct StageView {
     /// Time zone of its days and its schedule.
     pub zone: Zone,
     /// The stage's next cutoff; null if there is none.
-    pub next_cut: Option<NextCutoff>,
+    pub next_cutoff: Option<NextCutoff>,
     /// If its boards are frozen: since when, and why; absent otherwise.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub frozen: Option<RulingView>,
@@ -48,6 +49,7 @@ pub struct StageView {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub capacity: Option<Vec<DayLoad>>,
 }
+deprecated_names!(StageView { next_cut => next_cutoff });
 
 /// Phase of a stage.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]

@@ -1,20 +1,21 @@
 //! Disk usage and quota of teams.
 
-use faceoff_types::{TeamId, TeamName};
+use faceoff_types::{deprecated_names, TeamId, TeamName};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 /// Disk usage of a team's files.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(remote = "Self")]
 pub struct StorageView {
     /// Id of the team.
     pub team: TeamId,
     /// Name of the team.
     pub team_name: TeamName,
     /// Number of stored bundles.
-    pub archives: u32,
+    pub bundles: u32,
     /// Bytes of stored bundles, which count towards the quota.
-    pub archive_bytes: u64,
+    pub bundle_bytes: u64,
     /// Quota of stored bundles in bytes, from the current stage or the server's configuration.
     pub quota_bytes: u64,
     /// Number of stored datasets; for the team, only of released days and of stages that are not blind.
@@ -27,3 +28,4 @@ pub struct StorageView {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub proposal_bytes: Option<u64>,
 }
+deprecated_names!(StorageView { archives => bundles, archive_bytes => bundle_bytes });

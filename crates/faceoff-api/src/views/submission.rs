@@ -1,13 +1,14 @@
 //! Submissions and the verdicts of their validation runs.
 
 use crate::views::{exclusion::StageExclusion, queue::QueueView, ruling::RulingView};
-use faceoff_types::{ValidationTiming, SubmissionId, TeamId};
+use faceoff_types::{deprecated_names, ValidationTiming, SubmissionId, TeamId};
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 /// A submission.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(remote = "Self")]
 pub struct SubmissionView {
     /// Id of the submission.
     pub id: SubmissionId,
@@ -28,7 +29,7 @@ pub struct SubmissionView {
     pub runtime: Option<String>,
     /// Stages that have not ended and exclude its runtime, and why; absent if there are none.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub not_taken: Vec<StageExclusion>,
+    pub excluded_by: Vec<StageExclusion>,
     /// Computation times in the validation run, for each task.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub timing: Vec<ValidationTiming>,
@@ -48,7 +49,7 @@ pub struct SubmissionView {
     pub same_as: Option<SubmissionId>,
     /// If its bundle was removed: when, and why. It cannot be evaluated any more. Absent otherwise.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub archive_removed: Option<RulingView>,
+    pub bundle_removed: Option<RulingView>,
     /// If it was deleted: when, and by whom; absent otherwise.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub deleted: Option<DeletionView>,
@@ -61,6 +62,7 @@ pub struct SubmissionView {
     #[serde(flatten)]
     pub status: SubmissionStatus,
 }
+deprecated_names!(SubmissionView { not_taken => excluded_by, archive_removed => bundle_removed });
 
 /// The deletion of a submission's bundle.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, ToSchema)]

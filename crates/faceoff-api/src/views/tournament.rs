@@ -2,7 +2,7 @@
 
 use crate::views::ruling::RulingView;
 use faceoff_scoring::tournament::schedule::Table;
-use faceoff_types::{
+use faceoff_types::{deprecated_names, 
     DepartureKind, RoundNumber, StageId, StageName, SubmissionId, TeamId, TeamName, TournamentId,
     TournamentRules, TournamentSettings,
 };
@@ -73,6 +73,7 @@ pub struct TournamentView {
 
 /// A team in a tournament.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(remote = "Self")]
 pub struct EntrantView {
     /// Id of the team.
     pub team: TeamId,
@@ -82,8 +83,9 @@ pub struct EntrantView {
     pub entered_at: Timestamp,
     /// If it left: when, how, and why; absent otherwise.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub left: Option<DepartureView>,
+    pub departure: Option<DepartureView>,
 }
+deprecated_names!(EntrantView { left => departure });
 
 /// A team's departure from a tournament.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
@@ -101,6 +103,7 @@ pub struct DepartureView {
 
 /// A round with its draw.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(remote = "Self")]
 pub struct RoundView {
     /// From 1.
     #[schema(value_type = u32, minimum = 1, maximum = 100)]
@@ -108,7 +111,7 @@ pub struct RoundView {
     /// When it started; its submissions are fixed since then.
     pub started_at: Timestamp,
     /// When the last of its games ended for the first time; null before.
-    pub over_at: Option<Timestamp>,
+    pub ended_at: Option<Timestamp>,
     /// Number of matchdays. The games of a matchday can run in parallel.
     pub matchdays: u32,
     /// Number of its games in each state.
@@ -120,6 +123,7 @@ pub struct RoundView {
     /// The submission of each team.
     pub submissions: Vec<RoundSubmission>,
 }
+deprecated_names!(RoundView { over_at => ended_at });
 
 /// Number of a round's games in each state.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]

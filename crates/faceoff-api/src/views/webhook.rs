@@ -1,6 +1,6 @@
 //! Webhooks, without their secrets, and their deliveries.
 
-use faceoff_types::{DeliveryId, TeamId, WebhookId};
+use faceoff_types::{deprecated_names, DeliveryId, TeamId, WebhookId};
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
@@ -96,7 +96,7 @@ pub struct DeliveryAttemptView {
 
 /// State of a delivery.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
-#[serde(tag = "state", rename_all = "snake_case")]
+#[serde(remote = "Self", tag = "state", rename_all = "snake_case")]
 pub enum DeliveryStateView {
     /// Waiting for the first or next attempt.
     Waiting {
@@ -106,11 +106,12 @@ pub enum DeliveryStateView {
     /// The receiver accepted it.
     Delivered {
         /// When it was accepted.
-        settled_at: Timestamp,
+        ended_at: Timestamp,
     },
     /// No further attempts are made.
     GivenUp {
         /// When it was given up.
-        settled_at: Timestamp,
+        ended_at: Timestamp,
     },
 }
+deprecated_names!(DeliveryStateView { settled_at => ended_at });

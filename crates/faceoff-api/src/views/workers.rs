@@ -1,6 +1,6 @@
 //! Remote workers and their slots.
 
-use faceoff_types::{EvaluationId, GameId};
+use faceoff_types::{deprecated_names, EvaluationId, GameId};
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
@@ -8,16 +8,17 @@ use uuid::Uuid;
 
 /// Remote workers, and problems that keep them from working.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(remote = "Self")]
 pub struct WorkersView {
     /// Slots of the server itself; 0 if only remote workers run jobs.
     pub own_slots: u32,
     /// Slots of remote workers that can lease jobs now.
     pub remote_slots: u32,
     /// Whether the server leases jobs to remote workers.
-    pub is_given: bool,
+    pub leases_jobs: bool,
     /// Problems that keep remote workers from working; empty without problems.
     #[schema(example = json!([]))]
-    pub troubles: Vec<String>,
+    pub problems: Vec<String>,
     /// Jobs that run for conspicuously long; empty without such jobs.
     #[serde(default)]
     #[schema(example = json!([]))]
@@ -27,6 +28,7 @@ pub struct WorkersView {
     /// Banned workers by name.
     pub bans: Vec<WorkerBanView>,
 }
+deprecated_names!(WorkersView { is_given => leases_jobs, troubles => problems });
 
 /// A banned worker; the server rejects its results.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
@@ -89,21 +91,23 @@ pub enum WorkerState {
 
 /// A slot that runs a job.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(remote = "Self")]
 pub struct BusySlotView {
     /// Name of the slot.
     #[schema(example = "slot-0")]
     pub slot: String,
     /// Id of the job, as in the server's log.
-    pub unit: Uuid,
+    pub job: Uuid,
     /// Description of the job; absent if it started before this server process.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schema(example = "hit episodes 0 to 49")]
-    pub what: Option<String>,
+    pub job_description: Option<String>,
     /// When the job started.
     pub since: Timestamp,
     /// Whether the job has been running for more than an hour.
     pub is_long: bool,
     /// Why the slot cannot send its result; absent without a problem.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub trouble: Option<String>,
+    pub problem: Option<String>,
 }
+deprecated_names!(BusySlotView { unit => job, what => job_description, trouble => problem });

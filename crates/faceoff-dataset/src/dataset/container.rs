@@ -12,10 +12,10 @@ use std::{
 };
 use zip::{CompressionMethod, ZipArchive};
 
-/// The largest of the files that are read as a whole; the tables are not among them.
+/// Size limit of files that are read into memory; tables are not.
 const SMALL_FILE_BYTES: u64 = 512 << 20;
 
-/// Where a dataset's files are.
+/// The folder or archive of a dataset's files.
 #[derive(Debug)]
 pub(crate) enum Container {
     Folder(PathBuf),
@@ -36,33 +36,33 @@ impl Container {
         })
     }
 
-    /// Checks an archive's seal, as layout 2 has it. One that others have packed has none; its files are
-    /// checked all the same.
+    /// Checks the seal of an archive of layout 2. Archives repacked by other programs have none; their files are
+    /// checked anyway.
     pub fn check_seal(&self) -> Result<(), DatasetError> {
         let Self::Archive { zip, file } = self else {
             return Ok(());
         };
-        let altered = |what: &str| Err(DatasetError::Altered(what.to_owned()));
+        let altered = |problem: &str| Err(DatasetError::Altered(problem.to_owned()));
         match seal::check(file)? {
             Seal::Intact => Ok(()),
             Seal::Broken => {
-                altered("the bytes are not those that the archive's seal covers; download it again")
+                altered("the archive's bytes do not match its seal; download it again")
             }
             Seal::Absent => {
                 let zip = zip.lock().unwrap_or_else(PoisonError::into_inner);
                 if zip.comment().is_empty() {
                     Ok(())
                 } else {
-                    altered("the archive's comment is no seal")
+                    altered("the archive's comment is not a seal")
                 }
             }
         }
     }
 
-    /// There is no file but these and the manifest; each is there once.
+    /// Checks that an archive holds exactly these files and the manifest, each once.
     pub fn expect_only(&self, names: &[&str]) -> Result<(), DatasetError> {
         let Self::Archive { zip, .. } = self else {
-            // A folder may hold whatever its owner puts there.
+            // A folder may hold other files too.
             return Ok(());
         };
         let zip = zip.lock().unwrap_or_else(PoisonError::into_inner);
@@ -84,7 +84,7 @@ impl Container {
         Ok(())
     }
 
-    /// A file as a whole.
+    /// Reads a file into memory.
     pub fn bytes(&self, name: &str) -> Result<Vec<u8>, DatasetError> {
         let mut bytes = Vec::new();
         self.read(name, |reader| {
@@ -103,7 +103,7 @@ impl Container {
         self.read(name, |reader| digest::of_reader(reader))
     }
 
-    /// A file that can be read from any place.
+    /// A file for random access.
     pub fn range(&self, name: &str) -> Result<FileRange, DatasetError> {
         match self {
             Self::Folder(dir) => FileRange::whole(&dir.join(name)),
@@ -114,13 +114,13 @@ impl Container {
                     (entry.compression(), entry.data_start())
                 else {
                     return Err(DatasetError::Unreadable(format!(
-                        "{name} is compressed inside of the archive; unpack it and name the folder"
+                        "{name} is compressed in the archive; unpack it and pass the folder"
                     )));
                 };
                 Ok(FileRange {
                     file: file.clone(),
                     start,
-                    // Of the two sizes that a zip states, the one by which streams are read, too.
+                    // Of the two sizes in a zip entry, the one that also bounds streams.
                     bytes: entry.compressed_size(),
                 })
             }
@@ -145,7 +145,7 @@ impl Container {
                 let mut entry = zip.by_name(name).map_err(DatasetError::unreadable(name))?;
                 read(&mut entry).map_err(|error| match error.raw_os_error() {
                     Some(_) => DatasetError::Io(error),
-                    // The zip's own checksum, or a stream that no longer unpacks.
+                    // A wrong checksum of the zip entry, or a stream that does not unpack.
                     None => DatasetError::Altered(format!("{name}: {error}")),
                 })
             }

@@ -1,4 +1,4 @@
-use super::{file_range::FileRange, footer, steps::has_columns};
+use super::{file_range::FileRange, footer, steps::check_columns};
 use crate::{error::DatasetError, files::EPISODES_FILE, table::EpisodeRows};
 use arrow_array::{
     Array, BooleanArray, Float64Array, RecordBatch, StringArray, UInt32Array,
@@ -12,18 +12,17 @@ use serde::Serialize;
 /// One row of `episodes.parquet`, without the states and hashes.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct EpisodeRecord {
-    /// What scoring knows of it.
+    /// The outcome, as scoring uses it.
     #[serde(flatten)]
     pub outcome: EpisodeOutcome,
-    /// The episode's own, 64 hexadecimal digits.
+    /// Seed of the episode, 64 hexadecimal digits.
     pub seed: String,
-    /// The agent's interpolation: `1` … `5`, `-1` or `null`; absent if it did not get as far as to
-    /// say.
+    /// The agent's interpolation: `1` … `5`, `-1` or `null`; absent if the agent failed to start.
     pub interpolation: Option<String>,
-    /// Computation time included.
+    /// Penalty points, including those for computation time.
     pub penalty_points: f64,
-    /// The observation after the last answered step: 23 numbers for `hit`, 20 otherwise, none if no
-    /// step was answered.
+    /// The observation after the last answered step: 23 numbers for `hit`, 20 otherwise; empty if no step was
+    /// answered.
     #[serde(skip)]
     pub last_observation: Vec<f64>,
     /// The puck's true state before the first step, table frame: x, y, yaw, vx, vy, yaw rate.
@@ -34,7 +33,7 @@ pub struct EpisodeRecord {
     pub initial_ee: [f64; 3],
 }
 
-/// The table as it is, in batches, its columns checked.
+/// The unparsed table in batches, after a check of its columns.
 pub(crate) fn batches(table: FileRange) -> Result<Vec<RecordBatch>, DatasetError> {
     let bytes = table.bytes;
     let builder = ParquetRecordBatchReaderBuilder::try_new(table)
@@ -43,7 +42,7 @@ pub(crate) fn batches(table: FileRange) -> Result<Vec<RecordBatch>, DatasetError
             Ok(builder)
         })
         .map_err(DatasetError::unreadable(EPISODES_FILE))?;
-    has_columns(EPISODES_FILE, builder.schema(), EpisodeRows::new().schema())?;
+    check_columns(EPISODES_FILE, builder.schema(), EpisodeRows::new().schema())?;
     let reader = builder
         .build()
         .map_err(DatasetError::unreadable(EPISODES_FILE))?;
@@ -67,7 +66,7 @@ pub(super) fn records(batches: &[RecordBatch]) -> Result<Vec<EpisodeRecord>, Dat
     Ok(records)
 }
 
-/// A batch whose columns are known to be there.
+/// Access to the columns of a batch that was checked to have them.
 pub(crate) struct Columns<'a>(pub &'a RecordBatch);
 
 impl<'a> Columns<'a> {

@@ -12,7 +12,7 @@ use std::{
     sync::Arc,
 };
 
-/// A range of a file: a table on its own, or one inside of an archive.
+/// A range of a file: a table, or the part of an archive that is a table.
 #[derive(Debug, Clone)]
 pub(crate) struct FileRange {
     pub file: Arc<File>,
@@ -20,18 +20,18 @@ pub(crate) struct FileRange {
     pub bytes: u64,
 }
 
-/// Reads a range from some place on, without moving the file's own position.
+/// Reads a range from an offset, without moving the file's position.
 pub(crate) struct FileRangeReader {
     range: FileRange,
     at: u64,
 }
 
-/// Opens a file, and nothing else that has a name.
+/// Opens a regular file; refuses everything else.
 pub(super) fn open(path: &Path) -> Result<File, DatasetError> {
-    // Asked before it is opened: opening a pipe would wait for its writer.
+    // Check before opening: opening a pipe would wait for its writer.
     if !fs_err::metadata(path)?.is_file() {
         return Err(DatasetError::Unreadable(format!(
-            "{} is no file",
+            "{} is not a file",
             path.display()
         )));
     }
@@ -39,7 +39,7 @@ pub(super) fn open(path: &Path) -> Result<File, DatasetError> {
 }
 
 impl FileRange {
-    /// All of a file.
+    /// The range of a whole file.
     pub fn whole(path: &Path) -> Result<Self, DatasetError> {
         let file = open(path)?;
         let bytes = file.metadata()?.len();
@@ -60,12 +60,12 @@ impl FileRange {
 
 impl Read for FileRangeReader {
     fn read(&mut self, out: &mut [u8]) -> io::Result<usize> {
-        let left = self.range.bytes.saturating_sub(self.at);
-        let wanted = out.len().min(usize::try_from(left).unwrap_or(usize::MAX));
+        let remaining = self.range.bytes.saturating_sub(self.at);
+        let length = out.len().min(usize::try_from(remaining).unwrap_or(usize::MAX));
         let read = self
             .range
             .file
-            .read_at(&mut out[..wanted], self.range.start + self.at)?;
+            .read_at(&mut out[..length], self.range.start + self.at)?;
         self.at += read as u64;
         Ok(read)
     }

@@ -1,12 +1,12 @@
-//! A table's footer says where its columns lie. The library takes that for granted, so it is looked at before
-//! anything is read by it.
+//! Checks the positions of columns in a table's footer. The library trusts them, so they are checked before it
+//! reads columns.
 
 use parquet::{
     errors::{ParquetError, Result},
     file::metadata::{ColumnChunkMetaData, ParquetMetaData},
 };
 
-/// Refuses counts below zero and columns that do not lie within the table's `bytes`.
+/// Refuses negative counts, and columns that are not within the table's `bytes`.
 pub(crate) fn check(footer: &ParquetMetaData, bytes: u64) -> Result<()> {
     for (number, group) in footer.row_groups().iter().enumerate() {
         let columns = group.columns().iter();
@@ -71,7 +71,7 @@ mod tests {
     }
 
     #[test]
-    fn a_column_lies_within_its_table() {
+    fn columns_outside_of_the_table_are_refused() {
         assert!(check(&footer(3, 4, 96, None), 100).is_ok());
         assert!(check(&footer(3, 50, 96, Some(4)), 100).is_ok());
         for (rows, start, length, dictionary) in [

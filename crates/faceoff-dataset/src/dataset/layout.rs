@@ -3,11 +3,11 @@ use faceoff_wire::dataset::DATASET_SCHEMA;
 /// The layouts that this version reads.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Layout {
-    /// Sealed by a hash in the archive's comment; its tables split integers by bytes and have no index
-    /// of pages. Mean computation times were summed up from the shortest time on.
+    /// Sealed by a hash in the archive's comment. Its tables split integers by bytes and have no page index. Mean
+    /// computation times were summed in ascending order.
     Two,
-    /// What the host took of an answer's time is not told apart. Mean computation times are summed up in
-    /// order of play, as in all that follow.
+    /// Host interference in an answer's time is not recorded separately. Mean computation times are summed in order of
+    /// play, as in all later layouts.
     Three,
     Four,
 }
@@ -15,7 +15,7 @@ pub enum Layout {
 impl Layout {
     const ALL: [Self; 3] = [Self::Two, Self::Three, Self::Four];
 
-    /// As manifests name it.
+    /// Its name in manifests.
     #[must_use]
     pub const fn schema(self) -> &'static str {
         match self {
@@ -25,13 +25,13 @@ impl Layout {
         }
     }
 
-    pub(super) fn of(schema: &str) -> Option<Self> {
+    pub(super) fn from_schema(schema: &str) -> Option<Self> {
         Self::ALL
             .into_iter()
             .find(|layout| layout.schema() == schema)
     }
 
-    pub(super) fn all() -> String {
+    pub(super) fn schema_list() -> String {
         Self::ALL.map(Self::schema).join(", ")
     }
 }

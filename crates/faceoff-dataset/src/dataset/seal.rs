@@ -9,10 +9,10 @@ use std::{
 /// Hexadecimal digits of a hash.
 const DIGITS: u64 = 64;
 
-/// What the end of an archive says.
+/// State of an archive's seal.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Seal {
-    /// The bytes are those that were sealed.
+    /// The bytes match the seal.
     Intact,
     Broken,
     /// The file does not end with a seal.

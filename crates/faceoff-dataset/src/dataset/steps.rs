@@ -2,7 +2,7 @@ use super::{file_range::FileRange, footer};
 use crate::{
     error::DatasetError,
     files::STEPS_FILE,
-    table::{HOST_TIME, StepRows, without_host_time},
+    table::{HOST_TIME, StepRows, with_zero_host_time},
 };
 use arrow_array::{RecordBatch, RecordBatchReader};
 use arrow_schema::{DataType, Schema};
@@ -18,18 +18,18 @@ use parquet::{
 };
 use std::collections::VecDeque;
 
-/// Rows that are decoded at once.
+/// Number of rows in a decoded batch.
 pub(crate) const BATCH_ROWS: usize = 1024;
 
-/// Every expected column is there, with its type.
-pub(crate) fn has_columns(
+/// Checks that every expected column exists and has its type.
+pub(crate) fn check_columns(
     file: &str,
     found: &Schema,
     expected: &Schema,
 ) -> Result<(), DatasetError> {
     for field in expected.fields() {
         let ok = found.column_with_name(field.name()).is_some_and(|(_, f)| {
-            // Other writers name a list's items otherwise; only what they are matters.
+            // Other writers name a list's items differently; only their type matters.
             match (f.data_type(), field.data_type()) {
                 (DataType::List(a), DataType::List(b)) => a.data_type() == b.data_type(),
                 (a, b) => a == b,
@@ -46,12 +46,12 @@ pub(crate) fn has_columns(
     Ok(())
 }
 
-/// Is it a table of an earlier layout?
+/// Is it a table of a layout before 4, without the column for host interference?
 fn lacks_host_time(found: &Schema) -> bool {
     found.column_with_name(HOST_TIME).is_none()
 }
 
-/// A reader of a table of control steps, of all columns or of the named ones.
+/// A reader of a table of control steps, with all columns or the named ones.
 pub(super) fn reader<R: ChunkReader + 'static>(
     table: R,
     metadata: &ArrowReaderMetadata,
@@ -63,7 +63,7 @@ pub(super) fn reader<R: ChunkReader + 'static>(
     let fields = rows.schema().fields().iter();
     let fields = fields.filter(|field| !lacks_host_time || field.name() != HOST_TIME);
     let expected = Schema::new(fields.cloned().collect::<Vec<_>>());
-    has_columns(STEPS_FILE, found, &expected)?;
+    check_columns(STEPS_FILE, found, &expected)?;
     if found.fields().len() != expected.fields().len() {
         return Err(DatasetError::Unreadable(format!(
             "{STEPS_FILE} has {} columns, expected {}",
@@ -97,7 +97,7 @@ pub(super) fn reader<R: ChunkReader + 'static>(
     )
 }
 
-/// `steps.parquet`, opened.
+/// An open `steps.parquet`.
 #[derive(Debug)]
 pub struct StepTable {
     table: FileRange,
@@ -115,13 +115,13 @@ impl StepTable {
         Ok(Self { table, metadata })
     }
 
-    /// Does it tell apart what the host took, as all do since layout 4?
-    pub(crate) fn tells_host_time(&self) -> bool {
+    /// Does it record host interference, as since layout 4?
+    pub(crate) fn has_host_time(&self) -> bool {
         !lacks_host_time(self.metadata.schema())
     }
 
-    /// All rows from the first on, batch by batch, of all columns or of the named ones. A table of an
-    /// earlier layout is read as one in which the host took nothing.
+    /// All rows in order, in batches, with all columns or the named ones. In a table of an earlier layout host
+    /// interference is read as 0.
     ///
     /// # Errors
     /// [`DatasetError::Absent`] if a column is unknown, [`DatasetError::Unreadable`] if the table is
@@ -129,27 +129,27 @@ impl StepTable {
     pub fn read(self, columns: Option<&[String]>) -> Result<StepBatches, DatasetError> {
         let is_host_time = |name: &String| name == HOST_TIME;
         let adds_host_time =
-            !self.tells_host_time() && columns.is_none_or(|names| names.iter().any(is_host_time));
+            !self.has_host_time() && columns.is_none_or(|names| names.iter().any(is_host_time));
         let columns = columns.map(|names| -> Vec<String> {
-            let there = |name: &&String| !(adds_host_time && is_host_time(name));
-            names.iter().filter(there).cloned().collect()
+            let exists = |name: &&String| !(adds_host_time && is_host_time(name));
+            names.iter().filter(exists).cloned().collect()
         });
         let reader = reader(self.table, &self.metadata, columns.as_deref())?
             .build()
             .map_err(DatasetError::unreadable(STEPS_FILE))?;
         Ok(StepBatches {
             reader,
-            adds_host_time,
-            read: VecDeque::new(),
+            adds_zero_host_time: adds_host_time,
+            unread: VecDeque::new(),
         })
     }
 }
 
-/// Rows of `steps.parquet`, from the first on.
+/// Rows of `steps.parquet`, in order.
 pub struct StepBatches {
     reader: ParquetRecordBatchReader,
-    adds_host_time: bool,
-    read: VecDeque<RecordBatch>,
+    adds_zero_host_time: bool,
+    unread: VecDeque<RecordBatch>,
 }
 
 impl std::fmt::Debug for StepBatches {
@@ -161,28 +161,28 @@ impl std::fmt::Debug for StepBatches {
 }
 
 impl StepBatches {
-    /// The next rows, a thousand or so; none after the last.
+    /// The next rows, about a thousand; `None` after the last.
     ///
     /// # Errors
     /// [`DatasetError::Unreadable`] if the table is damaged.
     pub fn next_batch(&mut self) -> Result<Option<RecordBatch>, DatasetError> {
-        if let Some(batch) = self.read.pop_front() {
+        if let Some(batch) = self.unread.pop_front() {
             return Ok(Some(batch));
         }
         let next = self.reader.next().transpose();
         next.and_then(|batch| match batch {
-            Some(batch) if self.adds_host_time => without_host_time(&batch).map(Some),
+            Some(batch) if self.adds_zero_host_time => with_zero_host_time(&batch).map(Some),
             batch => Ok(batch),
         })
         .map_err(DatasetError::unreadable(STEPS_FILE))
     }
 
-    /// The next `count` rows, in pieces; fewer at the table's end.
+    /// The next `count` rows in batches; fewer at the table's end.
     ///
     /// # Errors
     /// As [`StepBatches::next_batch`].
     pub fn take_rows(&mut self, count: usize) -> Result<Vec<RecordBatch>, DatasetError> {
-        let mut pieces = Vec::new();
+        let mut batches = Vec::new();
         let mut missing = count;
         while missing > 0 {
             let Some(batch) = self.next_batch()? else {
@@ -190,14 +190,14 @@ impl StepBatches {
             };
             let taken = missing.min(batch.num_rows());
             if taken < batch.num_rows() {
-                self.read
+                self.unread
                     .push_front(batch.slice(taken, batch.num_rows() - taken));
             }
             if taken > 0 {
-                pieces.push(batch.slice(0, taken));
+                batches.push(batch.slice(0, taken));
             }
             missing -= taken;
         }
-        Ok(pieces)
+        Ok(batches)
     }
 }

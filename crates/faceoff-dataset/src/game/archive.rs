@@ -1,4 +1,4 @@
-//! The archives of a game: the whole recording, and what each side may have of it.
+//! The archives of a game: the whole recording, and the part that each side may have.
 
 use super::{
     files::{
@@ -29,34 +29,34 @@ use std::{
     path::{Path, PathBuf},
 };
 
-/// A game that is over, as it is recorded.
+/// A finished game with its recording.
 #[derive(Debug)]
 pub struct RecordedGame<'a> {
-    /// What was to be played.
+    /// The specification of the game.
     pub spec: &'a GameSpec,
     /// The agents' names, the first side's first.
     pub agents: &'a [String; 2],
-    pub played: FinishedGame<GameRecorder>,
-    /// How evenly the slot kept time.
+    pub finished: FinishedGame<GameRecorder>,
+    /// Timing measurements of the slot.
     pub calibration: GameCalibration,
     /// The ends of both agents' standard errors, with their faults.
     pub logs: &'a [String; 2],
 }
 
-/// What is left of a game.
+/// Score, outcome and archives of a game.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GameArchives {
-    /// The score, which is also the recording's `results.json`.
+    /// The score; identical to the recording's `results.json`.
     pub score: GameScore,
     pub outcome: GameOutcome,
     /// Size and hash of `game.zip`.
     pub game: FileDigest,
-    /// Of `side-1.zip` and `side-2.zip`.
+    /// Size and hash of `side-1.zip` and `side-2.zip`.
     pub sides: [FileDigest; 2],
 }
 
-/// By what a game's score is told.
-pub(super) fn played_as(spec: &GameSpec, agents: &[String; 2]) -> GameSettings {
+/// The settings that a game's score states.
+pub(super) fn game_settings(spec: &GameSpec, agents: &[String; 2]) -> GameSettings {
     GameSettings {
         ruleset: spec.ruleset,
         profile: spec.profile,
@@ -78,14 +78,14 @@ impl RecordedGame<'_> {
             outcome,
             answer_times_s,
             sink,
-        } = self.played;
+        } = self.finished;
         let tables = sink.finish()?;
         let score = score_game(
-            &played_as(self.spec, self.agents),
+            &game_settings(self.spec, self.agents),
             &outcome,
             &answer_times_s,
         );
-        let files = Files {
+        let files = ArchiveContents {
             spec: self.spec,
             agents: self.agents,
             tables: &tables,
@@ -105,11 +105,11 @@ impl RecordedGame<'_> {
         let game = digest::of_file(&game)?;
         fs::rename(tables.path(CLIPS_FILE), out.join(CLIPS_FILE))?;
         fs::remove_dir_all(tables.path(""))?;
-        // All are there, so all get their names; the game last, for who finds it finds all of them.
+        // Rename when all archives are complete. `game.zip` is last: if it exists, the others exist too.
         for name in Side::BOTH.map(side_file).into_iter().chain([GAME_FILE]) {
             fs::rename(partial(name, out), out.join(name))?;
         }
-        let [first, second] = archives.try_into().expect("one of each side");
+        let [first, second] = archives.try_into().expect("one archive per side");
         let sides = [first.1, second.1];
         Ok(GameArchives {
             score,
@@ -120,16 +120,16 @@ impl RecordedGame<'_> {
     }
 }
 
-/// Where an archive is written before it is complete.
+/// Path of an archive while it is incomplete.
 fn partial(name: &str, out: &Path) -> PathBuf {
     out.join(name).with_extension("zip.partial")
 }
 
-/// Removes the archives of a game, and what of them is half written, from the folder `out`.
+/// Removes the archives of a game, complete or not, from the folder `out`.
 ///
 /// # Errors
-/// Why one of them is still there.
-pub fn clear_game(out: &Path) -> std::io::Result<()> {
+/// The error that kept one of them from being removed.
+pub fn remove_game(out: &Path) -> std::io::Result<()> {
     let files = [GAME_FILE, CLIPS_FILE].into_iter();
     for name in files.chain(Side::BOTH.map(side_file)) {
         for path in [out.join(name), partial(name, out)] {
@@ -142,8 +142,8 @@ pub fn clear_game(out: &Path) -> std::io::Result<()> {
     Ok(())
 }
 
-/// What the archives are made of.
-struct Files<'a> {
+/// The contents of the archives.
+struct ArchiveContents<'a> {
     spec: &'a GameSpec,
     agents: &'a [String; 2],
     tables: &'a Tables,
@@ -153,12 +153,12 @@ struct Files<'a> {
     outcome: &'a GameOutcome,
 }
 
-impl Files<'_> {
+impl ArchiveContents<'_> {
     fn write_game(&self, path: &Path) -> Result<(), RecordingError> {
         let mut archive = ArchiveWriter::create(path)?;
         self.add_public_tables(&mut archive)?;
         for side in Side::BOTH {
-            self.add_own(side, &mut archive)?;
+            self.add_side_files(side, &mut archive)?;
         }
         archive.add_json(OUTCOME_FILE, self.outcome)?;
         archive.add_json(RESULTS_FILE, self.score)?;
@@ -174,12 +174,12 @@ impl Files<'_> {
         archive.finish()
     }
 
-    /// What a side may have: its own, and what anybody may see. Nothing in it names a seed, by which the
-    /// other side's observations could be made again from the true motion.
+    /// A side's archive: its own files and the public ones. It must not contain a seed: with the true motion, a seed
+    /// would reveal the other side's observations.
     fn write_side(&self, side: Side, path: &Path) -> Result<(), RecordingError> {
         let mut archive = ArchiveWriter::create(path)?;
         self.add_public_tables(&mut archive)?;
-        self.add_own(side, &mut archive)?;
+        self.add_side_files(side, &mut archive)?;
         archive.add_json(SIDE_OUTCOME_FILE, &self.outcome.sides[side.index()])?;
         let mut results = serde_json::to_value(self.score)
             .map_err(RecordingError::unusable("writing a side's results"))?;
@@ -204,7 +204,7 @@ impl Files<'_> {
         self.add_table(RALLIES_FILE, archive)
     }
 
-    fn add_own(&self, side: Side, archive: &mut ArchiveWriter) -> Result<(), RecordingError> {
+    fn add_side_files(&self, side: Side, archive: &mut ArchiveWriter) -> Result<(), RecordingError> {
         self.add_table(steps_file(side), archive)?;
         self.add_table(entries_file(side), archive)?;
         let log = &self.logs[side.index()];

@@ -1,19 +1,19 @@
-//! What the files of a game are called.
+//! File names of a recorded game.
 
 use faceoff_types::Side;
 
 /// The whole recording in the folder that `faceoff play` writes.
 pub const GAME_FILE: &str = "game.zip";
-/// What replays of the game are drawn from.
+/// Pack of clips for replays of the game.
 pub(super) const CLIPS_FILE: &str = "clips";
 pub(super) const MOTION_FILE: &str = "motion.parquet";
 pub(super) const RALLIES_FILE: &str = "rallies.parquet";
-/// What happened: all that scoring needs but the times.
+/// The outcome: all data for scoring except the times.
 pub(super) const OUTCOME_FILE: &str = "outcome.json";
-/// What one side did, in its own file.
+/// The outcome of one side, in its own archive.
 pub(super) const SIDE_OUTCOME_FILE: &str = "side.json";
 
-/// A side's own file in the folder that `faceoff play` writes.
+/// A side's own archive in the folder that `faceoff play` writes.
 #[must_use]
 pub const fn side_file(side: Side) -> &'static str {
     match side {
@@ -30,7 +30,7 @@ pub const GAME_FILES: [&str; 4] = [
     CLIPS_FILE,
 ];
 
-/// What a side saw and did.
+/// Observations and actions of a side.
 pub(super) const fn steps_file(side: Side) -> &'static str {
     match side {
         Side::First => "side-1.parquet",
@@ -38,7 +38,7 @@ pub(super) const fn steps_file(side: Side) -> &'static str {
     }
 }
 
-/// How a side got ready for each rally.
+/// Start and reset of a side before each rally.
 pub(super) const fn entries_file(side: Side) -> &'static str {
     match side {
         Side::First => "entries-1.parquet",

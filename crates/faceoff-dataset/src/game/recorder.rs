@@ -1,6 +1,6 @@
 use super::{
     files::{CLIPS_FILE, MOTION_FILE, RALLIES_FILE, entries_file, steps_file},
-    rows::{GameRows, not_recorded},
+    rows::{GameRows, record_error},
 };
 use crate::{error::RecordingError, table::TableWriter};
 use faceoff_episode::{GameSink, GameStepRow, RallyRow, RallyStart, RecordError};
@@ -13,10 +13,10 @@ use std::{
     path::{Path, PathBuf},
 };
 
-/// Rows that are held before they go to the files.
-const HELD_ROWS: usize = 1000;
+/// Rows that are buffered in memory before they are written.
+const BUFFERED_ROWS: usize = 1000;
 
-/// Writes the tables of a game as it is played. Memory is bounded, however long the game.
+/// Writes the tables of a game while it is played. Memory does not grow with the game's length.
 pub struct GameRecorder {
     dir: PathBuf,
     rows: GameRows,
@@ -35,7 +35,7 @@ impl std::fmt::Debug for GameRecorder {
     }
 }
 
-/// The tables of a game that is over, in a folder.
+/// The folder with the tables of a finished game.
 #[derive(Debug)]
 pub(super) struct Tables {
     dir: PathBuf,
@@ -87,7 +87,7 @@ impl GameRecorder {
         Ok(())
     }
 
-    /// Writes what is left and closes the tables.
+    /// Writes the buffered rows and closes the tables.
     pub(super) fn finish(mut self) -> Result<Tables, RecordingError> {
         self.write_steps()?;
         self.rallies.write(self.rows.rallies.take())?;
@@ -122,8 +122,8 @@ impl GameSink for GameRecorder {
     fn step(&mut self, row: &GameStepRow<'_>) -> Result<(), RecordError> {
         self.clips.step(row)?;
         self.rows.step(row)?;
-        if self.rows.motion.len() >= HELD_ROWS {
-            self.write_steps().map_err(not_recorded)?;
+        if self.rows.motion.len() >= BUFFERED_ROWS {
+            self.write_steps().map_err(record_error)?;
         }
         Ok(())
     }

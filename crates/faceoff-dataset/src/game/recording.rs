@@ -25,7 +25,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-/// Every file of a recording but its manifest.
+/// All files of a recording except its manifest.
 const FILES: [&str; 11] = [
     MOTION_FILE,
     RALLIES_FILE,
@@ -40,7 +40,7 @@ const FILES: [&str; 11] = [
     CALIBRATION_FILE,
 ];
 
-/// The recording of a game whose files are what its manifest says.
+/// The recording of a game whose files match its manifest.
 #[derive(Debug)]
 pub struct GameRecording {
     path: PathBuf,
@@ -48,14 +48,14 @@ pub struct GameRecording {
     manifest: GameManifest,
 }
 
-/// What can be told of a manifest of anything.
+/// The field that all manifests have.
 #[derive(Deserialize)]
-struct Named {
+struct ManifestSchema {
     schema: String,
 }
 
 impl GameRecording {
-    /// Is this the recording of a game, or a side's own file of one, by its manifest, whatever it is worth?
+    /// Does the manifest name this as the recording of a game or a side's archive? The recording may still be invalid.
     ///
     /// # Errors
     /// [`DatasetError::Unreadable`] if a folder holds a game and an evaluation.
@@ -64,7 +64,7 @@ impl GameRecording {
             let [game, evaluation] = [GAME_FILE, ARCHIVE_FILE].map(|name| path.join(name).exists());
             return match (game, evaluation) {
                 (true, true) => Err(DatasetError::Unreadable(format!(
-                    "{} holds {GAME_FILE} and {ARCHIVE_FILE}: name one of them",
+                    "{} holds {GAME_FILE} and {ARCHIVE_FILE}: pass one of them",
                     path.display()
                 ))),
                 (game, _) => Ok(game),
@@ -79,12 +79,13 @@ impl GameRecording {
             }
         };
         let schema = container.bytes(MANIFEST_FILE).ok();
-        let schema = schema.and_then(|bytes| serde_json::from_slice::<Named>(&bytes).ok());
-        Ok(schema.is_some_and(|named| named.schema.starts_with("faceoff-game")))
+        let schema = schema.and_then(|bytes| serde_json::from_slice::<ManifestSchema>(&bytes).ok());
+        Ok(schema.is_some_and(|manifest| manifest.schema.starts_with("faceoff-game")))
     }
 
     /// Opens `game.zip`, an unpacked folder, or a folder with a `game.zip`, and compares every file with its
-    /// hash, so that a damaged or truncated recording is never half-read.
+    /// hash, so that a damaged or truncated recording is never partly
+    /// read.
     ///
     /// # Errors
     /// [`DatasetError`].
@@ -96,7 +97,7 @@ impl GameRecording {
         } else {
             let archive = path.join(GAME_FILE);
             let container = Container::archive(&archive)?;
-            same_results(&path.join(RESULTS_FILE), &container)?;
+            check_results_copy(&path.join(RESULTS_FILE), &container)?;
             (archive, container)
         };
         let manifest = manifest(&container)?;
@@ -123,13 +124,13 @@ impl GameRecording {
         })
     }
 
-    /// What the recording says about itself.
+    /// The recording's manifest.
     #[must_use]
     pub const fn manifest(&self) -> &GameManifest {
         &self.manifest
     }
 
-    /// Size and hash of the archive, all of which is read; none of an unpacked folder.
+    /// Size and hash of the archive, which is read completely; `None` for an unpacked folder.
     ///
     /// # Errors
     /// [`DatasetError::Io`].
@@ -143,16 +144,16 @@ impl GameRecording {
     /// The published score.
     ///
     /// # Errors
-    /// [`DatasetError::Unreadable`] if `results.json` is none.
+    /// [`DatasetError::Unreadable`] if `results.json` has another format.
     pub fn results(&self) -> Result<GameScore, DatasetError> {
         serde_json::from_slice(&self.bytes(RESULTS_FILE)?)
             .map_err(DatasetError::unreadable(RESULTS_FILE))
     }
 
-    /// What happened.
+    /// The outcome of the game.
     ///
     /// # Errors
-    /// [`DatasetError::Unreadable`] if `outcome.json` does not tell.
+    /// [`DatasetError::Unreadable`] if `outcome.json` has another format.
     pub fn outcome(&self) -> Result<GameOutcome, DatasetError> {
         serde_json::from_slice(&self.bytes(OUTCOME_FILE)?)
             .map_err(DatasetError::unreadable(OUTCOME_FILE))
@@ -173,16 +174,16 @@ impl GameRecording {
 
 fn manifest(container: &Container) -> Result<GameManifest, DatasetError> {
     let bytes = container.bytes(MANIFEST_FILE)?;
-    // The layout first: a manifest of another one may lack fields.
-    let Named { schema } =
+    // Check the layout first: a manifest of another layout may lack fields.
+    let ManifestSchema { schema } =
         serde_json::from_slice(&bytes).map_err(DatasetError::unreadable(MANIFEST_FILE))?;
     match schema.as_str() {
         GAME_SCHEMA => {
             serde_json::from_slice(&bytes).map_err(DatasetError::unreadable(MANIFEST_FILE))
         }
         GAME_SIDE_SCHEMA => Err(DatasetError::Foreign(format!(
-            "this is one side's own file of a game, which cannot be simulated without the other side's \
-             commands; verify the {GAME_FILE} that it was cut from"
+            "this is one side's archive of a game, which cannot be simulated without the other side's \
+             commands; verify the {GAME_FILE} of the same game"
         ))),
         other => Err(DatasetError::Foreign(format!(
             "the recording's layout is {other:?}, this version reads {GAME_SCHEMA}"
@@ -190,12 +191,12 @@ fn manifest(container: &Container) -> Result<GameManifest, DatasetError> {
     }
 }
 
-/// The score beside the archive, if there is one, is the one inside.
-fn same_results(path: &Path, container: &Container) -> Result<(), DatasetError> {
+/// Checks that a `results.json` beside the archive equals the one inside.
+fn check_results_copy(path: &Path, container: &Container) -> Result<(), DatasetError> {
     match fs::read(path) {
-        Ok(beside) if beside == container.bytes(RESULTS_FILE)? => Ok(()),
+        Ok(copy) if copy == container.bytes(RESULTS_FILE)? => Ok(()),
         Ok(_) => Err(DatasetError::Altered(format!(
-            "{} is not the {RESULTS_FILE} inside of {GAME_FILE}",
+            "{} is not the {RESULTS_FILE} in {GAME_FILE}",
             path.display()
         ))),
         Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),

@@ -1,6 +1,6 @@
 use super::{
     files::{MOTION_FILE, RALLIES_FILE, entries_file, steps_file},
-    given::{GivenEntry, GivenResponse, Place},
+    recorded_inputs::{RecordedEntry, RecordedResponse, RowLocation},
     recording::GameRecording,
     rows::GameRows,
     table::GameTable,
@@ -15,24 +15,24 @@ use arrow_schema::SchemaRef;
 use faceoff_episode::{Arena, FinishedGame, RunningGame, RecordError};
 use faceoff_types::{AgentFault, Interpolation, Side};
 
-/// A game being simulated again with what was recorded of it.
-pub(super) struct Replay {
-    course: RunningGame<GameRows>,
+/// Simulates a game again with its recorded inputs.
+pub(super) struct GameReplay {
+    game: RunningGame<GameRows>,
     rallies: GameTable,
     entries: [GameTable; 2],
     motion: GameTable,
     steps: [GameTable; 2],
 }
 
-/// What is recorded of both sides for the rally under way.
-struct Given {
-    /// How both sides got ready.
+/// Recorded data of both sides for the current rally.
+struct RecordedRally {
+    /// Start and reset of both sides.
     entries: [RecordBatch; 2],
     interpolations: [Interpolation; 2],
     faults: [Option<AgentFault>; 2],
 }
 
-impl Replay {
+impl GameReplay {
     pub fn open(recording: &GameRecording) -> Result<Self, DatasetError> {
         let spec = &recording.manifest().spec;
         let arena = Arena::with_ruleset(
@@ -52,125 +52,125 @@ impl Replay {
             entries: [entries(Side::First)?, entries(Side::Second)?],
             motion: recording.table(MOTION_FILE, rows.motion.schema())?,
             steps: [steps(Side::First)?, steps(Side::Second)?],
-            course: RunningGame::begin(&arena, spec.steps, spec.limits.clone(), rows),
+            game: RunningGame::begin(&arena, spec.steps, spec.limits.clone(), rows),
         })
     }
 
-    /// Plays all of it; `progress` is told how many control steps have been.
+    /// Simulates the whole game; `progress` receives the number of control steps of each batch.
     pub fn play(mut self, progress: &dyn Fn(u64)) -> Result<FinishedGame<GameRows>, VerifyError> {
         while let Some(rally) = self.rallies.next_row()? {
-            self.rally(&rally, progress)?;
+            self.replay_rally(&rally, progress)?;
         }
-        let number = self.course.rally();
-        let at = |file| Place {
+        let number = self.game.rally();
+        let at = |file| RowLocation {
             file,
             rally: number,
             step: None,
         };
-        if self.course.end().is_none() {
+        if self.game.end().is_none() {
             let expected = "another rally: the game has not ended";
-            return Err(at(RALLIES_FILE).differs("rows", "no more", expected).into());
+            return Err(at(RALLIES_FILE).difference("rows", "no more", expected).into());
         }
         for table in &mut self.entries {
             if table.fill()? > 0 {
                 let at = at(table.name());
-                return Err(at.differs("rows", "another row", "no more rallies").into());
+                return Err(at.difference("rows", "another row", "no more rallies").into());
             }
         }
         let [first, second] = &mut self.steps;
         for table in [&mut self.motion, first, second] {
             if table.fill()? > 0 {
                 let at = at(table.name());
-                return Err(at.differs("rows", "another row", "no more steps").into());
+                return Err(at.difference("rows", "another row", "no more steps").into());
             }
         }
-        Ok(self.course.finish())
+        Ok(self.game.finish())
     }
 
-    fn rally(&mut self, row: &RecordBatch, progress: &dyn Fn(u64)) -> Result<(), VerifyError> {
-        let number = self.course.rally();
-        let at = Place {
+    fn replay_rally(&mut self, row: &RecordBatch, progress: &dyn Fn(u64)) -> Result<(), VerifyError> {
+        let number = self.game.rally();
+        let at = RowLocation {
             file: RALLIES_FILE,
             rally: number,
             step: None,
         };
-        if self.course.end().is_some() {
+        if self.game.end().is_some() {
             let expected = "no more: the game has ended";
-            return Err(at.differs("rows", "another rally", expected).into());
+            return Err(at.difference("rows", "another rally", expected).into());
         }
-        let given = self.start(number)?;
+        let recorded = self.start_rally(number)?;
         let count = Columns(row).int("steps", 0).unwrap_or_default();
         let mut left = count as usize;
         while left > 0 {
-            let played = self.piece(left, number, &given)?;
+            let played = self.replay_steps(left, number, &recorded)?;
             progress(played as u64);
             left -= played;
         }
-        if self.course.is_in_rally() {
+        if self.game.is_in_rally() {
             let expected = "more: the rally has not ended";
-            return Err(at.differs("steps", count.to_string(), expected).into());
+            return Err(at.difference("steps", count.to_string(), expected).into());
         }
-        let rows = self.course.sink();
+        let rows = self.game.sink();
         let played = batch(rows.rallies.take(), rows.rallies.schema());
-        differs(at, row, &played)?;
+        check_same(at, row, &played)?;
         for side in Side::BOTH {
             let rows = &mut rows.entries[side.index()];
             let played = batch(rows.take(), rows.schema());
             let file = entries_file(side);
-            differs(Place { file, ..at }, &given.entries[side.index()], &played)?;
+            check_same(RowLocation { file, ..at }, &recorded.entries[side.index()], &played)?;
         }
         Ok(())
     }
 
-    /// Gets both sides ready.
-    fn start(&mut self, rally: u32) -> Result<Given, VerifyError> {
-        let mut read = |side: Side| -> Result<(RecordBatch, GivenEntry), VerifyError> {
-            let at = Place {
+    /// Starts a rally with the recorded start and reset of both sides.
+    fn start_rally(&mut self, rally: u32) -> Result<RecordedRally, VerifyError> {
+        let mut read = |side: Side| -> Result<(RecordBatch, RecordedEntry), VerifyError> {
+            let at = RowLocation {
                 file: entries_file(side),
                 rally,
                 step: None,
             };
             let row = self.entries[side.index()].next_row()?;
-            let row = row.ok_or_else(|| at.differs("rows", "no more", "a row of this rally"))?;
-            let entry = GivenEntry::read(&row, side, self.course.needs_start(side), at)?;
+            let row = row.ok_or_else(|| at.difference("rows", "no more", "a row of this rally"))?;
+            let entry = RecordedEntry::read(&row, side, self.game.needs_start(side), at)?;
             Ok((row, entry))
         };
         let [(first_row, first), (second_row, second)] = [read(Side::First)?, read(Side::Second)?];
-        // Of one that does not play nothing is interpolated.
+        // The interpolation of a side that failed to start is not used.
         let interpolation =
-            |given: &GivenEntry| given.entry.interpolation().unwrap_or(Interpolation::Cubic);
-        let given = Given {
+            |entry: &RecordedEntry| entry.entry.interpolation().unwrap_or(Interpolation::Cubic);
+        let recorded = RecordedRally {
             entries: [first_row, second_row],
             interpolations: [interpolation(&first), interpolation(&second)],
-            faults: [first.later, second.later],
+            faults: [first.step_fault, second.step_fault],
         };
-        self.course
+        self.game
             .start_rally([first.entry, second.entry])
-            .map_err(not_built)?;
-        Ok(given)
+            .map_err(unbuildable_row)?;
+        Ok(recorded)
     }
 
-    /// Plays some steps of a rally, `most` at most, and compares what they led to.
-    fn piece(&mut self, most: usize, rally: u32, given: &Given) -> Result<usize, VerifyError> {
-        let first_step = self.course.rally_steps();
+    /// Simulates up to `most` steps of a rally and compares the resulting rows.
+    fn replay_steps(&mut self, most: usize, rally: u32, recorded: &RecordedRally) -> Result<usize, VerifyError> {
+        let first_step = self.game.rally_steps();
         let mut count = most;
         let [first, second] = &mut self.steps;
         for table in [&mut self.motion, first, second] {
             count = count.min(table.fill()?);
             if count == 0 {
-                let at = Place {
+                let at = RowLocation {
                     file: table.name(),
                     rally,
                     step: Some(first_step),
                 };
-                return Err(at.differs("rows", "no more", "a row of this step").into());
+                return Err(at.difference("rows", "no more", "a row of this step").into());
             }
         }
-        let motion = taken(&mut self.motion, count);
-        let sides = [0, 1].map(|side| taken(&mut self.steps[side], count));
-        let trouble = (0..count).find_map(|row| self.step(&sides, row, rally, given).err());
-        // What was played before the trouble comes first.
-        let rows = self.course.sink();
+        let motion = take_rows(&mut self.motion, count);
+        let sides = [0, 1].map(|side| take_rows(&mut self.steps[side], count));
+        let error = (0..count).find_map(|row| self.step(&sides, row, rally, recorded).err());
+        // A difference before the error is reported first.
+        let rows = self.game.sink();
         let played = batch(rows.motion.take(), rows.motion.schema());
         let mut compared = vec![(MOTION_FILE, &motion, played)];
         for side in Side::BOTH {
@@ -180,18 +180,18 @@ impl Replay {
         }
         let earliest = compared
             .iter()
-            .filter_map(|(file, recorded, played)| Some((file, compare::rows(recorded, played)?)))
+            .filter_map(|(file, rows, played)| Some((file, compare::first_row_difference(rows, played)?)))
             .min_by_key(|(_, cell)| cell.row);
         if let Some((file, cell)) = earliest {
-            let at = Place {
+            let at = RowLocation {
                 file,
                 rally,
                 step: Some(first_step.saturating_add(u32::try_from(cell.row).unwrap_or(u32::MAX))),
             };
-            let difference = at.differs(&cell.field, cell.recorded, cell.expected);
+            let difference = at.difference(&cell.field, cell.recorded, cell.expected);
             return Err(difference.into());
         }
-        trouble.map_or(Ok(count), Err)
+        error.map_or(Ok(count), Err)
     }
 
     fn step(
@@ -199,58 +199,58 @@ impl Replay {
         sides: &[RecordBatch; 2],
         row: usize,
         rally: u32,
-        given: &Given,
+        recorded: &RecordedRally,
     ) -> Result<(), VerifyError> {
-        let step = Some(self.course.rally_steps());
-        if !self.course.is_in_rally() {
-            let at = Place {
+        let step = Some(self.game.rally_steps());
+        if !self.game.is_in_rally() {
+            let at = RowLocation {
                 file: RALLIES_FILE,
                 rally,
                 step,
             };
             let expected = "no more steps: the rally has ended";
-            return Err(at.differs("steps", "another step", expected).into());
+            return Err(at.difference("steps", "another step", expected).into());
         }
         let read = |side: Side| {
-            let at = Place {
+            let at = RowLocation {
                 file: steps_file(side),
                 rally,
                 step,
             };
             let index = side.index();
-            GivenResponse::read(
+            RecordedResponse::read(
                 &sides[index],
                 row,
-                given.interpolations[index],
-                self.course.fault(side).is_none(),
-                given.faults[index].as_ref(),
+                recorded.interpolations[index],
+                self.game.fault(side).is_none(),
+                recorded.faults[index].as_ref(),
                 at,
             )
         };
         let [first, second] = [read(Side::First)?, read(Side::Second)?];
-        self.course
+        self.game
             .answer([first.response(), second.response()])
-            .map_err(not_built)
+            .map_err(unbuildable_row)
     }
 }
 
-fn taken(table: &mut GameTable, count: usize) -> RecordBatch {
+fn take_rows(table: &mut GameTable, count: usize) -> RecordBatch {
     table
         .take(count)
-        .expect("so many rows were seen to be there")
+        .expect("`count` is at most the number of buffered rows")
 }
 
 fn batch(columns: Vec<ArrayRef>, schema: &SchemaRef) -> RecordBatch {
     RecordBatch::try_new(schema.clone(), columns).expect("the rows are built by their own schema")
 }
 
-fn differs(at: Place, recorded: &RecordBatch, played: &RecordBatch) -> Result<(), Difference> {
-    match compare::rows(recorded, played) {
+fn check_same(at: RowLocation, recorded: &RecordBatch, played: &RecordBatch) -> Result<(), Difference> {
+    match compare::first_row_difference(recorded, played) {
         None => Ok(()),
-        Some(cell) => Err(at.differs(&cell.field, cell.recorded, cell.expected)),
+        Some(cell) => Err(at.difference(&cell.field, cell.recorded, cell.expected)),
     }
 }
 
-fn not_built(error: RecordError) -> VerifyError {
+fn unbuildable_row(error: RecordError) -> VerifyError {
     DatasetError::Unreadable(error.to_string()).into()
 }

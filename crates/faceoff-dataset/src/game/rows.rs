@@ -5,7 +5,7 @@ use crate::{
 use faceoff_episode::{GameSink, GameStepRow, RallyRow, RallyStart, RecordError};
 use faceoff_types::Side;
 
-/// The rows of all tables of a game, as it makes them.
+/// The rows of all tables of a game.
 pub(super) struct GameRows {
     pub motion: MotionRows,
     pub sides: [SideRows; 2],
@@ -24,8 +24,8 @@ impl GameRows {
     }
 }
 
-/// That a row could not be recorded.
-pub(super) fn not_recorded(error: RecordingError) -> RecordError {
+/// Converts the error of a row that could not be recorded.
+pub(super) fn record_error(error: RecordingError) -> RecordError {
     RecordError {
         what: "recording a game".to_owned(),
         source: error.into(),
@@ -54,7 +54,7 @@ impl GameSink for GameRows {
     fn end_rally(&mut self, row: &RallyRow<'_>) -> Result<(), RecordError> {
         self.rallies.end(row);
         for (rows, fault) in self.entries.iter_mut().zip(row.faults) {
-            rows.end(fault).map_err(not_recorded)?;
+            rows.end(fault).map_err(record_error)?;
         }
         Ok(())
     }

@@ -1,17 +1,17 @@
 use crate::{
-    dataset::{BATCH_ROWS, FileRange, check_footer, has_columns},
+    dataset::{BATCH_ROWS, FileRange, check_footer, check_columns},
     error::DatasetError,
 };
 use arrow_array::RecordBatch;
 use arrow_schema::Schema;
 use parquet::arrow::arrow_reader::{ParquetRecordBatchReader, ParquetRecordBatchReaderBuilder};
 
-/// A table of a game, read from its first row on.
+/// A table of a game, read in order.
 pub(super) struct GameTable {
     name: &'static str,
     reader: ParquetRecordBatchReader,
-    /// What was read and not taken; never empty once [`Self::fill`] has found a row.
-    ahead: Option<RecordBatch>,
+    /// Rows that were read but not used yet; not empty after [`Self::fill`] has found a row.
+    buffered: Option<RecordBatch>,
 }
 
 impl GameTable {
@@ -25,7 +25,7 @@ impl GameTable {
         let builder = ParquetRecordBatchReaderBuilder::try_new(table).map_err(unreadable())?;
         check_footer(builder.metadata(), bytes).map_err(unreadable())?;
         let found = builder.schema();
-        has_columns(name, found, expected)?;
+        check_columns(name, found, expected)?;
         if found.fields().len() != expected.fields().len() {
             return Err(DatasetError::Unreadable(format!(
                 "{name} has {} columns, expected {}",
@@ -40,7 +40,7 @@ impl GameTable {
         Ok(Self {
             name,
             reader,
-            ahead: None,
+            buffered: None,
         })
     }
 
@@ -48,27 +48,27 @@ impl GameTable {
         self.name
     }
 
-    /// How many rows can be taken at once; none after the last.
+    /// Number of rows that can be taken at once; 0 after the last row.
     pub fn fill(&mut self) -> Result<usize, DatasetError> {
         while self
-            .ahead
+            .buffered
             .as_ref()
             .is_none_or(|batch| batch.num_rows() == 0)
         {
             let next = self.reader.next().transpose();
             match next.map_err(DatasetError::unreadable(self.name))? {
-                Some(batch) => self.ahead = Some(batch),
+                Some(batch) => self.buffered = Some(batch),
                 None => return Ok(0),
             }
         }
-        Ok(self.ahead.as_ref().map_or(0, RecordBatch::num_rows))
+        Ok(self.buffered.as_ref().map_or(0, RecordBatch::num_rows))
     }
 
-    /// Takes `count` rows of those that can be.
+    /// Takes `count` of the buffered rows.
     pub fn take(&mut self, count: usize) -> Option<RecordBatch> {
-        let ahead = self.ahead.take()?;
+        let ahead = self.buffered.take()?;
         let taken = ahead.slice(0, count);
-        self.ahead = Some(ahead.slice(count, ahead.num_rows() - count));
+        self.buffered = Some(ahead.slice(count, ahead.num_rows() - count));
         Some(taken)
     }
 

@@ -22,9 +22,8 @@ impl FloatColumns {
         self
     }
 
-    /// Adds the columns of a true state to the right, their names after `prefix`. The filtered
-    /// velocities are left out: they follow from the others, and seven more columns of noise would be
-    /// a tenth of a dataset.
+    /// Adds the columns of a true state to the right, with names after `prefix`. The filtered velocities are left
+    /// out: they follow from the other columns, and would add a tenth to the size of a dataset.
     pub fn with_state(self, prefix: &str) -> Self {
         let name = |suffix: &str| format!("{prefix}{suffix}");
         self.with(
@@ -47,7 +46,7 @@ impl FloatColumns {
         &self.fields
     }
 
-    /// The next values of the row.
+    /// Appends values to the row.
     pub fn put(&mut self, values: &[f64]) {
         for value in values {
             self.builders[self.next].append_value(*value);
@@ -55,7 +54,7 @@ impl FloatColumns {
         }
     }
 
-    /// The next values of the row, absent or not.
+    /// Appends values to the row, null for `None`.
     pub fn put_optional<const N: usize>(&mut self, values: Option<[f64; N]>) {
         match values {
             Some(values) => self.put(&values),
@@ -63,7 +62,7 @@ impl FloatColumns {
         }
     }
 
-    /// The next `count` values of the row are absent.
+    /// Appends `count` nulls to the row.
     pub fn put_absent(&mut self, count: usize) {
         for _ in 0..count {
             self.builders[self.next].append_null();
@@ -71,7 +70,7 @@ impl FloatColumns {
         }
     }
 
-    /// The columns of [`FloatColumns::with_state`].
+    /// Appends the values of the columns of [`FloatColumns::with_state`].
     pub fn put_state(&mut self, state: &EpisodeState) {
         let EpisodeState {
             puck,
@@ -92,7 +91,7 @@ impl FloatColumns {
         self.put_optional(*opponent_ee);
     }
 
-    /// Ends the row. A row of another length is a mistake of this crate, not of its input.
+    /// Ends the row. Panics if the row is incomplete, which is a bug of this crate.
     pub fn end_row(&mut self) {
         assert_eq!(
             self.next,
@@ -102,7 +101,7 @@ impl FloatColumns {
         self.next = 0;
     }
 
-    /// The rows so far, which are removed.
+    /// Removes and returns the rows so far.
     pub fn take(&mut self) -> Vec<ArrayRef> {
         self.builders
             .iter_mut()

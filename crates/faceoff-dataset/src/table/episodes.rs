@@ -19,8 +19,8 @@ pub(crate) struct EpisodeRows {
     digests: StepDigests,
     /// The observation after the last answered step; empty before the first.
     last_observation: Vec<f64>,
-    /// How the episode under way began.
-    begun: Option<Begun>,
+    /// Start of the current episode.
+    started: Option<StartedEpisode>,
     tasks: StringBuilder,
     episodes: UInt32Builder,
     seeds: StringBuilder,
@@ -38,7 +38,7 @@ pub(crate) struct EpisodeRows {
     last: FloatColumns,
 }
 
-struct Begun {
+struct StartedEpisode {
     seed: String,
     interpolation: Option<String>,
     initial: EpisodeState,
@@ -83,7 +83,7 @@ impl EpisodeRows {
             schema: Arc::new(Schema::new(fields)),
             digests: StepDigests::default(),
             last_observation: Vec::new(),
-            begun: None,
+            started: None,
             tasks: StringBuilder::new(),
             episodes: UInt32Builder::new(),
             seeds: StringBuilder::new(),
@@ -111,9 +111,9 @@ impl EpisodeRows {
         self.episodes.len()
     }
 
-    /// Begins an episode, in place of one that has not ended.
+    /// Begins an episode; drops one that has not ended.
     pub fn begin(&mut self, start: &EpisodeStart<'_>) {
-        self.begun = Some(Begun {
+        self.started = Some(StartedEpisode {
             seed: start.seed.to_string(),
             interpolation: start.interpolation.map(|code| code.to_string()),
             initial: start.state.clone(),
@@ -134,12 +134,12 @@ impl EpisodeRows {
         outcome: &EpisodeOutcome,
         host_noise_reruns: u32,
     ) -> Result<(), RecordingError> {
-        let begun = self.begun.take().ok_or_else(|| {
-            RecordingError::Unusable("an episode ended that was not begun".to_owned())
+        let started = self.started.take().ok_or_else(|| {
+            RecordingError::Unusable("an episode ended without a start".to_owned())
         })?;
-        self.seeds.append_value(begun.seed);
-        self.interpolations.append_option(begun.interpolation);
-        self.initial.put_state(&begun.initial);
+        self.seeds.append_value(started.seed);
+        self.interpolations.append_option(started.interpolation);
+        self.initial.put_state(&started.initial);
         self.initial.end_row();
         self.tasks.append_value(outcome.task.as_str());
         self.episodes.append_value(outcome.episode);
@@ -176,7 +176,7 @@ impl EpisodeRows {
         Ok(())
     }
 
-    /// The rows so far, which are removed.
+    /// Removes and returns the rows so far.
     pub fn take(&mut self) -> Vec<ArrayRef> {
         let mut columns: Vec<ArrayRef> = vec![
             Arc::new(self.tasks.finish()),

@@ -1,5 +1,5 @@
-//! The tables of a game: the true motion, what each side saw and did, the rallies and how each side got
-//! ready for them.
+//! The tables of a game: the true motion, observations and actions of each side, the rallies, and the start and reset
+//! of each side for them.
 
 use super::{
     columns::{FloatColumns, joints},
@@ -17,7 +17,7 @@ use faceoff_episode::{RallyEntry, GameStepRow, RallyRow, RallyStart};
 use faceoff_types::{AgentFault, Side};
 use std::sync::Arc;
 
-/// Which step a row is of.
+/// Columns with the numbers of a row's step.
 #[derive(Default)]
 struct StepNumbers {
     game_steps: UInt32Builder,
@@ -94,7 +94,7 @@ impl MotionRows {
         motion.end_row();
     }
 
-    /// The rows so far, which are removed; so of the others.
+    /// Removes and returns the rows so far.
     pub fn take(&mut self) -> Vec<ArrayRef> {
         let mut columns = self.numbers.take();
         columns.extend(self.motion.take());
@@ -102,7 +102,7 @@ impl MotionRows {
     }
 }
 
-/// Rows of what one side saw and did: one per control step.
+/// Rows of observations and actions of one side: one per control step.
 pub(crate) struct SideRows {
     schema: SchemaRef,
     side: Side,
@@ -110,12 +110,12 @@ pub(crate) struct SideRows {
     observations: FloatColumns,
     actions: ListBuilder<Float64Builder>,
     effects: StringBuilder,
-    /// Computation time, the host's, CPU time.
+    /// Computation time, host interference, CPU time.
     times: [Int64Builder; 3],
     constraints: FloatColumns,
 }
 
-/// What a side's answer took, less what the host took; what that was; CPU time. Nanoseconds.
+/// Columns of a side's answer times, ns: computation time without host interference, host interference, CPU time.
 pub(crate) const SIDE_TIMES: [&str; 3] = ["computation_time_ns", "host_time_ns", "cpu_time_ns"];
 
 impl SideRows {
@@ -158,11 +158,11 @@ impl SideRows {
         }
         self.actions.append(side.action.is_some());
         self.effects.append_value(side.effect.as_str());
-        let answered = side.timing.as_ref();
+        let timing = side.timing.as_ref();
         let [computation, host, cpu] = &mut self.times;
-        computation.append_option(answered.map(|a| nanoseconds(a.computation_time_s)));
-        host.append_option(answered.map(|a| nanoseconds(a.host_time_s)));
-        cpu.append_option(answered.and_then(|a| a.cpu_time_s).map(nanoseconds));
+        computation.append_option(timing.map(|a| nanoseconds(a.computation_time_s)));
+        host.append_option(timing.map(|a| nanoseconds(a.host_time_s)));
+        cpu.append_option(timing.and_then(|a| a.cpu_time_s).map(nanoseconds));
         let c = side.constraints;
         self.constraints
             .put(&[c.joint_pos, c.joint_vel, c.ee, c.link]);
@@ -184,7 +184,7 @@ impl SideRows {
     }
 }
 
-/// Rows of the rallies, as anybody may see them.
+/// Rows of the rallies, which are public.
 pub(crate) struct RallyRows {
     schema: SchemaRef,
     rallies: UInt32Builder,
@@ -267,7 +267,7 @@ impl RallyRows {
     }
 }
 
-/// Rows of how one side got ready for each rally, and of its fault in it.
+/// Rows of start and reset of one side for each rally, and of its fault in it.
 pub(crate) struct EntryRows {
     schema: SchemaRef,
     side: Side,

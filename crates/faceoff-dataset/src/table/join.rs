@@ -1,5 +1,5 @@
 use super::{
-    steps::{HOST_TIME, with_host_time, without_host_time},
+    steps::{HOST_TIME, schema_with_host_time, with_zero_host_time},
     writer::{TableWriter, schema_metadata},
 };
 use crate::error::RecordingError;
@@ -24,23 +24,23 @@ use std::{
 /// A table of a shard.
 #[derive(Debug, Clone)]
 pub(crate) enum ShardTable {
-    /// In today's layout: its bytes are taken as they are.
-    Ready(PathBuf),
-    /// In a layout before: written anew.
-    Old(PathBuf),
+    /// In the current layout: its bytes are copied.
+    Current(PathBuf),
+    /// In an earlier layout: its rows are rewritten.
+    Earlier(PathBuf),
 }
 
 impl ShardTable {
-    /// Either can be read.
+    /// The path of the table.
     pub fn path(&self) -> &Path {
         match self {
-            Self::Ready(path) | Self::Old(path) => path,
+            Self::Current(path) | Self::Earlier(path) => path,
         }
     }
 }
 
-/// Writes the row groups of several tables of one schema as one file. Old ones are written anew in a
-/// nameless file of the folder `scratch` first.
+/// Writes the row groups of several tables with one schema to one file. Tables of earlier layouts are first rewritten
+/// to an unnamed file in the folder `scratch`.
 pub(crate) fn join<W: Write + Send>(
     tables: &[ShardTable],
     scratch: &Path,
@@ -51,17 +51,17 @@ pub(crate) fn join<W: Write + Send>(
     for table in tables {
         let path = table.path();
         let file = match table {
-            ShardTable::Ready(path) => File::open(path)?.into_file(),
-            ShardTable::Old(path) => rewritten(path, scratch)?,
+            ShardTable::Current(path) => File::open(path)?.into_file(),
+            ShardTable::Earlier(path) => rewrite(path, scratch)?,
         };
-        let joining = || RecordingError::unusable(format!("joining {}", path.display()));
+        let join_error = || RecordingError::unusable(format!("joining {}", path.display()));
         let metadata = ParquetMetaDataReader::new()
             .with_column_index_policy(PageIndexPolicy::Skip)
             .with_offset_index_policy(PageIndexPolicy::Optional)
             .parse_and_finish(&file)
-            .map_err(joining())?;
+            .map_err(join_error())?;
         if let Some(out) = out.take() {
-            writer = Some(begin(&metadata, out).map_err(joining())?);
+            writer = Some(begin(&metadata, out).map_err(join_error())?);
         }
         let Some(writer) = &mut writer else {
             break;
@@ -72,7 +72,7 @@ pub(crate) fn join<W: Write + Send>(
                 path.display()
             )));
         }
-        append(&metadata, &file, writer).map_err(joining())?;
+        append(&metadata, &file, writer).map_err(join_error())?;
     }
     match writer {
         None => Err(RecordingError::Unusable("nothing to join".to_owned())),
@@ -130,26 +130,26 @@ fn append<W: Write + Send>(
     Ok(())
 }
 
-/// The same rows as this version writes them.
-fn rewritten(path: &Path, scratch: &Path) -> Result<fs::File, RecordingError> {
-    let what = format!("reading {}", path.display());
+/// Rewrites a table in the current layout.
+fn rewrite(path: &Path, scratch: &Path) -> Result<fs::File, RecordingError> {
+    let context = format!("reading {}", path.display());
     let builder = ParquetRecordBatchReaderBuilder::try_new(File::open(path)?.into_file())
-        .map_err(RecordingError::unusable(&what))?;
+        .map_err(RecordingError::unusable(&context))?;
     let file = tempfile::tempfile_in(scratch)?;
     let copy = File::from_parts(file.try_clone()?, path);
-    // Layouts differ in nothing else that is not the writer's.
+    // Otherwise layouts differ only in properties of the writer.
     let lacks_host_time =
         path.ends_with(STEPS_FILE) && builder.schema().column_with_name(HOST_TIME).is_none();
     let schema = if lacks_host_time {
-        Arc::new(with_host_time(builder.schema()))
+        Arc::new(schema_with_host_time(builder.schema()))
     } else {
         builder.schema().clone()
     };
     let mut writer = TableWriter::new(copy, &schema)?;
-    for batch in builder.build().map_err(RecordingError::unusable(&what))? {
-        let mut batch = batch.map_err(RecordingError::unusable(&what))?;
+    for batch in builder.build().map_err(RecordingError::unusable(&context))? {
+        let mut batch = batch.map_err(RecordingError::unusable(&context))?;
         if lacks_host_time {
-            batch = without_host_time(&batch).map_err(RecordingError::unusable(&what))?;
+            batch = with_zero_host_time(&batch).map_err(RecordingError::unusable(&context))?;
         }
         writer.write(batch.columns().to_vec())?;
     }

@@ -12,8 +12,7 @@ use std::sync::Arc;
 /// Numbers of an observation with an opponent on the table.
 const OBSERVATION_MAX: usize = 23;
 
-/// Columns of an observation, in the protocol's order, their names after `prefix`; absent ones are
-/// null.
+/// Columns of an observation in the protocol's order, with names after `prefix`; absent numbers are null.
 pub(super) fn observation_columns(prefix: &str, nullable: bool) -> FloatColumns {
     FloatColumns::default()
         .with(
@@ -28,7 +27,7 @@ pub(super) fn observation_columns(prefix: &str, nullable: bool) -> FloatColumns 
         )
 }
 
-/// Fills the columns of an observation; an empty one is absent as a whole.
+/// Appends an observation to its columns; an empty observation gives nulls.
 pub(super) fn put_observation(columns: &mut FloatColumns, observation: &[f64]) {
     columns.put(observation);
     columns.put_absent(OBSERVATION_MAX - observation.len());
@@ -46,13 +45,13 @@ pub(crate) struct StepRows {
     computation_times: Int64Builder,
     host_times: Int64Builder,
     cpu_times: Int64Builder,
-    rest: FloatColumns,
+    state_and_constraints: FloatColumns,
 }
 
 impl StepRows {
     pub fn new(task: Task) -> Self {
         let observations = observation_columns("obs_", false);
-        let rest = FloatColumns::default()
+        let state_and_constraints = FloatColumns::default()
             .with_state("")
             .with(CONSTRAINTS.map(str::to_owned), false);
         let item = Arc::new(Field::new_list_field(DataType::Float64, false));
@@ -66,7 +65,7 @@ impl StepRows {
         fields.push(Field::new(COMPUTATION_TIME, DataType::Int64, false));
         fields.push(Field::new(HOST_TIME, DataType::Int64, false));
         fields.push(Field::new("cpu_time_ns", DataType::Int64, true));
-        fields.extend_from_slice(rest.fields());
+        fields.extend_from_slice(state_and_constraints.fields());
         Self {
             schema: Arc::new(Schema::new(fields)),
             task,
@@ -78,7 +77,7 @@ impl StepRows {
             computation_times: Int64Builder::new(),
             host_times: Int64Builder::new(),
             cpu_times: Int64Builder::new(),
-            rest,
+            state_and_constraints,
         }
     }
 
@@ -98,7 +97,7 @@ impl StepRows {
             self.computation_times.finish();
             self.host_times.finish();
             self.cpu_times.finish();
-            self.rest.take();
+            self.state_and_constraints.take();
         }
     }
 
@@ -118,14 +117,14 @@ impl StepRows {
             .append_value(nanoseconds(row.timing.host_time_s));
         self.cpu_times
             .append_option(row.timing.cpu_time_s.map(nanoseconds));
-        let rest = &mut self.rest;
-        rest.put_state(row.state);
+        let state_and_constraints = &mut self.state_and_constraints;
+        state_and_constraints.put_state(row.state);
         let c = row.constraints;
-        rest.put(&[c.joint_pos, c.joint_vel, c.ee, c.link]);
-        rest.end_row();
+        state_and_constraints.put(&[c.joint_pos, c.joint_vel, c.ee, c.link]);
+        state_and_constraints.end_row();
     }
 
-    /// The rows so far, which are removed.
+    /// Removes and returns the rows so far.
     pub fn take(&mut self) -> Vec<ArrayRef> {
         let episodes = self.episodes.finish();
         let tasks =
@@ -140,33 +139,33 @@ impl StepRows {
         columns.push(Arc::new(self.computation_times.finish()));
         columns.push(Arc::new(self.host_times.finish()));
         columns.push(Arc::new(self.cpu_times.finish()));
-        columns.extend(self.rest.take());
+        columns.extend(self.state_and_constraints.take());
         columns
     }
 }
 
 const COMPUTATION_TIME: &str = "computation_time_ns";
-/// What the host took of a step's time; a column since layout 4.
+/// Column of host interference, ns; since layout 4.
 pub(crate) const HOST_TIME: &str = "host_time_ns";
 
-/// The columns of a table of control steps of an earlier layout, with the one for the host's time.
-pub(crate) fn with_host_time(schema: &Schema) -> Schema {
+/// Adds the column for host interference to the schema of an earlier layout's table of control steps.
+pub(crate) fn schema_with_host_time(schema: &Schema) -> Schema {
     let mut fields = schema.fields().to_vec();
     let field = Arc::new(Field::new(HOST_TIME, DataType::Int64, false));
-    fields.insert(place(schema), field);
+    fields.insert(host_time_index(schema), field);
     Schema::new_with_metadata(fields, schema.metadata().clone())
 }
 
-/// Rows of an earlier layout in which the host took nothing, for nothing was told apart then.
-pub(crate) fn without_host_time(batch: &RecordBatch) -> Result<RecordBatch, ArrowError> {
+/// Adds the column for host interference to rows of an earlier layout: 0, since it was not recorded.
+pub(crate) fn with_zero_host_time(batch: &RecordBatch) -> Result<RecordBatch, ArrowError> {
     let mut columns = batch.columns().to_vec();
-    let none = Int64Array::from_value(0, batch.num_rows());
-    columns.insert(place(&batch.schema()), Arc::new(none));
-    RecordBatch::try_new(Arc::new(with_host_time(&batch.schema())), columns)
+    let zeros = Int64Array::from_value(0, batch.num_rows());
+    columns.insert(host_time_index(&batch.schema()), Arc::new(zeros));
+    RecordBatch::try_new(Arc::new(schema_with_host_time(&batch.schema())), columns)
 }
 
-/// After the computation time.
-fn place(schema: &Schema) -> usize {
+/// Index of the column for host interference: after the computation time.
+fn host_time_index(schema: &Schema) -> usize {
     let times = schema.column_with_name(COMPUTATION_TIME);
     times.map_or(schema.fields().len(), |(index, _)| index + 1)
 }

@@ -14,18 +14,18 @@ use parquet::{
 };
 use std::path::Path;
 
-/// Rows after which a row group is closed; bounds the memory of a writer.
+/// Rows after which a row group is closed. This bounds the memory of a writer.
 const ROW_GROUP_ROWS: usize = 32_768;
-/// Rows after which a page is closed. Whoever reads one episode unpacks a page or two per column;
-/// smaller ones would cost the whole dataset more than they save there.
+/// Rows after which a page is closed. Reading one episode decompresses one or two pages per column; smaller pages
+/// would make datasets larger for little gain.
 const PAGE_ROWS: usize = 1024;
-/// Most of what a recording costs is the search for repetitions in bytes that have none; higher levels search
-/// longer and gain a percent.
+/// Most CPU time of a recording is the search for repetitions in noise; higher levels search longer and gain one
+/// percent.
 const ZSTD_LEVEL: i32 = 1;
 
-/// One Parquet file being written.
+/// Writer of one Parquet file.
 pub(crate) struct TableWriter {
-    what: String,
+    context: String,
     schema: SchemaRef,
     writer: ArrowWriter<File>,
 }
@@ -35,7 +35,7 @@ impl TableWriter {
         Self::create_as(DATASET_SCHEMA, path, schema)
     }
 
-    /// A table of this layout.
+    /// Creates a table with the name of a layout in its metadata.
     pub fn create_as(
         layout: &str,
         path: &Path,
@@ -49,27 +49,26 @@ impl TableWriter {
     }
 
     fn new_as(layout: &str, file: File, schema: &SchemaRef) -> Result<Self, RecordingError> {
-        let what = format!("writing {}", file.path().display());
+        let context = format!("writing {}", file.path().display());
         let writer = ArrowWriter::try_new(file, schema.clone(), Some(properties(layout, schema)?))
-            .map_err(RecordingError::unusable(&what))?;
+            .map_err(RecordingError::unusable(&context))?;
         Ok(Self {
-            what,
+            context,
             schema: schema.clone(),
             writer,
         })
     }
 
-    /// Adds whole episodes, at most 1024 rows at once: pages and row groups then end where an episode
-    /// does.
+    /// Adds whole episodes, at most 1024 rows at once, so that pages and row groups end with an episode.
     pub fn write(&mut self, columns: Vec<ArrayRef>) -> Result<(), RecordingError> {
         if columns.iter().all(|column| column.is_empty()) {
             return Ok(());
         }
         let batch = RecordBatch::try_new(self.schema.clone(), columns)
-            .map_err(RecordingError::unusable(&self.what))?;
+            .map_err(RecordingError::unusable(&self.context))?;
         self.writer
             .write(&batch)
-            .map_err(RecordingError::unusable(&self.what))?;
+            .map_err(RecordingError::unusable(&self.context))?;
         if self.writer.in_progress_rows() >= ROW_GROUP_ROWS {
             self.end_row_group()?;
         }
@@ -79,23 +78,23 @@ impl TableWriter {
     fn end_row_group(&mut self) -> Result<(), RecordingError> {
         self.writer
             .flush()
-            .map_err(RecordingError::unusable(&self.what))
+            .map_err(RecordingError::unusable(&self.context))
     }
 
     pub fn finish(mut self) -> Result<(), RecordingError> {
         self.writer
             .finish()
-            .map_err(RecordingError::unusable(&self.what))?;
+            .map_err(RecordingError::unusable(&self.context))?;
         Ok(self.writer.inner().sync_all()?)
     }
 }
 
-/// The key under which a table names its layout.
+/// The metadata entry with the layout of a table.
 pub(super) fn schema_metadata() -> KeyValue {
-    named_layout(DATASET_SCHEMA)
+    layout_metadata(DATASET_SCHEMA)
 }
 
-fn named_layout(layout: &str) -> KeyValue {
+fn layout_metadata(layout: &str) -> KeyValue {
     KeyValue::new("faceoff.schema".to_owned(), layout.to_owned())
 }
 
@@ -106,11 +105,11 @@ fn properties(layout: &str, schema: &Schema) -> Result<WriterProperties, Recordi
         .set_max_row_group_row_count(None)
         .set_data_page_row_count_limit(PAGE_ROWS)
         .set_statistics_enabled(EnabledStatistics::Chunk)
-        .set_key_value_metadata(Some(vec![named_layout(layout)]));
+        .set_key_value_metadata(Some(vec![layout_metadata(layout)]));
     for field in schema.fields() {
         let name = field.name().as_str();
-        // Measured numbers hardly repeat, but their leading bytes do. Only floats are split by bytes:
-        // DuckDB and pyarrow 15 refuse that for integers. Those count up or lie close together.
+        // Measured numbers rarely repeat, but their leading bytes do. Only floats are split by bytes: DuckDB and
+        // pyarrow 15 refuse that for integers. Integers count up or are close together.
         let (path, encoding) = match field.data_type() {
             DataType::Float64 => (ColumnPath::from(name), Encoding::BYTE_STREAM_SPLIT),
             DataType::List(item) => {
@@ -125,8 +124,8 @@ fn properties(layout: &str, schema: &Schema) -> Result<WriterProperties, Recordi
         properties = properties
             .set_column_dictionary_enabled(path.clone(), false)
             .set_column_encoding(path.clone(), encoding);
-        // Readers find episodes by the bounds of `task`, `episode` and `step`; those of measured
-        // numbers would only be longer.
+        // Readers find episodes by the bounds of `task`, `episode` and `step`; bounds of measured numbers would
+        // have no use.
         if *field.data_type() != DataType::UInt32 {
             properties = properties.set_column_statistics_enabled(path, EnabledStatistics::None);
         }

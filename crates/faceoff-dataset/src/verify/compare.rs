@@ -1,4 +1,4 @@
-//! Bit for bit: −0 is not 0, and a missing value is not any value.
+//! Compares bit for bit: −0 differs from 0, and a missing value differs from every value.
 
 use super::difference::Difference;
 use arrow_array::{
@@ -10,16 +10,16 @@ use arrow_schema::DataType;
 use serde_json::Value;
 
 /// A cell that differs.
-pub(crate) struct Cell {
+pub(crate) struct CellDifference {
     pub row: usize,
     pub field: String,
     pub recorded: String,
     pub expected: String,
 }
 
-/// The first cell, by row and then by column, of `expected` that `recorded` does not hold. Columns go
-/// by their names; rows beyond those of `expected` are not looked at.
-pub(crate) fn rows(recorded: &RecordBatch, expected: &RecordBatch) -> Option<Cell> {
+/// The first cell, by row and then by column, that differs between `recorded` and `expected`. Columns are matched by
+/// name; rows beyond those of `expected` are not compared.
+pub(crate) fn first_row_difference(recorded: &RecordBatch, expected: &RecordBatch) -> Option<CellDifference> {
     let schema = expected.schema();
     let mut first: Option<(usize, usize)> = None;
     for (index, field) in schema.fields().iter().enumerate() {
@@ -35,7 +35,7 @@ pub(crate) fn rows(recorded: &RecordBatch, expected: &RecordBatch) -> Option<Cel
     }
     first.map(|(row, index)| {
         let name = schema.field(index).name().clone();
-        Cell {
+        CellDifference {
             row,
             recorded: recorded
                 .column_by_name(&name)
@@ -89,14 +89,14 @@ fn text(array: &dyn Array, row: usize) -> String {
     }
 }
 
-/// The first place in which a JSON file is not what it should be, byte for byte.
-pub(crate) fn json(file: &'static str, recorded: &[u8], expected: &[u8]) -> Option<Difference> {
+/// The first difference between two JSON files, compared byte for byte.
+pub(crate) fn json_difference(file: &'static str, recorded: &[u8], expected: &[u8]) -> Option<Difference> {
     if recorded == expected {
         return None;
     }
     let parse = serde_json::from_slice::<Value>;
     let found = match (parse(recorded), parse(expected)) {
-        (Ok(recorded), Ok(expected)) => place(&recorded, &expected, String::new()),
+        (Ok(recorded), Ok(expected)) => first_json_difference(&recorded, &expected, String::new()),
         _ => None,
     };
     let (field, recorded, expected) = found.unwrap_or_else(|| {
@@ -123,7 +123,7 @@ pub(crate) fn json(file: &'static str, recorded: &[u8], expected: &[u8]) -> Opti
     })
 }
 
-fn place(recorded: &Value, expected: &Value, at: String) -> Option<(String, String, String)> {
+fn first_json_difference(recorded: &Value, expected: &Value, at: String) -> Option<(String, String, String)> {
     match (recorded, expected) {
         (Value::Object(a), Value::Object(b)) => {
             let missing = a.keys().find(|key| !b.contains_key(*key));
@@ -133,7 +133,7 @@ fn place(recorded: &Value, expected: &Value, at: String) -> Option<(String, Stri
                 } else {
                     format!("{at}.{key}")
                 };
-                place(
+                first_json_difference(
                     a.get(key).unwrap_or(&Value::Null),
                     b.get(key).unwrap_or(&Value::Null),
                     at,
@@ -141,13 +141,13 @@ fn place(recorded: &Value, expected: &Value, at: String) -> Option<(String, Stri
             })
         }
         (Value::Array(a), Value::Array(b)) => (0..a.len().max(b.len())).find_map(|i| {
-            place(
+            first_json_difference(
                 a.get(i).unwrap_or(&Value::Null),
                 b.get(i).unwrap_or(&Value::Null),
                 format!("{at}[{i}]"),
             )
         }),
-        // As text, so that −0 is not 0.
+        // Compare as text, so that −0 differs from 0.
         (a, b) => {
             let (a, b) = (a.to_string(), b.to_string());
             (a != b).then_some((at, a, b))

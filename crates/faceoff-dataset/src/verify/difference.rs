@@ -2,23 +2,23 @@ use faceoff_types::Task;
 use serde::Serialize;
 use std::fmt;
 
-/// A recorded value that is not what the simulation gives.
+/// A recorded value that differs from the simulation.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Difference {
     pub file: &'static str,
-    /// The task, where it is about one.
+    /// The task, if the difference is in one.
     pub task: Option<Task>,
-    /// The episode, where it is about one.
+    /// The episode, if the difference is in one.
     pub episode: Option<u32>,
-    /// The rally of a game, where it is about one.
+    /// The rally of a game, if the difference is in one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rally: Option<u32>,
-    /// The control step, where it is about one.
+    /// The control step, if the difference is in one.
     pub step: Option<u32>,
-    /// The column, or the place in a JSON file.
+    /// The column, or the path in a JSON file.
     pub field: String,
     pub recorded: String,
-    /// What it should be.
+    /// The value of the simulation, or a description of the expected one.
     pub expected: String,
 }
 

@@ -1,16 +1,16 @@
 use super::difference::Difference;
 use crate::error::{DatasetError, RecordingError};
 
-/// Why a dataset is not verified.
+/// Reason why a dataset is not verified.
 #[derive(Debug, thiserror::Error)]
 pub enum VerifyError {
-    /// It cannot be read, or not simulated by this version.
+    /// It cannot be read, or this version cannot simulate it.
     #[error(transparent)]
     Dataset(#[from] DatasetError),
     /// The recording of a shard is damaged, incomplete, or of another layout or simulator.
     #[error(transparent)]
     Recording(#[from] RecordingError),
-    /// The first number that is not what the simulation gives.
+    /// The first difference from the simulation.
     #[error("{0}")]
     Differs(Box<Difference>),
     /// The threads could not be started.

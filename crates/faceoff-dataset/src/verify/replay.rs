@@ -1,9 +1,9 @@
-use super::{compare, difference::Difference, feed::Recorded};
+use super::{compare, difference::Difference, episode_reader::RecordedEpisode};
 use crate::{
     dataset::Columns,
     files::{EPISODES_FILE, STEPS_FILE},
     interpolation_text,
-    score::Measured,
+    score::StepMeasurement,
     table::{EpisodeRows, HOST_TIME, StepRows},
     times::seconds,
 };
@@ -15,36 +15,36 @@ use arrow_array::{
 use faceoff_episode::{AnswerTiming, Arena, RunningEpisode, EpisodeStart, RecordError, StepRow, StepSink};
 use faceoff_types::{ACTION_LIMIT, AgentFault, EpisodeOutcome, Interpolation, Ruleset};
 
-/// What it takes to simulate the episodes of an evaluation again.
-pub(super) struct Replay {
+/// Simulates the episodes of an evaluation again.
+pub(super) struct Replayer {
     ruleset: Ruleset,
     arena: Arena,
 }
 
-/// An episode that is what was recorded.
-pub(super) struct Replayed {
+/// A replayed episode without differences.
+pub(super) struct ReplayedEpisode {
     pub outcome: EpisodeOutcome,
-    /// What scoring needs of its steps.
-    pub steps: Vec<Measured>,
+    /// Data of its steps for scoring.
+    pub steps: Vec<StepMeasurement>,
     pub host_noise_reruns: u32,
 }
 
-/// One episode being simulated again, with the recorded answers.
-struct Again<'a> {
-    recorded: &'a Recorded,
+/// Replay of one episode with its recorded answers.
+struct EpisodeReplay<'a> {
+    recorded: &'a RecordedEpisode,
     ruleset: Ruleset,
     interpolation: Interpolation,
-    course: RunningEpisode<Rows>,
+    running: RunningEpisode<ReplayRows>,
 }
 
-/// The rows that the episode should have.
-struct Rows {
+/// The expected rows of the episode.
+struct ReplayRows {
     steps: StepRows,
     episodes: EpisodeRows,
-    measured: Vec<Measured>,
+    measured: Vec<StepMeasurement>,
 }
 
-impl StepSink for Rows {
+impl StepSink for ReplayRows {
     fn begin(&mut self, start: EpisodeStart<'_>) {
         self.steps.begin(start.episode);
         self.episodes.begin(&start);
@@ -58,8 +58,8 @@ impl StepSink for Rows {
         self.steps.push(row);
         self.episodes.step(row);
         let c = row.constraints;
-        self.measured.push(Measured {
-            answered: row.timing,
+        self.measured.push(StepMeasurement {
+            timing: row.timing,
             constraints: [c.joint_pos, c.joint_vel, c.ee, c.link],
         });
     }
@@ -74,91 +74,91 @@ impl StepSink for Rows {
     }
 }
 
-/// What the agent made of the episode, as far as it cannot be simulated.
-struct Given {
+/// Inputs from the agent that are read from the recording.
+struct RecordedInputs {
     interpolation: Option<Interpolation>,
     fault: Option<AgentFault>,
 }
 
-impl Replay {
+impl Replayer {
     pub const fn new(ruleset: Ruleset, arena: Arena) -> Self {
         Self { ruleset, arena }
     }
 
-    /// Simulates an episode again and compares every number of it.
-    pub fn episode(&self, recorded: &Recorded) -> Result<Replayed, Difference> {
-        let given = given(recorded)?;
-        let rows = Rows {
+    /// Simulates an episode again and compares all its numbers.
+    pub fn episode(&self, recorded: &RecordedEpisode) -> Result<ReplayedEpisode, Difference> {
+        let inputs = read_inputs(recorded)?;
+        let rows = ReplayRows {
             steps: StepRows::new(recorded.task),
             episodes: EpisodeRows::new(),
             measured: Vec::new(),
         };
         let (task, episode) = (recorded.task, recorded.episode);
-        let mut again = Again {
+        let mut replay = EpisodeReplay {
             recorded,
             ruleset: self.ruleset,
             // Without an agent there are no steps to interpolate.
-            interpolation: given.interpolation.unwrap_or(Interpolation::Cubic),
-            course: RunningEpisode::begin(&self.arena, task, episode, given.interpolation, rows),
+            interpolation: inputs.interpolation.unwrap_or(Interpolation::Cubic),
+            running: RunningEpisode::begin(&self.arena, task, episode, inputs.interpolation, rows),
         };
         let mut ended = None;
-        for piece in &recorded.steps {
-            ended = again.piece(piece)?.or(ended);
+        for batch in &recorded.steps {
+            ended = replay.replay_batch(batch)?.or(ended);
         }
-        again.end(ended, given.fault)
+        replay.end(ended, inputs.fault)
     }
 }
 
-impl Again<'_> {
-    /// Plays the actions of some steps, and compares what they led to.
-    fn piece(&mut self, piece: &RecordBatch) -> Result<Option<EpisodeOutcome>, Difference> {
-        let first = self.course.steps();
+impl EpisodeReplay<'_> {
+    /// Applies the actions of some steps and compares the resulting rows.
+    fn replay_batch(&mut self, batch: &RecordBatch) -> Result<Option<EpisodeOutcome>, Difference> {
+        let first = self.running.steps();
         let mut ended = None;
-        let trouble = (0..piece.num_rows()).find_map(|row| match self.step(piece, row) {
+        let error = (0..batch.num_rows()).find_map(|row| match self.step(batch, row) {
             Ok(outcome) => {
                 ended = outcome.or(ended.take());
                 None
             }
             Err(difference) => Some(difference),
         });
-        let steps = &mut self.course.sink().steps;
+        let steps = &mut self.running.sink().steps;
         let played = RecordBatch::try_new(steps.schema().clone(), steps.take())
             .expect("the rows are built by their own schema");
-        // What was played before the trouble comes first.
-        if let Some(cell) = compare::rows(piece, &played) {
+        // A difference before the error is reported first.
+        if let Some(cell) = compare::first_row_difference(batch, &played) {
             let step = first.saturating_add(u32::try_from(cell.row).unwrap_or(u32::MAX));
-            return Err(self.at_step(step, &cell.field, cell.recorded, cell.expected));
+            return Err(self.step_difference(step, &cell.field, cell.recorded, cell.expected));
         }
-        trouble.map_or(Ok(ended), Err)
+        error.map_or(Ok(ended), Err)
     }
 
     fn step(
         &mut self,
-        piece: &RecordBatch,
+        batch: &RecordBatch,
         row: usize,
     ) -> Result<Option<EpisodeOutcome>, Difference> {
-        let step = self.course.steps();
-        if let Some(end) = self.course.end() {
+        let step = self.running.steps();
+        if let Some(end) = self.running.end() {
             let expected = format!("no more steps: the episode has ended ({})", end.as_str());
-            return Err(self.at_step(step, "step", "another step".to_owned(), expected));
+            return Err(self.step_difference(step, "step", "another step".to_owned(), expected));
         }
-        let action = self.action(piece, row, step)?;
-        let answered = self.answered(piece, row, step)?;
-        // That the world diverged is the course's to remember: the recorded fault must say so, too.
+        let action = self.read_action(batch, row, step)?;
+        let timing = self.read_timing(batch, row, step)?;
+        // The running episode stores a divergence; the recorded fault must match it.
         Ok(self
-            .course
-            .answer(action.values(), answered)
+            .running
+            .answer(action.values(), timing)
             .unwrap_or_default())
     }
 
-    /// The recorded action: it is the simulation's input, so it must be one.
-    fn action(
+    /// The recorded action, checked, since it is an input of the simulation.
+    fn read_action(
         &self,
-        piece: &RecordBatch,
+        batch: &RecordBatch,
         row: usize,
         step: u32,
     ) -> Result<Float64Array, Difference> {
-        let actions: &ListArray = piece["action"].as_list();
+        let actions: &ListArray = batch["action"].as_list();
         let wrong = |recorded: String| {
             let expected = match self.ruleset {
                 Ruleset::First => format!("{} finite numbers", self.interpolation.len()),
@@ -167,7 +167,7 @@ impl Again<'_> {
                     self.interpolation.len()
                 ),
             };
-            self.at_step(step, "action", recorded, expected)
+            self.step_difference(step, "action", recorded, expected)
         };
         if actions.is_null(row) {
             return Err(wrong("nothing".to_owned()));
@@ -188,23 +188,23 @@ impl Again<'_> {
         }
     }
 
-    /// The recorded times, which nothing else tells.
-    fn answered(&self, piece: &RecordBatch, row: usize, step: u32) -> Result<AnswerTiming, Difference> {
+    /// The recorded times.
+    fn read_timing(&self, batch: &RecordBatch, row: usize, step: u32) -> Result<AnswerTiming, Difference> {
         let time = |name: &str| -> Result<Option<i64>, Difference> {
-            let column: &Int64Array = piece[name].as_primitive::<Int64Type>();
+            let column: &Int64Array = batch[name].as_primitive::<Int64Type>();
             if column.is_null(row) {
                 return Ok(None);
             }
             match column.value(row) {
                 negative @ ..0 => {
-                    Err(self.at_step(step, name, negative.to_string(), "at least 0".to_owned()))
+                    Err(self.step_difference(step, name, negative.to_string(), "at least 0".to_owned()))
                 }
                 time => Ok(Some(time)),
             }
         };
         let name = "computation_time_ns";
         let Some(computation_time) = time(name)? else {
-            return Err(self.at_step(step, name, "nothing".to_owned(), "a time".to_owned()));
+            return Err(self.step_difference(step, name, "nothing".to_owned(), "a time".to_owned()));
         };
         Ok(AnswerTiming {
             computation_time_s: seconds(computation_time),
@@ -213,57 +213,57 @@ impl Again<'_> {
         })
     }
 
-    /// The episode's outcome from its course and the recorded fault, and its row.
+    /// Determines the outcome from the replay and the recorded fault, and compares the episode's row.
     fn end(
         mut self,
         ended: Option<EpisodeOutcome>,
         fault: Option<AgentFault>,
-    ) -> Result<Replayed, Difference> {
-        let (recorded, steps) = (self.recorded, self.course.steps());
-        let diverged = self.course.diverged().map(ToString::to_string);
+    ) -> Result<ReplayedEpisode, Difference> {
+        let (recorded, steps) = (self.recorded, self.running.steps());
+        let diverged = self.running.diverged().map(ToString::to_string);
         let outcome = match (ended, fault) {
             (Some(outcome), None) => outcome,
             (None, Some(fault)) => {
-                let told = fault.to_string();
-                self.course.outcome_after_recorded_fault(fault).ok_or_else(|| {
+                let recorded_fault = fault.to_string();
+                self.running.outcome_after_recorded_fault(fault).ok_or_else(|| {
                     let expected = diverged
                         .unwrap_or_else(|| format!("a fault of this episode after {steps} steps"));
-                    in_row(recorded, "fault", told, expected)
+                    row_difference(recorded, "fault", recorded_fault, expected)
                 })?
             }
             (Some(outcome), Some(fault)) => {
                 let end = outcome.end.as_str();
                 let expected = format!("none: the episode ended before ({end})");
-                return Err(in_row(recorded, "fault", fault.to_string(), expected));
+                return Err(row_difference(recorded, "fault", fault.to_string(), expected));
             }
             (None, None) => {
                 if let Some(expected) = diverged {
-                    return Err(in_row(recorded, "fault", "nothing", expected));
+                    return Err(row_difference(recorded, "fault", "nothing", expected));
                 }
                 let expected = "more: the episode has not ended".to_owned();
-                return Err(in_row(recorded, "steps", steps.to_string(), expected));
+                return Err(row_difference(recorded, "steps", steps.to_string(), expected));
             }
         };
-        // Nothing but the record tells it.
+        // Cannot be simulated.
         let reruns = Columns(&recorded.row).int("host_noise_reruns", 0);
         let host_noise_reruns = reruns.unwrap_or_default();
-        let rows = self.course.sink();
+        let rows = self.running.sink();
         if let Err(error) = rows.end(&outcome, host_noise_reruns) {
-            return Err(in_row(recorded, "fault", error.to_string(), "a fault"));
+            return Err(row_difference(recorded, "fault", error.to_string(), "a fault"));
         }
         let played = RecordBatch::try_new(rows.episodes.schema().clone(), rows.episodes.take())
             .expect("the row is built by its own schema");
-        match compare::rows(&recorded.row, &played) {
-            None => Ok(Replayed {
+        match compare::first_row_difference(&recorded.row, &played) {
+            None => Ok(ReplayedEpisode {
                 outcome,
                 steps: std::mem::take(&mut rows.measured),
                 host_noise_reruns,
             }),
-            Some(cell) => Err(in_row(recorded, &cell.field, cell.recorded, cell.expected)),
+            Some(cell) => Err(row_difference(recorded, &cell.field, cell.recorded, cell.expected)),
         }
     }
 
-    fn at_step(&self, step: u32, field: &str, recorded: String, expected: String) -> Difference {
+    fn step_difference(&self, step: u32, field: &str, recorded: String, expected: String) -> Difference {
         Difference {
             file: STEPS_FILE,
             task: Some(self.recorded.task),
@@ -277,47 +277,47 @@ impl Again<'_> {
     }
 }
 
-/// The answers of the agent that its row holds.
-fn given(recorded: &Recorded) -> Result<Given, Difference> {
+/// Reads interpolation and fault of the agent from the episode's row.
+fn read_inputs(recorded: &RecordedEpisode) -> Result<RecordedInputs, Difference> {
     let columns = Columns(&recorded.row);
     let fault = columns
         .text("fault", 0)
         .map(serde_json::from_str::<AgentFault>)
         .transpose()
-        .map_err(|error| in_row(recorded, "fault", error.to_string(), "a fault as JSON"))?;
+        .map_err(|error| row_difference(recorded, "fault", error.to_string(), "a fault as JSON"))?;
     let interpolation = match columns.text("interpolation", 0) {
         None => None,
         Some(text) => {
             let expected = "1 to 5, -1 or null";
             Some(
                 interpolation_text::parse(text)
-                    .ok_or_else(|| in_row(recorded, "interpolation", text, expected))?,
+                    .ok_or_else(|| row_difference(recorded, "interpolation", text, expected))?,
             )
         }
     };
     let started = fault.as_ref().is_none_or(|fault| fault.episode.is_some());
     if started != interpolation.is_some() {
         let expected = if started {
-            "the agent's, which had started"
+            "the agent's interpolation: the agent had started"
         } else {
             "nothing: the agent had not started"
         };
         let text = columns.text("interpolation", 0).unwrap_or("nothing");
-        return Err(in_row(recorded, "interpolation", text, expected));
+        return Err(row_difference(recorded, "interpolation", text, expected));
     }
-    Ok(Given {
+    Ok(RecordedInputs {
         interpolation,
         fault,
     })
 }
 
-fn in_row(
-    recorded: &Recorded,
+fn row_difference(
+    recorded: &RecordedEpisode,
     field: &str,
     found: impl Into<String>,
     expected: impl Into<String>,
 ) -> Difference {
-    let Recorded { task, episode, .. } = recorded;
+    let RecordedEpisode { task, episode, .. } = recorded;
     Difference {
         file: EPISODES_FILE,
         task: Some(*task),

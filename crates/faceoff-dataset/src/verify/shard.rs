@@ -1,6 +1,6 @@
-//! Verifies what a shard has recorded before anything is made of it.
+//! Verifies the recording of a shard before it is accepted.
 
-use super::{difference::Difference, error::VerifyError, feed::Feed, replay::Replay};
+use super::{difference::Difference, error::VerifyError, episode_reader::EpisodeReader, replay::Replayer};
 use crate::{
     dataset::Columns,
     error::{DatasetError, RecordingError},
@@ -13,16 +13,16 @@ use faceoff_types::EpisodeOutcome;
 use faceoff_wire::job::ShardSpec;
 use std::path::Path;
 
-/// Reads the recording of a shard in the folder `dir`, and simulates the episodes of `sample` again: every number of theirs must be what
-/// the simulation gives, bit for bit. All others must be there, whole, in order, and end as `outcomes` say. Of the recording, `spec` is what
-/// was ordered.
+/// Reads the recording of a shard in the folder `dir`, and simulates the episodes of `sample` again: all their numbers
+/// must equal the simulation, bit for bit. All other episodes must be complete, in order, and end as in `outcomes`.
+/// `spec` is the specification of the shard's job.
 ///
-/// What only an agent could tell is believed: its actions, times and faults. So a recording that somebody made up of another agent's actions
-/// is not found out by this.
+/// Inputs from the agent are trusted: its actions, times and faults. This does not detect a recording with another
+/// agent's actions.
 ///
 /// # Errors
 /// [`VerifyError::Differs`] with the first difference; [`VerifyError::Recording`] and [`VerifyError::Dataset`] if it is damaged,
-/// incomplete, or not of this order.
+/// incomplete, or of another job.
 pub fn verify_shard(
     dir: &Path,
     spec: &ShardSpec,
@@ -30,12 +30,12 @@ pub fn verify_shard(
     sample: &[u32],
 ) -> Result<(), VerifyError> {
     let recording = ShardRecording::open(dir)?;
-    let unusable = |what: &str| RecordingError::Unusable(what.to_owned());
+    let unusable = |problem: &str| RecordingError::Unusable(problem.to_owned());
     if recording.spec != *spec {
-        return Err(unusable("the recording is of other episodes than the order").into());
+        return Err(unusable("the recording has other episodes than the job").into());
     }
     if recording.report.outcomes != outcomes {
-        return Err(unusable("the recording and the report tell of other outcomes").into());
+        return Err(unusable("the recording and the report have different outcomes").into());
     }
     let arena = Arena::with_ruleset(
         spec.ruleset,
@@ -44,27 +44,27 @@ pub fn verify_shard(
         spec.seed,
         spec.mismatch_seed,
     );
-    let replay = Replay::new(spec.ruleset, arena);
+    let replay = Replayer::new(spec.ruleset, arena);
     let (episodes, steps) = (recording.episodes.path(), recording.steps.path());
-    let mut feed = Feed::of_shard(spec, outcomes.len(), episodes, steps)?;
+    let mut reader = EpisodeReader::open_shard(spec, outcomes.len(), episodes, steps)?;
     for outcome in outcomes {
         // One at a time: the steps of a whole shard need not be in memory.
-        let read = feed.next_episodes(1);
-        read.then?;
-        let Some(recorded) = read.read.first() else {
+        let batch = reader.next_episodes(1);
+        batch.result?;
+        let Some(recorded) = batch.episodes.first() else {
             return Err(unusable("the recording lacks an episode").into());
         };
-        ended_so(&recorded.row, outcome)?;
+        check_outcome(&recorded.row, outcome)?;
         if sample.contains(&outcome.episode) {
             replay.episode(recorded)?;
         }
     }
-    // Nothing may follow.
-    feed.next_episodes(1).then
+    // No episode may follow.
+    reader.next_episodes(1).result
 }
 
-/// Does an episode's row tell of this outcome? Its times are the steps' to tell.
-fn ended_so(row: &RecordBatch, outcome: &EpisodeOutcome) -> Result<(), VerifyError> {
+/// Compares an episode's row with the reported outcome, without its times, which follow from the steps.
+fn check_outcome(row: &RecordBatch, outcome: &EpisodeOutcome) -> Result<(), VerifyError> {
     let recorded = Columns(row).record(0);
     let mut recorded = recorded
         .map_err(DatasetError::unreadable(EPISODES_FILE))?

@@ -1,4 +1,4 @@
-use crate::played::{Agent, Evaluation, holding, json, moving, play, spec, table, unzip};
+use crate::recordings::{Agent, Evaluation, hold_still, json, swing_arm, play, spec, table, unzip};
 use arrow_array::{StringArray, cast::AsArray, types::Int64Type};
 use faceoff_dataset::RecordingError;
 use faceoff_scoring::StepTimes;
@@ -41,12 +41,12 @@ fn refused(evaluation: &Evaluation, needle: &str) {
 }
 
 #[test]
-fn the_dataset_is_whole_and_its_score_is_the_direct_one() {
-    let mut evaluation = two_tasks(moving);
+fn dataset_is_complete_and_has_the_direct_score() {
+    let mut evaluation = two_tasks(swing_arm);
     let (one, archive) = evaluation.assemble("one.zip").unwrap();
     let result = one.result.clone();
 
-    // The shards' order does not matter, and nothing depends on the time of day.
+    // Neither the shards' order nor the time has an effect.
     evaluation.shards.reverse();
     let (again, second) = evaluation.assemble("two.zip").unwrap();
     assert_eq!(one, again);
@@ -201,8 +201,8 @@ fn violations_name_episode_and_step() {
 }
 
 #[test]
-fn what_is_missing_twice_or_foreign_is_refused() {
-    let mut evaluation = two_tasks(holding);
+fn missing_repeated_and_foreign_shards_are_refused() {
+    let mut evaluation = two_tasks(hold_still);
     let whole = evaluation.shards.clone();
     evaluation.shards.remove(2);
     refused(
@@ -230,8 +230,8 @@ fn what_is_missing_twice_or_foreign_is_refused() {
 }
 
 #[test]
-fn damaged_recordings_are_found() {
-    let evaluation = two_tasks(holding);
+fn damaged_shards_are_refused() {
+    let evaluation = two_tasks(hold_still);
     let shard = &evaluation.shards[1];
     for name in [
         "steps.parquet",
@@ -263,8 +263,8 @@ fn damaged_recordings_are_found() {
 }
 
 #[test]
-fn an_evaluation_stopped_by_faults_has_no_score() {
-    let evaluation = two_tasks(holding);
+fn evaluation_stopped_by_faults_has_no_score() {
+    let evaluation = two_tasks(hold_still);
     let quits: Agent = |turn| turn.step.is_none().then_some([turn.held, [0.0; 7]]);
     play(
         &spec(Task::Prepare, 0..4),
@@ -275,8 +275,8 @@ fn an_evaluation_stopped_by_faults_has_no_score() {
 }
 
 #[test]
-fn the_archive_is_read_by_others() {
-    let evaluation = two_tasks(holding);
+fn results_json_has_the_documented_fields() {
+    let evaluation = two_tasks(hold_still);
     let (_, archive) = evaluation.assemble("one.zip").unwrap();
     let mut text = String::new();
     let mut zip = ZipArchive::new(File::open(archive).unwrap()).unwrap();

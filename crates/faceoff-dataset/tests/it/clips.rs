@@ -1,6 +1,6 @@
-//! What replays are drawn from, against the dataset that was recorded with it.
+//! Compares the clips for replays with the dataset that was recorded with them.
 
-use crate::played::{Evaluation, moving};
+use crate::recordings::{Evaluation, swing_arm};
 use arrow_array::{Array, Int64Array, cast::AsArray, types::Float64Type};
 use faceoff_dataset::{Dataset, assemble};
 use faceoff_replay::{Clip, ContactWith, Group, Key, Pack};
@@ -14,20 +14,20 @@ const SHARDS: [(Task, std::ops::Range<u32>); 4] = [
     (Task::Prepare, 0..2),
 ];
 
-struct Made {
+struct Fixture {
     evaluation: Evaluation,
     dataset: Dataset,
     clips: PathBuf,
     pack: Pack,
 }
 
-fn made(name: &str) -> Made {
-    let evaluation = Evaluation::play(Some(moving), &SHARDS);
+fn fixture(name: &str) -> Fixture {
+    let evaluation = Evaluation::play(Some(swing_arm), &SHARDS);
     let clips = evaluation.dir.path().join(name);
     let archive = evaluation.archive();
-    let made = assemble(&evaluation.meta, &evaluation.shards, &archive, Some(&clips));
-    assert!(made.unwrap().clips);
-    Made {
+    let fixture = assemble(&evaluation.meta, &evaluation.shards, &archive, Some(&clips));
+    assert!(fixture.unwrap().clips);
+    Fixture {
         dataset: Dataset::open(&archive).unwrap(),
         pack: Pack::open(&clips).unwrap(),
         evaluation,
@@ -40,14 +40,14 @@ fn clip(pack: &Pack, key: Key) -> Clip {
 }
 
 #[test]
-fn samples_are_the_datasets_to_their_resolution() {
-    let made = made("clips");
-    for report in &made.evaluation.reports {
+fn samples_match_the_dataset_within_their_resolution() {
+    let fixture = fixture("clips");
+    for report in &fixture.evaluation.reports {
         for outcome in &report.outcomes {
             let (task, episode) = (outcome.task, outcome.episode);
-            let rows = made.dataset.episode(task, episode, None).unwrap();
-            let motion = clip(&made.pack, Key::motion(task, episode));
-            let observed = clip(&made.pack, Key::observed(task, episode));
+            let rows = fixture.dataset.episode(task, episode, None).unwrap();
+            let motion = clip(&fixture.pack, Key::motion(task, episode));
+            let observed = clip(&fixture.pack, Key::observed(task, episode));
             assert_eq!(motion.header.samples, outcome.steps + 1);
             assert_eq!(motion.column("opponent_q_1").is_some(), task == Task::Hit);
             let mut compared = 0;
@@ -55,7 +55,7 @@ fn samples_are_the_datasets_to_their_resolution() {
             for column in motion.columns.iter().chain(&observed.columns) {
                 let name = column.name.as_str();
                 let (expected, skip): (Vec<f64>, usize) = match name {
-                    // What the agent was told before each step; the last one follows the last step.
+                    // Observations before each step; the last sample follows the last step.
                     "seen_x" => (float("obs_puck_x").iter().map(|x| x - 1.51).collect(), 0),
                     "seen_y" => (float("obs_puck_y"), 0),
                     "seen_yaw" => (float("obs_puck_yaw"), 0),
@@ -69,15 +69,15 @@ fn samples_are_the_datasets_to_their_resolution() {
                     _ if name.starts_with("command_") => {
                         let joint: usize = name["command_".len()..].parse().unwrap();
                         let actions = rows["action"].as_list::<i32>();
-                        let asked = (0..actions.len()).map(|row| {
+                        let commanded = (0..actions.len()).map(|row| {
                             actions
                                 .value(row)
                                 .as_primitive::<Float64Type>()
                                 .value(joint - 1)
                         });
-                        (asked.collect(), 0)
+                        (commanded.collect(), 0)
                     }
-                    // The states after the steps, behind the initial one.
+                    // The states after the steps; the first sample is the initial state.
                     _ => (float(name), 1),
                 };
                 let found: Vec<f64> = column.values().skip(skip).collect();
@@ -100,12 +100,12 @@ fn samples_are_the_datasets_to_their_resolution() {
 }
 
 #[test]
-fn contacts_lie_on_the_way_between_the_samples() {
-    let made = made("clips");
-    let mut with = Vec::new();
+fn contacts_are_near_the_neighbouring_samples() {
+    let fixture = fixture("clips");
+    let mut bodies = Vec::new();
     for (task, range) in SHARDS {
         for episode in range {
-            let motion = clip(&made.pack, Key::motion(task, episode));
+            let motion = clip(&fixture.pack, Key::motion(task, episode));
             let places: Vec<[f64; 2]> = {
                 let column = |name: &str| motion.column(name).unwrap().values();
                 column("puck_x")
@@ -119,43 +119,43 @@ fn contacts_lie_on_the_way_between_the_samples() {
                     let distance = (x - contact.x).hypot(y - contact.y);
                     assert!(
                         distance < 0.1,
-                        "{task} {episode}: {contact:?} is {distance} m from a sample beside it"
+                        "{task} {episode}: {contact:?} is {distance} m from a neighbouring sample"
                     );
                 }
                 if contact.what == ContactWith::Rim {
                     let at_rim = contact.y.abs() > 0.45 || contact.x.abs() > 0.9;
                     assert!(at_rim, "{contact:?}");
                 }
-                with.push(contact.what);
+                bodies.push(contact.what);
             }
             assert!(motion.header.contacts.is_sorted_by(|a, b| a.t <= b.t));
         }
     }
-    assert!(with.contains(&ContactWith::Rim), "{with:?}");
-    assert!(with.contains(&ContactWith::Mallet), "{with:?}");
+    assert!(bodies.contains(&ContactWith::Rim), "{bodies:?}");
+    assert!(bodies.contains(&ContactWith::Mallet), "{bodies:?}");
 }
 
 #[test]
-fn the_sheet_has_a_line_for_each_episode_that_says_what_the_dataset_says() {
-    let made = made("clips");
-    let sheet = made.pack.clip_index().unwrap();
-    let outcomes: Vec<_> = made
+fn clip_index_matches_the_dataset_for_each_episode() {
+    let fixture = fixture("clips");
+    let index = fixture.pack.clip_index().unwrap();
+    let outcomes: Vec<_> = fixture
         .evaluation
         .reports
         .iter()
         .flat_map(|report| &report.outcomes)
         .collect();
-    assert_eq!(sheet.episodes.len(), outcomes.len());
-    let violations = made.dataset.violations().unwrap();
+    assert_eq!(index.episodes.len(), outcomes.len());
+    let violations = fixture.dataset.violations().unwrap();
     let mut broken = 0;
     for outcome in &outcomes {
-        let line = sheet.line(outcome.task, outcome.episode).unwrap();
+        let line = index.line(outcome.task, outcome.episode).unwrap();
         assert_eq!(
             (line.steps, line.success, line.end),
             (outcome.steps, outcome.success, outcome.end)
         );
         assert!(!line.why.is_empty());
-        let motion = clip(&made.pack, Key::motion(outcome.task, outcome.episode));
+        let motion = clip(&fixture.pack, Key::motion(outcome.task, outcome.episode));
         assert_eq!(motion.header.end.unwrap().why, line.why);
         let of_task = &violations.tasks[&outcome.task];
         for (group, recorded) in [
@@ -165,21 +165,21 @@ fn the_sheet_has_a_line_for_each_episode_that_says_what_the_dataset_says() {
             (Group::JointVel, &of_task.joint_vel),
         ] {
             let recorded = recorded.iter().find(|one| one.episode == outcome.episode);
-            let told = line.broken.iter().find(|broken| broken.group == group);
-            match (recorded, told) {
+            let found = line.broken.iter().find(|broken| broken.group == group);
+            match (recorded, found) {
                 (None, None) => {}
-                (Some(recorded), Some(told)) => {
-                    assert_eq!(told.from, recorded.first_step + 1);
-                    assert_eq!(told.samples, recorded.steps);
-                    assert_eq!(told.worst, recorded.max);
+                (Some(recorded), Some(found)) => {
+                    assert_eq!(found.from, recorded.first_step + 1);
+                    assert_eq!(found.samples, recorded.steps);
+                    assert_eq!(found.worst, recorded.max);
                     broken += 1;
                 }
-                (recorded, told) => panic!("{group:?}: {recorded:?} but {told:?}"),
+                (recorded, found) => panic!("{group:?}: {recorded:?} but {found:?}"),
             }
         }
     }
-    assert!(broken > 0, "something was broken");
-    for (task, times) in &sheet.times {
+    assert!(broken > 0, "no violation in the recording");
+    for (task, times) in &index.times {
         let steps: u32 = outcomes
             .iter()
             .filter(|outcome| outcome.task == *task)
@@ -191,48 +191,48 @@ fn the_sheet_has_a_line_for_each_episode_that_says_what_the_dataset_says() {
 }
 
 #[test]
-fn clips_take_at_most_a_quarter_of_the_dataset() {
-    let made = made("clips");
-    let of_dataset = std::fs::metadata(made.evaluation.archive()).unwrap().len();
-    let of_clips = std::fs::metadata(&made.clips).unwrap().len();
+fn clips_are_at_most_a_quarter_of_the_dataset_size() {
+    let fixture = fixture("clips");
+    let dataset_bytes = std::fs::metadata(fixture.evaluation.archive()).unwrap().len();
+    let clips_bytes = std::fs::metadata(&fixture.clips).unwrap().len();
     assert!(
-        4 * of_clips <= of_dataset,
-        "clips {of_clips} bytes, dataset {of_dataset}"
+        4 * clips_bytes <= dataset_bytes,
+        "clips {clips_bytes} bytes, dataset {dataset_bytes}"
     );
 }
 
 #[test]
-fn the_same_shards_give_the_same_bytes_in_any_order() {
-    let mut made = made("clips");
-    let again = made.evaluation.dir.path().join("again");
-    made.evaluation.shards.reverse();
+fn clips_are_the_same_bytes_for_any_order_of_shards() {
+    let mut fixture = fixture("clips");
+    let again = fixture.evaluation.dir.path().join("again");
+    fixture.evaluation.shards.reverse();
     assemble(
-        &made.evaluation.meta,
-        &made.evaluation.shards,
-        &made.evaluation.archive(),
+        &fixture.evaluation.meta,
+        &fixture.evaluation.shards,
+        &fixture.evaluation.archive(),
         Some(&again),
     )
     .unwrap();
-    assert!(std::fs::read(&made.clips).unwrap() == std::fs::read(again).unwrap());
+    assert!(std::fs::read(&fixture.clips).unwrap() == std::fs::read(again).unwrap());
 }
 
 #[test]
-fn a_pack_that_is_cut_or_overwritten_is_refused() {
-    let made = made("clips");
-    let bytes = std::fs::read(&made.clips).unwrap();
-    let path = made.evaluation.dir.path().join("damaged");
+fn truncated_or_overwritten_pack_is_refused() {
+    let fixture = fixture("clips");
+    let bytes = std::fs::read(&fixture.clips).unwrap();
+    let path = fixture.evaluation.dir.path().join("damaged");
     let refused = |bytes: &[u8]| {
         std::fs::write(&path, bytes).unwrap();
         Pack::open(&path).err().map(|error| error.to_string())
     };
     for length in [0, 10, 31, bytes.len() / 2, bytes.len() - 1] {
-        let why = refused(&bytes[..length]).expect("it is cut off");
-        assert!(why.contains("cut off"), "{why}");
+        let message = refused(&bytes[..length]).expect("it is cut off");
+        assert!(message.contains("cut off"), "{message}");
     }
     let mut other = bytes.clone();
     other[0] ^= 1;
     assert!(refused(&other).unwrap().contains("does not begin as one"));
-    // The last clip's place, in the index.
+    // The last clip's offset, in the index.
     let mut other = bytes.clone();
     let place = bytes.len() - 16 - 12;
     other[place + 4] = 0xff;
@@ -244,13 +244,13 @@ fn a_pack_that_is_cut_or_overwritten_is_refused() {
     std::fs::write(&path, &other).unwrap();
     let pack = Pack::open(&path).unwrap();
     let first = pack.clip(Key::motion(Task::Hit, 0)).unwrap().unwrap();
-    let why = Clip::read(&first).unwrap_err().to_string();
-    assert!(why.contains("is no clip"), "{why}");
+    let message = Clip::read(&first).unwrap_err().to_string();
+    assert!(message.contains("is no clip"), "{message}");
 }
 
 #[test]
-fn shards_of_the_layout_before_are_joined_without_clips() {
-    let evaluation = Evaluation::play(Some(moving), &[(Task::Prepare, 0..2)]);
+fn shards_of_the_previous_layout_have_no_clips() {
+    let evaluation = Evaluation::play(Some(swing_arm), &[(Task::Prepare, 0..2)]);
     let shard = &evaluation.shards[0];
     std::fs::remove_file(shard.join("clips")).unwrap();
     let path = shard.join("shard.json");
@@ -260,13 +260,13 @@ fn shards_of_the_layout_before_are_joined_without_clips() {
     file["files"].as_object_mut().unwrap().remove("clips");
     std::fs::write(&path, file.to_string()).unwrap();
     let clips = evaluation.dir.path().join("clips");
-    let made = assemble(
+    let fixture = assemble(
         &evaluation.meta,
         &evaluation.shards,
         &evaluation.archive(),
         Some(&clips),
     )
     .unwrap();
-    assert!(!made.clips);
+    assert!(!fixture.clips);
     assert!(!clips.exists());
 }

@@ -1,6 +1,6 @@
-//! A recording changed in one place and made to look whole again.
+//! Recordings with one changed value and matching hashes.
 
-use crate::played::table;
+use crate::recordings::table;
 use arrow_array::{
     Array, ArrayRef, BooleanArray, Float64Array, Int64Array, ListArray, RecordBatch, StringArray,
     UInt32Array,
@@ -16,7 +16,7 @@ use std::{
 };
 use tempfile::TempDir;
 
-/// A copy of the recording that a forger changes.
+/// A copy of a recording for forgery.
 pub struct Forgery {
     pub dir: TempDir,
 }
@@ -52,10 +52,10 @@ impl Forgery {
         fs::write(&path, text.replacen(from, to, 1)).unwrap();
     }
 
-    /// Makes the manifest's sizes and hashes those of the files.
+    /// Updates the manifest's sizes and hashes.
     pub fn reseal(self) -> Self {
         let path = self.path("manifest.json");
-        // Of whatever layout.
+        // Works for any layout.
         let mut manifest: serde_json::Value =
             serde_json::from_slice(&fs::read(&path).unwrap()).unwrap();
         for (name, digest) in manifest["files"].as_object_mut().unwrap() {
@@ -138,7 +138,7 @@ fn flip(column: &ArrayRef, row: usize) -> ArrayRef {
     }
 }
 
-/// The table with one value changed; without nullability, which a forger may ignore.
+/// The table with one value changed, and with nullable columns, since a forger may ignore nullability.
 pub fn flipped(batch: &RecordBatch, name: &str, row: usize) -> RecordBatch {
     let schema = batch.schema();
     let (index, _) = schema.column_with_name(name).unwrap();
@@ -152,9 +152,9 @@ pub fn flipped(batch: &RecordBatch, name: &str, row: usize) -> RecordBatch {
     RecordBatch::try_new(Arc::new(arrow_schema::Schema::new(fields)), columns).unwrap()
 }
 
-/// One batch of several.
+/// Concatenates batches.
 pub fn concat(parts: &[RecordBatch]) -> RecordBatch {
-    // Through a file, as a forger would.
+    // Through a file, like a forger.
     let file = tempfile::NamedTempFile::new().unwrap();
     let mut writer = ArrowWriter::try_new(file.reopen().unwrap(), parts[0].schema(), None).unwrap();
     for part in parts {

@@ -1,8 +1,8 @@
-//! Recordings of games: verified, forged, damaged.
+//! Verification of recorded games, forged games and damaged ones.
 
 use crate::{
     forgery::{Forgery, flipped},
-    played::table,
+    recordings::table,
 };
 use arrow_array::{Array, RecordBatch, cast::AsArray, types::Float64Type};
 use faceoff_dataset::{
@@ -38,23 +38,23 @@ fn spec() -> GameSpec {
     }
 }
 
-/// Plays a game in which all happens that a recording must tell: answers late and in time, a fault at a step,
-/// one at a reset, one at a start, and another interpolation after a restart.
+/// Records a game with all recorded cases: answers late and in time, a fault at a step, at a reset and at a start, and
+/// another interpolation after a restart.
 fn record(out: &Path) {
     let spec = spec();
     let arena = Arena::new(spec.profile, spec.seed, spec.mismatch_seed);
     let recorder = GameRecorder::create(&out.join("tables")).unwrap();
-    let mut course = RunningGame::begin(&arena, spec.steps, spec.limits.clone(), recorder);
+    let mut game = RunningGame::begin(&arena, spec.steps, spec.limits.clone(), recorder);
     let fault = |detail: &str| SideFault {
         kind: AgentFaultKind::NotJson {
             detail: detail.to_owned(),
         },
         line: Some("oops".to_owned()),
     };
-    while course.end().is_none() {
-        let rally = course.rally();
+    while game.end().is_none() {
+        let rally = game.rally();
         let entries = Side::BOTH.map(|side| {
-            let startup_s = course.needs_start(side).then_some(0.25);
+            let startup_s = game.needs_start(side).then_some(0.25);
             let interpolation = match (rally, side) {
                 (0, _) => Interpolation::Cubic,
                 _ => Interpolation::Linear,
@@ -78,11 +78,11 @@ fn record(out: &Path) {
             }
         });
         let interpolations = entries.each_ref().map(RallyEntry::interpolation);
-        course.start_rally(entries).unwrap();
-        while course.is_in_rally() {
-            let step = course.rally_steps();
+        game.start_rally(entries).unwrap();
+        while game.is_in_rally() {
+            let step = game.rally_steps();
             let actions = Side::BOTH.map(|side| {
-                let question = course.question(side).unwrap()?;
+                let question = game.question(side).unwrap()?;
                 let mut held: [f64; 7] = question.observation[6..13].try_into().unwrap();
                 held[0] += 0.001 * f64::from(step % 30);
                 let interpolation = interpolations[side.index()].unwrap();
@@ -94,7 +94,7 @@ fn record(out: &Path) {
                 } else {
                     0.001953125
                 };
-                let answered = AnswerTiming {
+                let timing = AnswerTiming {
                     computation_time_s,
                     host_time_s: 0.0,
                     cpu_time_s: None,
@@ -107,13 +107,13 @@ fn record(out: &Path) {
                     {
                         Response::Fault {
                             fault: fault("step"),
-                            timing: answered,
+                            timing,
                         }
                     }
-                    Some(action) => Response::Answer { action, timing: answered },
+                    Some(action) => Response::Answer { action, timing },
                 }
             });
-            course.answer(responses).unwrap();
+            game.answer(responses).unwrap();
         }
     }
     let calibration = GameCalibration {
@@ -122,7 +122,7 @@ fn record(out: &Path) {
     let recorded = RecordedGame {
         spec: &spec,
         agents: &["one".to_owned(), "other".to_owned()],
-        played: course.finish(),
+        finished: game.finish(),
         calibration,
         logs: &["log of one\n".to_owned(), "log of the other\n".to_owned()],
     };
@@ -146,7 +146,7 @@ fn verify(path: &Path) -> Result<u32, String> {
 }
 
 #[test]
-fn a_recording_verifies_packed_and_unpacked_and_the_same_game_gives_the_same_bytes() {
+fn recording_verifies_and_is_reproducible() {
     let (out, unpacked) = recorded();
     assert_eq!(verify(&out.path().join(GAME_FILE)), Ok(STEPS));
     assert_eq!(verify(out.path()), Ok(STEPS));
@@ -174,9 +174,9 @@ fn games_of_the_second_ruleset_verify() {
     assert_eq!(verify(earlier.reseal().dir.path()), Ok(STEPS));
 }
 
-/// A forger who also states the hashes anew is found out by what the simulation gives.
+/// Forgeries with updated hashes differ from the simulation.
 #[test]
-fn every_column_that_a_forger_touches_is_found() {
+fn forged_value_in_any_column_is_found() {
     let (_out, unpacked) = recorded();
     for (name, row) in [
         ("motion.parquet", 20),
@@ -184,14 +184,14 @@ fn every_column_that_a_forger_touches_is_found() {
         ("rallies.parquet", 1),
         ("entries-2.parquet", 1),
     ] {
-        let columns: Vec<String> = crate::played::table(&unpacked.path().join(name))
+        let columns: Vec<String> = crate::recordings::table(&unpacked.path().join(name))
             .schema()
             .fields()
             .iter()
             .map(|field| field.name().clone())
             .collect();
         for column in columns {
-            // Nothing follows from what the host took or from a CPU's time, and no times but these are null here.
+            // No other number follows from host interference or CPU time.
             if ["host_time_ns", "cpu_time_ns"].contains(&column.as_str()) {
                 continue;
             }
@@ -204,52 +204,52 @@ fn every_column_that_a_forger_touches_is_found() {
                 changed
             });
             if same {
-                // There is no value in this row.
+                // The row has no value in this column.
                 continue;
             }
             let found = verify(forged.reseal().dir.path());
-            let words = found.expect_err(&format!("{name}, {column}"));
-            assert!(!words.is_empty(), "{name}, {column}");
+            let message = found.expect_err(&format!("{name}, {column}"));
+            assert!(!message.is_empty(), "{name}, {column}");
         }
     }
 }
 
 #[test]
-fn the_words_say_where_and_what() {
+fn difference_names_location_and_field() {
     let (_out, unpacked) = recorded();
-    let said = |name: &str, change: fn(RecordBatch) -> RecordBatch| {
+    let error_of = |name: &str, change: fn(RecordBatch) -> RecordBatch| {
         let forged = Forgery::of(unpacked.path());
         forged.table(name, change);
         verify(forged.reseal().dir.path()).unwrap_err()
     };
-    let words = said("motion.parquet", |batch| flipped(&batch, "puck_x", 30));
+    let message = error_of("motion.parquet", |batch| flipped(&batch, "puck_x", 30));
     assert!(
-        words.starts_with("motion.parquet, rally 0, step 30, puck_x: recorded"),
-        "{words}"
+        message.starts_with("motion.parquet, rally 0, step 30, puck_x: recorded"),
+        "{message}"
     );
-    let words = said("motion.parquet", |batch| batch.slice(0, 100));
-    assert!(words.contains("rally 0, step 100, rows"), "{words}");
-    let words = said("rallies.parquet", |batch| batch.slice(0, 1));
-    assert!(words.contains("the game has not ended"), "{words}");
-    let words = said("entries-1.parquet", |batch| batch.slice(0, 1));
+    let message = error_of("motion.parquet", |batch| batch.slice(0, 100));
+    assert!(message.contains("rally 0, step 100, rows"), "{message}");
+    let message = error_of("rallies.parquet", |batch| batch.slice(0, 1));
+    assert!(message.contains("the game has not ended"), "{message}");
+    let message = error_of("entries-1.parquet", |batch| batch.slice(0, 1));
     assert!(
-        words.contains("entries-1.parquet, rally 1, rows"),
-        "{words}"
+        message.contains("entries-1.parquet, rally 1, rows"),
+        "{message}"
     );
 
     let forged = Forgery::of(unpacked.path());
     forged.text("results.json", "\"goals\": 0", "\"goals\": 7");
-    let words = verify(forged.reseal().dir.path()).unwrap_err();
-    assert!(words.contains("results.json, sides[0].goals"), "{words}");
+    let message = verify(forged.reseal().dir.path()).unwrap_err();
+    assert!(message.contains("results.json, sides[0].goals"), "{message}");
     let forged = Forgery::of(unpacked.path());
     let seed = spec().seed.to_string();
     forged.text("manifest.json", &seed, &Seed::from_number(12).to_string());
-    let words = verify(forged.dir.path()).unwrap_err();
-    assert!(words.contains("rally 0"), "{words}");
+    let message = verify(forged.dir.path()).unwrap_err();
+    assert!(message.contains("rally 0"), "{message}");
 }
 
 #[test]
-fn what_is_damaged_is_told_apart_from_what_is_foreign() {
+fn damaged_and_foreign_recordings_have_different_errors() {
     let (out, unpacked) = recorded();
     let archive = out.path().join(GAME_FILE);
     let whole = fs::read(&archive).unwrap();
@@ -263,12 +263,12 @@ fn what_is_damaged_is_told_apart_from_what_is_foreign() {
     let altered = GameRecording::open(forged.dir.path()).unwrap_err();
     assert!(matches!(altered, DatasetError::Altered(_)));
     assert!(altered.to_string().contains("agent-1.log"), "{altered}");
-    for (from, to, words) in [
+    for (from, to, expected) in [
         ("faceoff-game/1", "faceoff-game/9", "this version reads"),
         (
             "airhockey-2023.3",
             "airhockey-2023.1",
-            "games are played by airhockey-2023.2 and airhockey-2023.3 alone",
+            "only airhockey-2023.2 and airhockey-2023.3 have games",
         ),
         (
             "airhockey-2023.3",
@@ -278,30 +278,30 @@ fn what_is_damaged_is_told_apart_from_what_is_foreign() {
     ] {
         let forged = Forgery::of(unpacked.path());
         forged.text("manifest.json", from, to);
-        let said = verify(forged.dir.path()).unwrap_err();
-        assert!(said.contains(words), "{said}");
+        let message = verify(forged.dir.path()).unwrap_err();
+        assert!(message.contains(expected), "{message}");
     }
     let side = GameRecording::open(&out.path().join(side_file(Side::Second))).unwrap_err();
     assert!(matches!(side, DatasetError::Foreign(_)));
-    let nothing = tempfile::tempdir().unwrap();
-    assert!(!GameRecording::is_at(nothing.path()).unwrap());
+    let empty = tempfile::tempdir().unwrap();
+    assert!(!GameRecording::is_at(empty.path()).unwrap());
     for name in [GAME_FILE, "dataset.zip"] {
-        fs::write(nothing.path().join(name), "").unwrap();
+        fs::write(empty.path().join(name), "").unwrap();
     }
-    let both = GameRecording::is_at(nothing.path())
+    let both = GameRecording::is_at(empty.path())
         .unwrap_err()
         .to_string();
-    assert!(both.contains("name one of them"), "{both}");
+    assert!(both.contains("pass one of them"), "{both}");
 }
 
 #[test]
-fn clips_of_a_game_are_its_motion_part_by_part() {
+fn clips_of_a_game_match_its_motion() {
     let (out, unpacked) = recorded();
     let pack = Pack::open(&out.path().join("clips")).unwrap();
     let motion = table(&unpacked.path().join("motion.parquet"));
     let float = |name: &str| motion[name].as_primitive::<Float64Type>().values().to_vec();
     let mut score = [0, 0];
-    let mut last_of_before: Option<f64> = None;
+    let mut previous_last: Option<f64> = None;
     let mut rallies = 0;
     for chunk in 0..STEPS.div_ceil(CHUNK_STEPS) {
         let clip = pack.clip(Key::game_motion(chunk)).unwrap().unwrap();
@@ -319,17 +319,17 @@ fn clips_of_a_game_are_its_motion_part_by_part() {
         ] {
             let column = clip.column(column).unwrap();
             let recorded = &float(recorded)[first as usize..(first + samples - 1) as usize];
-            // Behind the sample that the part begins with.
+            // After the first sample of the chunk.
             for (found, expected) in column.values().skip(1).zip(recorded) {
                 let difference = (found - expected).abs();
                 assert!(difference <= 0.5001 * column.scale, "{}", column.name);
             }
         }
-        let places: Vec<f64> = clip.column("puck_x").unwrap().values().collect();
-        if let Some(last) = last_of_before {
-            assert_eq!(places[0], last, "a part begins where the one before ends");
+        let positions: Vec<f64> = clip.column("puck_x").unwrap().values().collect();
+        if let Some(last) = previous_last {
+            assert_eq!(positions[0], last, "a chunk begins at the end of the previous one");
         }
-        last_of_before = places.last().copied();
+        previous_last = positions.last().copied();
         for one in &clip.header.breaks {
             assert!((first + 1..=first + samples).contains(&one.sample));
             score = one.score;
@@ -340,9 +340,9 @@ fn clips_of_a_game_are_its_motion_part_by_part() {
             let observed = Clip::read(&observed).unwrap();
             let times = observed.column("computation_time").unwrap();
             assert_eq!(times.counts.len(), samples as usize - 1);
-            // Each side's observation is of the table that both stand at.
+            // The clip has each side's observation in the table frame.
             let seen = observed.column("seen_x").unwrap();
-            for (seen, place) in seen.values().zip(&places) {
+            for (seen, place) in seen.values().zip(&positions) {
                 assert!(seen.abs() < 1.2, "{seen} where the puck is at {place}");
             }
         }
@@ -350,5 +350,5 @@ fn clips_of_a_game_are_its_motion_part_by_part() {
     let after = Key::game_motion(STEPS.div_ceil(CHUNK_STEPS));
     assert!(pack.clip(after).unwrap().is_none());
     let recorded = table(&unpacked.path().join("rallies.parquet"));
-    assert_eq!(rallies, recorded.num_rows(), "each rally has its end");
+    assert_eq!(rallies, recorded.num_rows(), "one end per rally");
 }

@@ -1,7 +1,7 @@
-//! What the version before left, commit e67a08c: its archives are read, and its shards joined.
+//! Data of commit e67a08c (layout 2): archives are read, and shards are joined.
 
 use crate::{
-    played::{Evaluation, fixture, play, spec, table},
+    recordings::{Evaluation, fixture, play, spec, table},
     verify::check,
 };
 use arrow_array::{RecordBatch, cast::AsArray, types::Int64Type};
@@ -17,7 +17,7 @@ use std::{fs, path::Path};
 const ARCHIVE: &str = "dataset-layout-2.zip";
 
 #[test]
-fn an_archive_is_read_and_verified() {
+fn archive_is_read_and_verified() {
     let dataset = Dataset::open(&fixture(ARCHIVE)).unwrap();
     assert_eq!(dataset.layout(), Layout::Two);
     let verified = check(&fixture(ARCHIVE), 2).unwrap();
@@ -45,7 +45,7 @@ fn an_archive_is_read_and_verified() {
             (defend, 1, 53)
         ]
     );
-    let lazily = Dataset::open_unread(&fixture(ARCHIVE)).unwrap();
+    let lazily = Dataset::open_lazily(&fixture(ARCHIVE)).unwrap();
     for (task, episode, steps) in steps {
         let rows = lazily.episode(task, episode, None).unwrap();
         assert_eq!(rows.num_rows(), steps as usize);
@@ -53,22 +53,22 @@ fn an_archive_is_read_and_verified() {
 }
 
 #[test]
-fn a_broken_seal_is_refused() {
+fn broken_seal_is_refused() {
     let good = fs::read(fixture(ARCHIVE)).unwrap();
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("dataset.zip");
     let tail = good.len() - 2048;
-    let places = (0..128)
+    let offsets = (0..128)
         .chain((128..tail).step_by(tail / 200))
         .chain(tail..good.len());
-    let flipped = places.map(|at| {
+    let flipped = offsets.map(|at| {
         let mut bytes = good.clone();
         bytes[at] ^= 1 << (at % 8);
         bytes
     });
-    let cut = [0, good.len() / 2, good.len() - 1].map(|length| good[..length].to_vec());
+    let truncated = [0, good.len() / 2, good.len() - 1].map(|length| good[..length].to_vec());
     let longer = [&good[..], b"x"].concat();
-    for (index, bytes) in flipped.chain(cut).chain([longer]).enumerate() {
+    for (index, bytes) in flipped.chain(truncated).chain([longer]).enumerate() {
         fs::write(&path, bytes).unwrap();
         let opened = Dataset::open(&path);
         assert!(
@@ -84,7 +84,7 @@ fn a_broken_seal_is_refused() {
 }
 
 #[test]
-fn a_shard_of_an_evaluation_under_way_is_joined() {
+fn shard_of_a_running_evaluation_is_joined() {
     let old = fixture("shard-layout-2");
     let text = fs::read(old.join("shard.json")).unwrap();
     let file: serde_json::Value = serde_json::from_slice(&text).unwrap();
@@ -95,14 +95,14 @@ fn a_shard_of_an_evaluation_under_way_is_joined() {
     evaluation.meta.seed = played.seed;
     evaluation.meta.mismatch_seed = played.mismatch_seed;
 
-    // One more shard, played by this version.
+    // One more shard, recorded by this version.
     let next = evaluation.dir.path().join("next");
-    let further = ShardSpec {
+    let next_spec = ShardSpec {
         episodes: played.episodes.end..played.episodes.end + 1,
         ..played.clone()
     };
-    assert_eq!(further.task, spec(Task::Defend, 0..1).task);
-    play(&further, Some(crate::played::holding), &next);
+    assert_eq!(next_spec.task, spec(Task::Defend, 0..1).task);
+    play(&next_spec, Some(crate::recordings::hold_still), &next);
     evaluation.shards = vec![old.clone(), next.clone()];
     let evaluation = evaluation.assembled();
 
@@ -114,7 +114,7 @@ fn a_shard_of_an_evaluation_under_way_is_joined() {
         table(&next.join("steps.parquet")),
     );
     let rows = first.num_rows();
-    // The host's time was not told apart then.
+    // Layout 2 did not record host interference.
     let mut old_columns = columns(&joined.slice(0, rows));
     let (_, host_times) = old_columns.remove(
         old_columns
@@ -133,18 +133,18 @@ fn a_shard_of_an_evaluation_under_way_is_joined() {
         columns(&joined.slice(rows, second.num_rows())),
         columns(&second)
     );
-    only_floats_are_split_by_bytes(&steps);
+    assert_only_floats_are_split_by_bytes(&steps);
 }
 
-/// By name; nullability and metadata apart.
+/// Columns by name, without nullability and metadata.
 fn columns(batch: &RecordBatch) -> Vec<(String, arrow_array::ArrayRef)> {
     let schema = batch.schema();
     let names = schema.fields().iter().map(|field| field.name().clone());
     names.zip(batch.columns().iter().cloned()).collect()
 }
 
-/// DuckDB and pyarrow 15 cannot read integers that are.
-fn only_floats_are_split_by_bytes(path: &Path) {
+/// DuckDB and pyarrow 15 cannot read integers that are split by bytes.
+fn assert_only_floats_are_split_by_bytes(path: &Path) {
     let reader = SerializedFileReader::new(fs::File::open(path).unwrap()).unwrap();
     for group in reader.metadata().row_groups() {
         for column in group.columns() {

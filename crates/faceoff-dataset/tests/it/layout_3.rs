@@ -1,7 +1,7 @@
-//! What commit d418cdf left: its archives do not tell what the host took, and verify all the same.
+//! Data of commit d418cdf (layout 3): archives without host interference verify.
 
 use crate::{
-    played::{fixture, table},
+    recordings::{fixture, table},
     verify::check,
 };
 use faceoff_dataset::{Dataset, Layout};
@@ -10,7 +10,7 @@ use faceoff_types::Task;
 const ARCHIVE: &str = "dataset-layout-3.zip";
 
 #[test]
-fn an_archive_is_read_and_verified() {
+fn archive_is_read_and_verified() {
     let dataset = Dataset::open(&fixture(ARCHIVE)).unwrap();
     assert_eq!(dataset.layout(), Layout::Three);
     let verified = check(&fixture(ARCHIVE), 2).unwrap();
@@ -18,7 +18,7 @@ fn an_archive_is_read_and_verified() {
     assert_eq!(verified.result, dataset.results().unwrap());
     let steps = dataset.episode(Task::Hit, 0, None).unwrap();
     assert!(steps.column_by_name("host_time_ns").is_none());
-    // Read from the first on, it is a table like today's.
+    // Read in order, the table has the current columns.
     let mut all = dataset.steps().unwrap().read(None).unwrap();
     let first = all.next_batch().unwrap().unwrap();
     let names: Vec<String> = first
@@ -27,14 +27,14 @@ fn an_archive_is_read_and_verified() {
         .iter()
         .map(|field| field.name().clone())
         .collect();
-    let ours = crate::played::Evaluation::play(Some(crate::played::holding), &[(Task::Hit, 0..1)])
+    let current = crate::recordings::Evaluation::play(Some(crate::recordings::hold_still), &[(Task::Hit, 0..1)])
         .assembled();
-    let ours = table(&ours.folder().join("steps.parquet"));
-    let todays: Vec<String> = ours
+    let current = table(&current.folder().join("steps.parquet"));
+    let current_names: Vec<String> = current
         .schema()
         .fields()
         .iter()
         .map(|field| field.name().clone())
         .collect();
-    assert_eq!(names, todays);
+    assert_eq!(names, current_names);
 }

@@ -1,12 +1,12 @@
-//! Evaluations by other weights, bounds and magnitudes than the ruleset's: recorded with the dataset, simulated and
-//! scored again by them.
+//! Evaluations with other weights, bounds and magnitudes than the ruleset's: they are recorded in the dataset, and
+//! verification uses them.
 
 use crate::{
     forgery::Forgery,
-    played::{Evaluation, json, moving},
+    recordings::{Evaluation, json, swing_arm},
     verify::check,
 };
-use faceoff_dataset::{Dataset, has_robot, verify::VerifyError};
+use faceoff_dataset::{Dataset, can_draw_plant, verify::VerifyError};
 use faceoff_types::{PerturbationSettings, Task, Variation};
 use faceoff_wire::dataset::DatasetManifest;
 use serde_json::{Value, json};
@@ -28,8 +28,8 @@ fn wild() -> Variation {
 }
 
 #[test]
-fn a_dataset_says_by_what_it_was_played_and_verifies_by_it() {
-    let played = Evaluation::play_by(wild(), Some(moving), &SHARDS).assembled();
+fn dataset_records_its_variation_and_verifies_with_it() {
+    let played = Evaluation::play_with_variation(wild(), Some(swing_arm), &SHARDS).assembled();
     let verified = check(&played.archive(), 2).unwrap();
     assert_eq!(verified.result.variation, wild());
     let dataset = Dataset::open(&played.archive()).unwrap();
@@ -47,8 +47,8 @@ fn a_dataset_says_by_what_it_was_played_and_verifies_by_it() {
     let score = 12.5 * rate(Task::Hit) + 87.5 * rate(Task::Defend);
     assert!((verified.result.score - score).abs() < 1e-9);
 
-    // The same agent on the same seeds under the ruleset's magnitudes plays another evaluation, and says nothing of them.
-    let plain = Evaluation::play(Some(moving), &SHARDS).assembled();
+    // With the ruleset's magnitudes the same agent and seeds give another evaluation, which states no variation.
+    let plain = Evaluation::play(Some(swing_arm), &SHARDS).assembled();
     assert_ne!(
         std::fs::read(plain.folder().join("steps.parquet")).unwrap(),
         std::fs::read(played.folder().join("steps.parquet")).unwrap()
@@ -60,8 +60,8 @@ fn a_dataset_says_by_what_it_was_played_and_verifies_by_it() {
 }
 
 #[test]
-fn other_magnitudes_than_those_that_were_played_are_found() {
-    let played = Evaluation::play_by(wild(), Some(moving), &SHARDS).assembled();
+fn forged_variation_is_found() {
+    let played = Evaluation::play_with_variation(wild(), Some(swing_arm), &SHARDS).assembled();
     let forged = |change: &dyn Fn(&mut Variation)| {
         let forgery = Forgery::of(&played.folder());
         let path = forgery.path("manifest.json");
@@ -83,21 +83,21 @@ fn other_magnitudes_than_those_that_were_played_are_found() {
 
 #[test]
 fn shards_of_other_magnitudes_are_not_joined() {
-    let mut played = Evaluation::play_by(wild(), Some(moving), &SHARDS);
+    let mut played = Evaluation::play_with_variation(wild(), Some(swing_arm), &SHARDS);
     *played.meta.variation.perturbations = PerturbationSettings::default();
     let refused = played.assemble("dataset.zip").unwrap_err().to_string();
     assert!(refused.contains("other magnitudes"), "{refused}");
 }
 
 #[test]
-fn ranges_that_no_robot_meets_are_known_before_anything_is_played() {
+fn unreachable_plant_ranges_are_detected_in_advance() {
     let seed = faceoff_types::Seed::from_number(7).model_mismatch();
     let mut settings = PerturbationSettings::default();
-    assert!(has_robot(&settings, seed));
-    assert!(has_robot(&wild().perturbations, seed));
+    assert!(can_draw_plant(&settings, seed));
+    assert!(can_draw_plant(&wild().perturbations, seed));
     settings.model_mismatch.static_error_m = [0.9, 1.0];
     assert!(
-        !has_robot(&settings, seed),
+        !can_draw_plant(&settings, seed),
         "an arm that sags by its own length"
     );
 }

@@ -1,8 +1,8 @@
-//! A sceptic's view: recordings forged in one place and made to look whole again.
+//! Verification of datasets: forged recordings with matching hashes are found.
 
 use crate::{
     forgery::{Forgery, concat, flipped},
-    played::{Agent, Evaluation, Turn, moving, spec, table},
+    recordings::{Agent, Evaluation, Question, swing_arm, spec, table},
 };
 use arrow_array::{
     Array, Float64Array, ListArray, RecordBatch, StringArray, UInt32Array,
@@ -12,7 +12,7 @@ use arrow_array::{
 use arrow_schema::DataType;
 use faceoff_dataset::{
     Dataset, DatasetError, EpisodeRecord,
-    verify::{Difference, SeasonClaim, Verified, VerifyError, verify},
+    verify::{Difference, SeasonClaim, VerifiedDataset, VerifyError, verify},
 };
 use faceoff_types::{EvaluationResult, Seed, Task};
 use faceoff_wire::dataset::DatasetManifest;
@@ -31,7 +31,7 @@ fn played() -> &'static Evaluation {
     static PLAYED: OnceLock<Evaluation> = OnceLock::new();
     PLAYED.get_or_init(|| {
         let shards = [(Task::Hit, 0..1), (Task::Hit, 1..2), (Task::Defend, 0..2)];
-        Evaluation::play(Some(moving), &shards).assembled()
+        Evaluation::play(Some(swing_arm), &shards).assembled()
     })
 }
 
@@ -39,7 +39,7 @@ fn forgery() -> Forgery {
     Forgery::of(&played().folder())
 }
 
-pub fn check(path: &Path, workers: usize) -> Result<Verified, VerifyError> {
+pub fn check(path: &Path, workers: usize) -> Result<VerifiedDataset, VerifyError> {
     verify(
         &Dataset::open(path)?,
         NonZero::new(workers).unwrap(),
@@ -66,7 +66,7 @@ fn names(file: &str) -> Vec<String> {
 }
 
 #[test]
-fn a_recording_verifies_as_archive_as_folder_and_on_any_number_of_threads() {
+fn recording_verifies_packed_unpacked_and_on_any_threads() {
     let played = played();
     let done = AtomicU32::new(0);
     let dataset = Dataset::open(&played.archive()).unwrap();
@@ -90,14 +90,14 @@ fn a_recording_verifies_as_archive_as_folder_and_on_any_number_of_threads() {
         one,
         "as `faceoff eval` leaves it"
     );
-    // Rewritten by another program, the same numbers are the same dataset.
+    // A table rewritten by another program with the same numbers verifies too.
     let rewritten = forgery();
     rewritten.table("steps.parquet", |batch| batch);
     assert_eq!(check(rewritten.reseal().dir.path(), 2).unwrap(), one);
 }
 
 #[test]
-fn a_worker_that_panics_does_not_leave_the_others_waiting() {
+fn panic_in_a_worker_ends_the_verification() {
     let dataset = Dataset::open(&played().archive()).unwrap();
     let panic = std::panic::catch_unwind(|| {
         verify(&dataset, NonZero::<usize>::MIN, &|| panic!("stop here")).unwrap()
@@ -107,9 +107,9 @@ fn a_worker_that_panics_does_not_leave_the_others_waiting() {
 }
 
 #[test]
-fn one_bit_of_any_column_of_a_step_is_found_where_it_is() {
+fn flipped_bit_in_any_step_column_is_located() {
     let steps = table(&played().folder().join("steps.parquet"));
-    // Some step in the midst of `hit`, episode 1.
+    // A step in the middle of `hit`, episode 1.
     let tasks: &StringArray = steps["task"].as_string();
     let episodes: &UInt32Array = steps["episode"].as_primitive();
     let start = (0..steps.num_rows())
@@ -126,7 +126,7 @@ fn one_bit_of_any_column_of_a_step_is_found_where_it_is() {
             "{name}: {found}"
         );
         match name.as_str() {
-            // The digest tells what moves nothing or follows from nothing.
+            // The digest detects changes without effect on other numbers.
             "computation_time_ns" | "host_time_ns" | "cpu_time_ns" => {
                 assert_eq!(found.step, None, "{found}");
                 let fields = ["computation_time_mean_s", "times_blake3"];
@@ -142,7 +142,7 @@ fn one_bit_of_any_column_of_a_step_is_found_where_it_is() {
 }
 
 #[test]
-fn an_action_that_moves_the_arm_is_found_at_its_step() {
+fn changed_action_is_found_at_its_step() {
     let forgery = forgery();
     forgery.table("steps.parquet", |batch| {
         let (index, _) = batch
@@ -188,14 +188,14 @@ fn an_action_that_moves_the_arm_is_found_at_its_step() {
 }
 
 #[test]
-fn one_bit_of_any_column_of_an_episode_is_found() {
+fn flipped_bit_in_any_episode_column_is_found() {
     for name in names("episodes.parquet") {
         // The opponent's columns are absent in `defend`: take `hit`.
         let forgery = forgery();
         forgery.table("episodes.parquet", |batch| flipped(&batch, &name, 1));
         let found = difference(forgery.reseal().dir.path(), 2);
         if name == "host_noise_reruns" {
-            // Nothing but the slots' own count tells that one was added.
+            // Only the slots' count shows the change.
             assert_eq!((&found.field, found.file), (&name, "calibration.json"));
             continue;
         }
@@ -205,7 +205,7 @@ fn one_bit_of_any_column_of_an_episode_is_found() {
             "{name}: {found}"
         );
         match name.as_str() {
-            // Another interpolation cannot read the recorded actions; other steps are missing.
+            // With another interpolation the recorded actions are invalid; with other steps, rows are missing.
             "interpolation" => assert_eq!(found.file, "steps.parquet", "{found}"),
             "steps" => {}
             _ => assert_eq!(
@@ -243,9 +243,9 @@ fn forged_scores_are_found() {
     ] {
         let forgery = forgery();
         forgery.text(name, from, to);
-        // Unsealed, the hash tells; sealed, the simulation does.
+        // The hash shows the change; with updated hashes, the simulation does.
         match Dataset::open(forgery.dir.path()) {
-            Err(DatasetError::Altered(what)) => assert!(what.starts_with(name), "{what}"),
+            Err(DatasetError::Altered(message)) => assert!(message.starts_with(name), "{message}"),
             other => panic!("{other:?}"),
         }
         let found = difference(forgery.reseal().dir.path(), 2);
@@ -255,7 +255,7 @@ fn forged_scores_are_found() {
 }
 
 #[test]
-fn forged_seeds_and_profiles_give_other_episodes() {
+fn forged_seeds_and_profiles_are_found() {
     let seed = spec(Task::Hit, 0..1).seed;
     for (from, to) in [
         (seed.to_string(), Seed::from_number(8).to_string()),
@@ -277,7 +277,7 @@ fn forged_seeds_and_profiles_give_other_episodes() {
 }
 
 #[test]
-fn episodes_and_steps_that_are_missing_twice_or_too_many_are_found() {
+fn missing_repeated_and_surplus_rows_are_found() {
     let without = |table: &str, row: usize| {
         let forgery = forgery();
         forgery.table(table, |batch| {
@@ -333,7 +333,7 @@ fn episodes_and_steps_that_are_missing_twice_or_too_many_are_found() {
     );
 }
 
-/// What a reader gets of a dataset.
+/// The contents of a dataset for a reader.
 fn contents(dataset: &Dataset) -> (EvaluationResult, Vec<EpisodeRecord>, DatasetManifest) {
     let episodes = dataset.episodes().unwrap();
     (
@@ -344,19 +344,19 @@ fn contents(dataset: &Dataset) -> (EvaluationResult, Vec<EpisodeRecord>, Dataset
 }
 
 #[test]
-fn damage_to_an_archive_is_refused_or_touches_no_file() {
+fn damaged_archive_is_refused_or_has_intact_files() {
     let good = fs::read(played().archive()).unwrap();
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("dataset.zip");
     let whole = Dataset::open(&played().archive()).unwrap();
     let hash = whole.archive().unwrap().unwrap().blake3;
     let whole = contents(&whole);
-    // Every byte of the ends, where the framing is, and some of the rest.
+    // Every byte at both ends, where the archive's structure is, and some of the rest.
     let tail = good.len() - 2048;
-    let places = (0..128)
+    let offsets = (0..128)
         .chain((128..tail).step_by(tail / 200))
         .chain(tail..good.len());
-    for at in places {
+    for at in offsets {
         let mut bytes = good.clone();
         bytes[at] ^= 1 << (at % 8);
         fs::write(&path, &bytes).unwrap();
@@ -383,7 +383,7 @@ fn damage_to_an_archive_is_refused_or_touches_no_file() {
 }
 
 #[test]
-fn a_file_is_compared_with_its_hash_when_it_is_read() {
+fn lazily_opened_files_are_checked_when_read() {
     let forgery = forgery();
     for name in [
         "steps.parquet",
@@ -395,7 +395,7 @@ fn a_file_is_compared_with_its_hash_when_it_is_read() {
         let mut bytes = good.clone();
         bytes[good.len() / 2] ^= 1;
         fs::write(forgery.path(name), &bytes).unwrap();
-        let dataset = Dataset::open_unread(forgery.dir.path()).unwrap();
+        let dataset = Dataset::open_lazily(forgery.dir.path()).unwrap();
         let read = [
             ("steps.parquet", dataset.steps().map(|_| ())),
             ("episodes.parquet", dataset.episodes().map(|_| ())),
@@ -404,8 +404,8 @@ fn a_file_is_compared_with_its_hash_when_it_is_read() {
         ];
         for (file, read) in read {
             match read {
-                Err(DatasetError::Altered(what)) => {
-                    assert!(file == name && what.starts_with(name), "{what}");
+                Err(DatasetError::Altered(message)) => {
+                    assert!(file == name && message.starts_with(name), "{message}");
                 }
                 other => assert!(other.is_ok() && file != name, "{file}: {other:?}"),
             }
@@ -415,7 +415,7 @@ fn a_file_is_compared_with_its_hash_when_it_is_read() {
 }
 
 #[test]
-fn damaged_tables_are_refused_in_a_folder_too() {
+fn damaged_files_in_a_folder_are_refused() {
     for name in [
         "steps.parquet",
         "episodes.parquet",
@@ -429,7 +429,7 @@ fn damaged_tables_are_refused_in_a_folder_too() {
             bytes[at] ^= 0x10;
             fs::write(forgery.path(name), &bytes).unwrap();
             match Dataset::open(forgery.dir.path()) {
-                Err(DatasetError::Altered(what)) => assert!(what.starts_with(name), "{what}"),
+                Err(DatasetError::Altered(message)) => assert!(message.starts_with(name), "{message}"),
                 other => panic!("{name}, byte {at}: {other:?}"),
             }
         }
@@ -439,7 +439,7 @@ fn damaged_tables_are_refused_in_a_folder_too() {
             "{name} is missing"
         );
     }
-    // Hashes that fit do not make a table readable.
+    // A truncated table with a matching hash is unreadable.
     let forgery = forgery();
     let steps = fs::read(forgery.path("steps.parquet")).unwrap();
     fs::write(forgery.path("steps.parquet"), &steps[..steps.len() / 2]).unwrap();
@@ -454,14 +454,14 @@ fn damaged_tables_are_refused_in_a_folder_too() {
 }
 
 #[test]
-fn other_layouts_rulesets_and_simulators_are_named() {
+fn foreign_layouts_rulesets_and_simulators_are_named() {
     let fingerprint = Dataset::open(&played().archive())
         .unwrap()
         .manifest()
         .simulator
         .fingerprint
         .clone();
-    for (from, to, words) in [
+    for (from, to, expected) in [
         (
             "faceoff-dataset/4",
             "faceoff-dataset/1",
@@ -482,8 +482,8 @@ fn other_layouts_rulesets_and_simulators_are_named() {
         let forgery = forgery();
         forgery.text("manifest.json", from, to);
         match check(forgery.dir.path(), 1) {
-            Err(VerifyError::Dataset(DatasetError::Foreign(what))) => {
-                assert!(what.contains(words), "{what}");
+            Err(VerifyError::Dataset(DatasetError::Foreign(message))) => {
+                assert!(message.contains(expected), "{message}");
             }
             other => panic!("{other:?}"),
         }
@@ -504,10 +504,10 @@ fn datasets_of_earlier_rulesets_verify() {
 }
 
 #[test]
-fn agents_that_fault_verify_too() {
-    let agent: Agent = |turn| match (turn.episode, turn.step) {
+fn datasets_with_agent_faults_verify() {
+    let agent: Agent = |question| match (question.episode, question.step) {
         (1, Some(4)) | (2, None) => None,
-        _ => Some([turn.held, [0.0; 7]]),
+        _ => Some([question.held, [0.0; 7]]),
     };
     let faulty = Evaluation::play(Some(agent), &[(Task::Prepare, 0..4)]).assembled();
     let verified = check(&faulty.archive(), 2).unwrap();
@@ -535,34 +535,34 @@ fn seeds_follow_from_the_revealed_secret() {
         day,
     };
     assert_eq!(claim.check(&manifest), Ok(()));
-    let what =
-        |claim: &SeasonClaim, manifest: &DatasetManifest| claim.check(manifest).unwrap_err().what;
+    let failed_claim =
+        |claim: &SeasonClaim, manifest: &DatasetManifest| claim.check(manifest).unwrap_err().claim;
     let other_day = SeasonClaim {
         day: "2026-11-22".parse().unwrap(),
         ..claim.clone()
     };
-    assert_eq!(what(&other_day, &manifest), "the evaluation's seed");
+    assert_eq!(failed_claim(&other_day, &manifest), "the evaluation's seed");
     let broken = SeasonClaim {
         commitment: Some("00".repeat(32)),
         ..claim.clone()
     };
-    assert_eq!(what(&broken, &manifest), "the commitment");
+    assert_eq!(failed_claim(&broken, &manifest), "the commitment");
     manifest.mismatch_seed = manifest.seed;
-    assert_eq!(what(&claim, &manifest), "the seed of the model mismatch");
+    assert_eq!(failed_claim(&claim, &manifest), "the seed of the model mismatch");
 }
 
-/// Commands that no robot can follow, from its 4th step on.
-fn throwing(turn: &Turn) -> Option<[[f64; 7]; 2]> {
-    let step = turn.step.unwrap_or(0);
+/// An agent that commands extreme positions from its 4th step on.
+fn command_extremes(question: &Question) -> Option<[[f64; 7]; 2]> {
+    let step = question.step.unwrap_or(0);
     let sign = if step.is_multiple_of(2) { 1e4 } else { -1e4 };
-    Some(match (turn.episode, step) {
+    Some(match (question.episode, step) {
         (1, 4..) => [[sign; 7], [-sign; 7]],
-        _ => [turn.held, [0.0; 7]],
+        _ => [question.held, [0.0; 7]],
     })
 }
 
 #[test]
-fn numbers_beyond_a_rulesets_bound_are_found() {
+fn actions_beyond_the_limit_of_the_ruleset_are_found() {
     let forge = |ruleset: &str| {
         let forgery = forgery();
         forgery.text("manifest.json", "airhockey-2023.3", ruleset);
@@ -580,7 +580,7 @@ fn numbers_beyond_a_rulesets_bound_are_found() {
                 let values = actions.value(row);
                 let values: &Float64Array = values.as_primitive();
                 for (i, value) in values.values().iter().enumerate() {
-                    // The last step of all: it moves nothing that is recorded after it.
+                    // The last step of the table: no later row depends on it.
                     let last = row + 1 == batch.num_rows() && i == 9;
                     changed
                         .values()
@@ -598,21 +598,21 @@ fn numbers_beyond_a_rulesets_bound_are_found() {
         assert_eq!((&*found.field, &*found.recorded), ("action", "20000.0"));
         assert_eq!(found.expected, "14 numbers of at most 10000 in magnitude");
     }
-    // The first ruleset only asked for finite numbers; what they lead to is another state.
+    // The first ruleset only required finite numbers; there the resulting state differs.
     let found = forge("airhockey-2023.1");
     assert_ne!(found.field, "action");
 }
 
 #[test]
-fn extreme_commands_verify_whatever_comes_of_them() {
-    let evaluation = Evaluation::play(Some(throwing), &[(Task::Prepare, 0..3)]).assembled();
+fn datasets_with_extreme_commands_verify() {
+    let evaluation = Evaluation::play(Some(command_extremes), &[(Task::Prepare, 0..3)]).assembled();
     let verified = check(&evaluation.archive(), 2).unwrap();
     assert_eq!(verified.episodes, 3);
 }
 
 #[test]
-fn a_divergence_that_did_not_happen_is_found() {
-    let quits: Agent = |turn| (turn.step != Some(3)).then_some([turn.held, [0.0; 7]]);
+fn invented_divergence_is_found() {
+    let quits: Agent = |question| (question.step != Some(3)).then_some([question.held, [0.0; 7]]);
     let evaluation = Evaluation::play(Some(quits), &[(Task::Prepare, 0..2)]).assembled();
     check(&evaluation.archive(), 2).unwrap();
     let forgery = Forgery::of(&evaluation.folder());

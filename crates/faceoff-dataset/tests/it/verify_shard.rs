@@ -1,8 +1,8 @@
-//! What another machine says it recorded, before anything is made of it.
+//! Verification of a shard's recording from a remote worker.
 
 use crate::{
     forgery::{Forgery, flipped},
-    played::{moving, play, spec},
+    recordings::{swing_arm, play, spec},
 };
 use faceoff_dataset::{
     ShardReport,
@@ -22,7 +22,7 @@ struct Played {
 fn played() -> Played {
     let folder = tempfile::tempdir().unwrap();
     let spec = spec(Task::Defend, 4..8);
-    let report = play(&spec, Some(moving), folder.path());
+    let report = play(&spec, Some(swing_arm), folder.path());
     Played {
         folder,
         spec,
@@ -30,7 +30,7 @@ fn played() -> Played {
     }
 }
 
-/// The sizes and hashes of `shard.json` become those of the files.
+/// Updates the sizes and hashes in `shard.json`.
 fn reseal(folder: &Path) {
     let path = folder.join("shard.json");
     let mut shard: Value = serde_json::from_slice(&fs::read(&path).unwrap()).unwrap();
@@ -42,12 +42,12 @@ fn reseal(folder: &Path) {
     fs::write(&path, serde_json::to_vec(&shard).unwrap()).unwrap();
 }
 
-fn told(found: Result<(), VerifyError>) -> String {
+fn error_text(found: Result<(), VerifyError>) -> String {
     found.unwrap_err().to_string()
 }
 
 #[test]
-fn what_was_played_is_found_to_be_what_is_simulated() {
+fn genuine_recording_verifies_with_any_sample() {
     let all = played();
     for sample in [&[][..], &[4], &[5, 7], &[4, 5, 6, 7]] {
         verify_shard(all.folder.path(), &all.spec, &all.report.outcomes, sample).unwrap();
@@ -55,7 +55,7 @@ fn what_was_played_is_found_to_be_what_is_simulated() {
 }
 
 #[test]
-fn a_number_of_a_sampled_episode_that_is_not_the_simulators_is_found() {
+fn changed_number_in_a_sampled_episode_is_found() {
     let all = played();
     let steps = Forgery::of(all.folder.path());
     let first = all.report.outcomes[0].steps;
@@ -66,48 +66,48 @@ fn a_number_of_a_sampled_episode_that_is_not_the_simulators_is_found() {
     reseal(steps.dir.path());
     let verify =
         |sample: &[u32]| verify_shard(steps.dir.path(), &all.spec, &all.report.outcomes, sample);
-    let found = told(verify(&[4, 5]));
+    let found = error_text(verify(&[4, 5]));
     assert!(
         found.contains("episode 5, step 0") && found.contains("puck_x"),
         "{found}"
     );
-    // The others are not simulated: this is what a sample leaves out.
+    // Episodes outside of the sample are not simulated, so the change is not found.
     verify(&[4, 6]).unwrap();
 }
 
 #[test]
-fn outcomes_that_no_row_tells_are_found_without_a_sample() {
+fn outcomes_that_differ_from_the_rows_are_found() {
     let all = played();
     let mut claimed = all.report.outcomes.clone();
     claimed[3].success = !claimed[3].success;
-    let verify = |folder: &Path, outcomes| told(verify_shard(folder, &all.spec, outcomes, &[]));
-    assert!(verify(all.folder.path(), &claimed).contains("other outcomes"));
-    // The recording's own report says so, too.
-    let lied = Forgery::of(all.folder.path());
+    let verify = |folder: &Path, outcomes| error_text(verify_shard(folder, &all.spec, outcomes, &[]));
+    assert!(verify(all.folder.path(), &claimed).contains("different outcomes"));
+    // With the same claim in the recording's report.
+    let forged = Forgery::of(all.folder.path());
     let mut report: Value =
-        serde_json::from_slice(&fs::read(lied.path("report.json")).unwrap()).unwrap();
+        serde_json::from_slice(&fs::read(forged.path("report.json")).unwrap()).unwrap();
     report["outcomes"] = serde_json::to_value(&claimed).unwrap();
     fs::write(
-        lied.path("report.json"),
+        forged.path("report.json"),
         serde_json::to_vec(&report).unwrap(),
     )
     .unwrap();
-    assert!(verify(lied.dir.path(), &claimed).contains("report.json has"));
-    reseal(lied.dir.path());
-    let found = verify(lied.dir.path(), &claimed);
+    assert!(verify(forged.dir.path(), &claimed).contains("report.json has"));
+    reseal(forged.dir.path());
+    let found = verify(forged.dir.path(), &claimed);
     assert!(found.contains("episode 7, outcome"), "{found}");
-    // One that says less than was ordered, and does not say that faults ended it.
-    let fewer = told(verify_shard(
+    // Fewer outcomes than episodes of the job, not ended by faults.
+    let fewer = error_text(verify_shard(
         all.folder.path(),
         &all.spec,
         &all.report.outcomes[..3],
         &[],
     ));
-    assert!(fewer.contains("other outcomes"), "{fewer}");
+    assert!(fewer.contains("different outcomes"), "{fewer}");
 }
 
 #[test]
-fn another_order_s_recording_is_none_of_this_one() {
+fn recording_of_another_job_is_refused() {
     let all = played();
     let others = [
         ShardSpec {
@@ -121,9 +121,9 @@ fn another_order_s_recording_is_none_of_this_one() {
     ];
     for other in others {
         let found = verify_shard(all.folder.path(), &other, &all.report.outcomes, &[]);
-        assert!(told(found).contains("other episodes than the order"));
+        assert!(error_text(found).contains("other episodes than the job"));
     }
     let none = tempfile::tempdir().unwrap();
     let found = verify_shard(none.path(), &all.spec, &all.report.outcomes, &[4]);
-    assert!(told(found).contains("damaged or incomplete"));
+    assert!(error_text(found).contains("damaged or incomplete"));
 }

@@ -39,7 +39,7 @@ const REVEALING: [&str; 12] = [
     "59.98",
     "60.0 ",
     "777.5",
-    "told_apart",
+    "significant\"",
 ];
 
 #[track_caller]

@@ -153,7 +153,7 @@ async fn forecast_reports_a_day_that_will_not_fit() {
         page.body
     );
     let me = site.get("/api/v1/me", Some(&alpha.token)).await.json(200);
-    assert_eq!(me["turn"]["evaluation"], Value::Null);
+    assert_eq!(me["today"]["evaluation"], Value::Null);
 }
 
 #[tokio::test]
@@ -169,7 +169,7 @@ async fn pending_jobs_show_position_time_and_next_step() {
     let waiting = site.get(&upload, Some(&alpha.token)).await.json(200);
     assert_eq!(
         waiting["queue"],
-        json!({ "place": 1, "of": 1, "expected_at": null })
+        json!({ "position": 1, "place": 1, "total": 1, "of": 1, "expected_at": null })
     );
     assert!(string(&waiting["next"]).contains("validation run"));
     let me = site.get("/api/v1/me", Some(&alpha.token)).await.json(200);
@@ -207,8 +207,8 @@ async fn pending_jobs_show_position_time_and_next_step() {
     for (team, path) in [(&alpha, &alpha_evaluation), (&beta, &beta_evaluation)] {
         let view = site.get(path, Some(&team.token)).await.json(200);
         let me = site.get("/api/v1/me", Some(&team.token)).await.json(200);
-        assert_eq!(me["turn"]["queue"], view["queue"]);
-        assert_eq!(me["turn"]["next"], view["next"]);
+        assert_eq!(me["today"]["queue"], view["queue"]);
+        assert_eq!(me["today"]["next"], view["next"]);
         if view["state"] != "finished" {
             pending.push((view, path.replace("/api/v1", "")));
         }
@@ -216,7 +216,7 @@ async fn pending_jobs_show_position_time_and_next_step() {
     let (view, page) = &pending[0];
     assert_eq!(pending.len(), 1);
     assert_eq!(
-        (&view["queue"]["place"], &view["queue"]["of"]),
+        (&view["queue"]["position"], &view["queue"]["total"]),
         (&json!(1), &json!(1))
     );
     let expected: jiff::Timestamp = string(&view["queue"]["expected_at"]).parse().unwrap();

@@ -293,13 +293,13 @@ async fn episodes_page_is_filtered_by_its_query() {
     let with_fault = day.page("?end=agent_fault").await;
     assert_eq!(rows(&with_fault).len(), 1);
     let failed = lines.iter().filter(|line| line["success"] == false).count();
-    let shown = day.page("?task=prepare&went=failure").await;
+    let shown = day.page("?task=prepare&outcome=failure").await;
     assert_eq!(rows(&shown).len(), failed);
     let with_foul = lines
         .iter()
         .filter(|line| line["broken"].is_array())
         .count();
-    let shown = day.page("?broke=any").await;
+    let shown = day.page("?violated=any").await;
     assert_eq!(rows(&shown).len(), with_foul);
     let none = day.page("?task=hit").await;
     assert!(texts(&none, "#table ~ p")[0].contains("No episode matches"));
@@ -310,8 +310,8 @@ async fn episodes_page_is_filtered_by_its_query() {
     );
     for unknown in [
         "?task=juggle",
-        "?went=well",
-        "?broke=everything",
+        "?outcome=well",
+        "?violated=everything",
         "?what=else",
     ] {
         let path = format!("{}{unknown}", day.page);

@@ -43,7 +43,7 @@ async fn evaluations_of_a_day_are_compared_by_episode() {
     for (field, value) in [("both", 40), ("only_a", 20), ("only_b", 0), ("neither", 40)] {
         assert_eq!(hit[field], value, "{field}");
     }
-    assert_eq!(hit["told_apart"], true);
+    assert_eq!(hit["significant"], true);
     assert_eq!(view["tasks"]["defend"]["p_value"], 1.0);
     assert_eq!(view["overall"]["score_a"], 60.0);
     assert_eq!(view["overall"]["score_b"], 52.0);

@@ -60,7 +60,7 @@ async fn voided_evaluation_leaves_the_board_with_its_reason() {
         .await
         .problem(409, "conflict", &["counts"]);
     let me = site.get("/api/v1/me", Some(&team.token)).await.json(200);
-    assert_eq!(me["turn"]["evaluation"], json!(null));
+    assert_eq!(me["today"]["evaluation"], json!(null));
     let page = site.get(&path.replace("/api/v1", ""), None).await.body;
     assert!(
         page.contains("Voided") && page.contains("the &#60;table&#62; was tilted"),

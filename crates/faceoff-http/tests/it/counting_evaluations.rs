@@ -211,7 +211,7 @@ async fn final_day_replaces_the_board_once_it_has_started() {
     site.advance(11 * 3600);
     start().await.problem(
         409,
-        "day-has-cut",
+        "cutoff-passed",
         &["2026-03-01", "a date of its own", "UTC"],
     );
     site.advance(4 * 3600);

@@ -42,7 +42,7 @@ async fn day_starts_once_and_lists_teams_without_submission() {
         let again = Answer::of(request.send().await.unwrap()).await;
         let problem = again.problem(
             409,
-            "day-has-cut",
+            "cutoff-passed",
             &[
                 "2026-03-01 10:00:00 UTC",
                 "nothing was started",
@@ -51,7 +51,7 @@ async fn day_starts_once_and_lists_teams_without_submission() {
         );
         assert_eq!(problem["day"], "2026-03-01");
         assert_eq!(
-            problem["next_cut"],
+            problem["next_cutoff"],
             json!({
                 "stage": stage,
                 "stage_name": "Qualifying",
@@ -81,8 +81,8 @@ async fn next_cutoff_follows_the_schedule() {
     let next_cutoff = async || {
         let me = site.get("/api/v1/me", Some(&team.token)).await.json(200);
         let season = site.get("/api/v1/season", None).await.json(200);
-        assert_eq!(me["next_cut"], season["next_cut"]);
-        me["next_cut"]["at"].clone()
+        assert_eq!(me["next_cutoff"], season["next_cutoff"]);
+        me["next_cutoff"]["at"].clone()
     };
     assert_eq!(next_cutoff().await, "2026-03-01T12:00:00Z");
     // Started by hand before the scheduled time: the next cutoff of the schedule is on the next day.
@@ -92,7 +92,7 @@ async fn next_cutoff_follows_the_schedule() {
     assert_eq!(next_cutoff().await, "2026-03-02T12:00:00Z");
     site.post("/api/v1/days", Some(ADMIN), &json!({}))
         .await
-        .problem(409, "day-has-cut", &["2026-03-02 at 12:00:00 UTC"]);
+        .problem(409, "cutoff-passed", &["2026-03-02 at 12:00:00 UTC"]);
 }
 
 #[tokio::test]

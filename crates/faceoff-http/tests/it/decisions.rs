@@ -174,7 +174,7 @@ async fn missed_day_is_evaluated_later_with_a_public_reason() {
         .await
         .problem(
             409,
-            "day-has-cut",
+            "cutoff-passed",
             &[
                 "2026-03-01",
                 "2026-03-01 10:00:00 UTC",
@@ -204,7 +204,7 @@ async fn missed_day_is_evaluated_later_with_a_public_reason() {
         (
             &season["days"][0]["day"],
             &season["days"][0]["missed"],
-            &season["days"][0]["cut_at"]
+            &season["days"][0]["cutoff_at"]
         ),
         (
             &json!("2026-03-02"),
@@ -227,7 +227,7 @@ async fn extra_evaluation_is_confirmed_when_it_replaces_one() {
     site.ranked_teams(&[("Alpha", result([0.5, 0.5, 0.5], 10.0))])
         .await;
     let stage = site.stage().await;
-    let path = format!("/api/v1/stages/{stage}/days/2026-03-01/extra-turn");
+    let path = format!("/api/v1/stages/{stage}/days/2026-03-01/extra-evaluation");
     let teams = site.get("/api/v1/teams", Some(ADMIN)).await.json(200);
     let alpha = teams[0]["id"].clone();
     let beta = site.team("Beta").await;
@@ -273,7 +273,7 @@ async fn extra_evaluation_is_confirmed_when_it_replaces_one() {
     assert_eq!(created.status, 201, "{}", created.body);
     let created = created.json(201);
     assert_eq!(
-        (&created["day"], &created["extra_turn"]),
+        (&created["day"], &created["extra_evaluation"]),
         (&json!("2026-03-01"), &json!("joined late"))
     );
     site.post(&path, Some(ADMIN), &beta_request)
@@ -284,8 +284,8 @@ async fn extra_evaluation_is_confirmed_when_it_replaces_one() {
     let board = site.get("/api/v1/board", None).await.json(200);
     let rows = board["rows"].as_array().unwrap();
     let row = |name: &str| rows.iter().find(|row| row["team"] == name).unwrap();
-    assert_eq!(row("Beta")["extra_turn"], "joined late");
-    assert_eq!(row("Alpha")["extra_turn"], Value::Null);
+    assert_eq!(row("Beta")["extra_evaluation"], "joined late");
+    assert_eq!(row("Alpha")["extra_evaluation"], Value::Null);
     assert_ne!(row("Beta")["seed"], row("Alpha")["seed"]);
     let page = site.get("/", None).await.body;
     assert!(page.contains("extra evaluation: joined late"), "{page}");

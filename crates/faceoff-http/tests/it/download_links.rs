@@ -52,12 +52,12 @@ async fn link_needs_no_token_and_expires() {
     assert_eq!(site.get(&url, None).await.status, 200);
     site.advance(1);
     let expired = site.get(&url, None).await;
-    let words = ["good until 2026-03-01 10:01:00 UTC"];
+    let words = ["expired at 2026-03-01 10:01:00 UTC"];
     let problem = expired.problem(410, "link-expired", &words);
     assert_eq!(problem["expired_at"], "2026-03-01T10:01:00Z");
 
     // A link without an expiry is valid for an hour.
-    let archive = create_link(&site, &format!("{submission}/archive"), &team.token).await;
+    let archive = create_link(&site, &format!("{submission}/bundle"), &team.token).await;
     site.advance(3599);
     assert_eq!(site.get(&archive, None).await.status, 200);
     site.advance(1);
@@ -134,7 +134,7 @@ async fn link_is_valid_while_its_creator_may_download() {
     );
     let status = async |url: &str| site.get(url, None).await.status.as_u16();
     // Links to a removed file are gone, too.
-    let archive = create_link(&site, &format!("{submission}/archive"), &team.token).await;
+    let archive = create_link(&site, &format!("{submission}/bundle"), &team.token).await;
     assert_eq!(status(&archive).await, 200);
     site.valid_submission(&team, "b").await;
     let delete = site

@@ -21,7 +21,7 @@ impl FinishedEvaluation {
         site.finish_evaluation(&result([0.5, 0.6, 0.7], 100.0)).await;
         Self {
             dataset: format!("{path}/dataset"),
-            archive: format!("{submission}/archive"),
+            archive: format!("{submission}/bundle"),
             site,
             team,
         }

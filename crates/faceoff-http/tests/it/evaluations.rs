@@ -54,7 +54,7 @@ async fn evaluation_shows_progress_result_and_dataset() {
     let page = site.get(&format!("/evaluations/{id}"), None).await;
     assert!(page.body.contains(&hash), "{}", page.body);
     let me = site.get("/api/v1/me", token).await.json(200);
-    assert_eq!(me["turn"]["evaluation"], finished["id"]);
+    assert_eq!(me["today"]["evaluation"], finished["id"]);
 
     let dataset = site.get(&format!("{path}/dataset"), token).await;
     assert_eq!(dataset.status, 200);
@@ -129,7 +129,7 @@ async fn failed_evaluation_shows_its_faults_and_log() {
         .problem(409, "conflict", &["no dataset", "log"]);
     let me = site.get("/api/v1/me", Some(&team.token)).await.json(200);
     assert_eq!(
-        me["turn"]["evaluation"], failed["id"],
+        me["today"]["evaluation"], failed["id"],
         "an evaluation that the agent failed counts"
     );
 
@@ -161,7 +161,7 @@ async fn cancelled_evaluation_shows_reason_and_can_be_rerun() {
         .await
         .problem(409, "conflict", &["over already"]);
     let me = site.get("/api/v1/me", Some(&team.token)).await.json(200);
-    assert_eq!(me["turn"]["evaluation"], json!(null));
+    assert_eq!(me["today"]["evaluation"], json!(null));
 
     let rerun = format!("{path}/rerun");
     site.post(&rerun, Some(&team.token), &json!({}))
@@ -185,7 +185,7 @@ async fn cancelled_evaluation_shows_reason_and_can_be_rerun() {
         .problem(404, "not-found", &[]);
     site.finish_evaluation(&result([0.5, 0.6, 0.7], 100.0)).await;
     let me = site.get("/api/v1/me", Some(&team.token)).await.json(200);
-    assert_eq!(me["turn"]["evaluation"], again["id"]);
+    assert_eq!(me["today"]["evaluation"], again["id"]);
 }
 
 #[tokio::test]

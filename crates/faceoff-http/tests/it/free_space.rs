@@ -32,7 +32,7 @@ async fn low_disk_space_refuses_uploads_and_is_shown() {
 
     let health = site.get("/api/v1/health", None).await;
     let health = health.problem(503, "not-ready", &["bytes are free"]);
-    assert_eq!(health["room"], "short");
+    assert_eq!(health["free_space"], "short");
     assert_eq!(health["queue"], "paused");
     assert_eq!(health["database"], "writable");
     site.get("/api/v1/health/live", None).await.json(200);

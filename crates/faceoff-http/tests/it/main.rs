@@ -19,6 +19,7 @@ mod capacity_log;
 mod clips;
 mod comparisons;
 mod days;
+mod deprecated_names;
 mod team_dashboard;
 mod divisions;
 mod docs;

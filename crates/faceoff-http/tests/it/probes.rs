@@ -23,7 +23,7 @@ async fn server_that_is_not_ready_is_live() {
     site.restart().await;
     let ready = site.get("/readyz", None).await;
     let problem = ready.problem(503, "not-ready", &["bytes are free"]);
-    assert_eq!(problem["room"], "short");
+    assert_eq!(problem["free_space"], "short");
     site.get("/livez", None).await.json(200);
     site.store.close().await;
     site.advance(1); // one probe a second

@@ -104,7 +104,7 @@ async fn trial_is_visible_to_organisers_only() {
 
     // The trial is on no board and on no page, and its team does not see it.
     let me = site.get("/api/v1/me", Some(&alpha.token)).await.json(200);
-    assert_eq!(me["turn"]["evaluation"], Value::Null);
+    assert_eq!(me["today"]["evaluation"], Value::Null);
     assert_eq!(
         site.get("/api/v1/evaluations", Some(&alpha.token))
             .await

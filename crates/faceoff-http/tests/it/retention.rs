@@ -205,7 +205,7 @@ async fn deleted_submission_keeps_its_results() {
     let submission = site.valid_submission(&team, "a").await;
     let evaluation = run_day(&site, &team, &submission, [0.5; 3]).await;
     let own = Some(team.token.as_str());
-    let archive = format!("{submission}/archive");
+    let archive = format!("{submission}/bundle");
     let downloaded = site.get(&archive, own).await;
     assert_eq!(downloaded.status, 200);
     assert_eq!(downloaded.body.len(), String::from_utf8_lossy(&GZIP).len());
@@ -267,7 +267,7 @@ async fn deleted_submission_keeps_its_results() {
         .json(200);
     assert_eq!(deleted["state"], "valid");
     assert_eq!(deleted["deleted"]["by"], format!("team:{}", team.id));
-    assert_eq!(deleted["archive_removed"]["reason"], "by its team");
+    assert_eq!(deleted["bundle_removed"]["reason"], "by its team");
     assert_eq!(deleted["log"], "ready\n");
     assert!(string(&deleted["blake3"]).len() == 64);
     assert!(string(&deleted["next"]).contains("upload it again"));
@@ -306,7 +306,7 @@ async fn organiser_deletes_with_a_reason_but_not_evidence() {
     let deleted = delete(&site, &first, Some(ADMIN), request.clone())
         .await
         .json(200);
-    let reason = &deleted["archive_removed"]["reason"];
+    let reason = &deleted["bundle_removed"]["reason"];
     assert_eq!(reason, "by an organiser: it holds a virus");
     assert_eq!(deleted["deleted"]["by"], "organiser");
 
@@ -321,9 +321,9 @@ async fn organiser_deletes_with_a_reason_but_not_evidence() {
         );
     }
     // An organiser can still download a recently deleted archive; its team cannot.
-    let archive = format!("{first}/archive");
+    let archive = format!("{first}/bundle");
     site.get(&archive, own).await.problem(410, "removed", &[]);
-    for path in [archive, format!("{second}/archive")] {
+    for path in [archive, format!("{second}/bundle")] {
         assert_eq!(site.get(&path, Some(ADMIN)).await.status, 200);
     }
     let log = site
@@ -345,8 +345,8 @@ async fn storage_is_shown_to_its_team_and_organisers() {
     let path = format!("/api/v1/teams/{}/storage", team.id);
     let own = site.get(&path, Some(&team.token)).await.json(200);
     assert_eq!(own["team_name"], "Alpha");
-    assert_eq!(own["archives"], 1);
-    assert_eq!(own["archive_bytes"], GZIP.len());
+    assert_eq!(own["bundles"], 1);
+    assert_eq!(own["bundle_bytes"], GZIP.len());
     assert_eq!(own["datasets"], 1);
     assert_eq!(own["dataset_bytes"], 23);
     assert_eq!(own["unmeasured_datasets"], 0);
@@ -361,7 +361,7 @@ async fn storage_is_shown_to_its_team_and_organisers() {
     let all = site.get("/api/v1/storage", Some(ADMIN)).await.json(200);
     assert_eq!(all[0]["dataset_bytes"], 23);
     assert_eq!(all[0]["proposal_bytes"], 0);
-    assert_eq!(all[1]["archives"], 0);
+    assert_eq!(all[1]["bundles"], 0);
     // The quota of the stage applies.
     change(&site, json!({ "uploads": { "stored_bytes": 5 } }))
         .await

@@ -100,6 +100,8 @@ const TABLE: &[(&str, &str)] = &[
     ("POST /submissions/{id}/withdraw", "?00++--"),
     ("GET /submissions/{id}/archive", "?00++++"),
     ("POST /submissions/{id}/archive/link", "?00++++"),
+    ("GET /submissions/{id}/bundle", "?00++++"),
+    ("POST /submissions/{id}/bundle/link", "?00++++"),
     ("DELETE /submissions/{id}", "?00++++"),
     ("GET /storage", "?----++"),
     ("GET /workers", "?----++"),
@@ -129,6 +131,7 @@ const TABLE: &[(&str, &str)] = &[
     ("POST /proposals/{id}/drop", "?----++"),
     ("GET /stages/{id}/capacity", "?----++"),
     ("POST /stages/{id}/days", "?----++"),
+    ("POST /stages/{id}/days/{day}/extra-evaluation", "?----++"),
     ("POST /stages/{id}/days/{day}/extra-turn", "?----++"),
     ("POST /stages/{id}/final", "?----++"),
     ("POST /stages/{id}/finalise", "?----++"),
@@ -165,6 +168,7 @@ const TABLE: &[(&str, &str)] = &[
     ("GET /tournaments/{id}/games", "+++++++"),
     ("GET /tournaments/{id}/head-to-head", "+++++++"),
     ("GET /tournaments/{id}/ratings", "+++++++"),
+    ("GET /tournaments/{id}/uncounted-games", "?++++++"),
     ("PATCH /tournaments/{id}", "?----++"),
     ("POST /games/{id}/rerun", "?----++"),
     ("POST /games/{id}/void", "?----++"),
@@ -199,7 +203,8 @@ fn body(route: &str) -> Value {
         | "POST /stages/{id}/trial"
         | "POST /stages/{id}/proposals" => json!({ "reason": "" }),
         "POST /stages/{id}/days" => json!({ "day": "2020-01-01", "reason": "" }),
-        "POST /stages/{id}/days/{day}/extra-turn" => {
+        "POST /stages/{id}/days/{day}/extra-evaluation"
+        | "POST /stages/{id}/days/{day}/extra-turn" => {
             json!({ "team": "00000000-0000-7000-8000-000000000000", "reason": "" })
         }
         "POST /invitations" => json!({ "role": "member", "note": "" }),
@@ -249,7 +254,7 @@ async fn played_test_game(site: &Site, team: &TestTeam) -> [String; 2] {
     let played = fake_slot::play_next(site, |_, _| GameOutcome::goals(1, 0)).await;
     assert!(played.is_some());
     let id = path.rsplit('/').next().unwrap().to_owned();
-    [id, string(&created["ordered"][0]["id"])]
+    [id, string(&created["queued"][0]["id"])]
 }
 
 struct RoleFixture {

@@ -88,12 +88,12 @@ async fn excluded_runtime_is_not_evaluated_and_says_why() {
     let stage = site.stage().await;
     let view = site.get(&native, Some(&alpha.token)).await.json(200);
     assert_eq!(
-        (&view["runtime"], view.get("not_taken")),
+        (&view["runtime"], view.get("excluded_by")),
         (&json!("native"), None)
     );
     set_runtimes(&site, json!(["python3"])).await;
     let why = "the stage “Qualifying” takes agents of the runtime python3 only, and this one names native in agent.toml";
-    let not_taken = json!([{ "stage": stage, "stage_name": "Qualifying", "reason": why }]);
+    let excluded_by = json!([{ "stage": stage, "stage_name": "Qualifying", "reason": why }]);
 
     // It may stay active: this stage may accept it later, or another stage does.
     let activate = format!("{native}/activate");
@@ -102,14 +102,14 @@ async fn excluded_runtime_is_not_evaluated_and_says_why() {
         .await
         .json(200);
     assert_eq!(
-        (&active["active"], &active["not_taken"]),
-        (&json!(true), &not_taken)
+        (&active["active"], &active["excluded_by"]),
+        (&json!(true), &excluded_by)
     );
     assert!(string(&active["next"]).contains(why), "{active}");
     let me = site.get("/api/v1/me", Some(&alpha.token)).await.json(200);
-    assert_eq!(me["not_taken"], not_taken);
+    assert_eq!(me["excluded_by"], excluded_by);
     let me = site.get("/api/v1/me", Some(&beta.token)).await.json(200);
-    assert_eq!(me.get("not_taken"), None);
+    assert_eq!(me.get("excluded_by"), None);
 
     // A trial of all active submissions skips it. A trial of this submission alone is refused.
     let trial = format!("/api/v1/stages/{stage}/trial");
@@ -145,7 +145,7 @@ async fn excluded_runtime_is_not_evaluated_and_says_why() {
     assert_eq!(names(&day["created"], "team_name"), ["Beta"]);
     assert_eq!(names(&day["without_submission"], "name"), ["Gamma"]);
     assert_eq!(
-        day["not_taken"],
+        day["excluded"],
         json!([{ "team": alpha.id, "team_name": "Alpha", "submission": id, "reason": why }])
     );
     let logged = "/api/v1/events?kind=submission_not_taken";
@@ -155,14 +155,14 @@ async fn excluded_runtime_is_not_evaluated_and_says_why() {
         logged["events"][0]["details"],
         json!({ "stage": stage, "day": "2026-03-01", "reason": why })
     );
-    let extra = format!("/api/v1/stages/{stage}/days/2026-03-01/extra-turn");
+    let extra = format!("/api/v1/stages/{stage}/days/2026-03-01/extra-evaluation");
     let request = json!({ "team": alpha.id, "reason": "?" });
     site.post(&extra, Some(ADMIN), &request)
         .await
         .problem(409, "conflict", &[why]);
     site.finish_evaluation(&result([0.5; 3], 10.0)).await;
     let me = site.get("/api/v1/me", Some(&alpha.token)).await.json(200);
-    assert_eq!(me["turn"]["evaluation"], Value::Null, "no evaluation was created");
+    assert_eq!(me["today"]["evaluation"], Value::Null, "no evaluation was created");
 
     // Rules that accept none of the day's agents allow no re-evaluation.
     set_runtimes(&site, json!(["native"])).await;

@@ -51,9 +51,9 @@ async fn closing_the_season_reveals_its_secret() {
     let day_seed = child(stage_seed.as_bytes(), "day", b"2026-03-01");
     assert_eq!(season["days"][0]["day"], "2026-03-01");
     assert_eq!(season["days"][0]["finished"], 1);
-    assert_eq!(season["days"][0]["cut_at"], "2026-03-01T10:00:00Z");
+    assert_eq!(season["days"][0]["cutoff_at"], "2026-03-01T10:00:00Z");
     assert_eq!(season["days"][0]["released_at"], "2026-03-01T10:00:00Z");
-    assert_eq!(season["next_cut"], json!(null));
+    assert_eq!(season["next_cutoff"], json!(null));
     assert_eq!(season["days"][0]["seed"], day_seed.to_hex().as_str());
     let mismatch = child(&secret, "model_mismatch", b"");
     assert_eq!(season["mismatch_seed"], mismatch.to_hex().as_str());

@@ -105,7 +105,7 @@ async fn seed_and_dataset_stay_secret_until_the_day_ends() {
     let submission = site.valid_submission(&late, "l").await;
     site.post("/api/v1/days", Some(ADMIN), &json!({}))
         .await
-        .problem(409, "day-has-cut", &["2026-03-02"]);
+        .problem(409, "cutoff-passed", &["2026-03-02"]);
     site.next_day();
     site.evaluate(&late, &submission).await;
     let tomorrow = secret

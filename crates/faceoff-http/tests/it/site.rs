@@ -453,7 +453,7 @@ impl Site {
         self.run_shards(0).await;
         let ClaimedJob { claim, job } = self.claim().await;
         let Job::Scoring { evaluation, .. } = job else {
-            panic!("expected a finalisation");
+            panic!("expected a scoring job");
         };
         self.commit_evaluation(&claim, evaluation, result).await;
     }
@@ -511,7 +511,7 @@ impl Site {
                     self.commit_evaluation(&claim, evaluation, &result).await;
                     return evaluation;
                 }
-                other => panic!("expected a shard or a finalisation, claimed {other:?}"),
+                other => panic!("expected a shard or a scoring job, claimed {other:?}"),
             }
         }
     }

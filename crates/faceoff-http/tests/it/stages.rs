@@ -45,8 +45,8 @@ async fn stage_is_created_changed_and_played() {
         (&json!(1), &json!("2026-03-02T08:00:00Z"), &json!(2))
     );
     // The stage opens on Monday at 9:00 in Berlin.
-    assert_eq!(created["next_cut"]["day"], "2026-03-02");
-    assert_eq!(created["next_cut"]["at"], "2026-03-02T08:00:00Z");
+    assert_eq!(created["next_cutoff"]["day"], "2026-03-02");
+    assert_eq!(created["next_cutoff"]["at"], "2026-03-02T08:00:00Z");
     let path = format!("/api/v1/stages/{}", created["id"].as_str().unwrap());
     assert_eq!(site.get(&path, Some(ADMIN)).await.json(200), created);
     let all = site.get("/api/v1/stages", Some(ADMIN)).await.json(200);

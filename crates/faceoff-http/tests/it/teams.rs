@@ -35,11 +35,11 @@ async fn team_token_gives_access_to_its_own_view() {
     let me = site.get("/api/v1/me", Some(&team.token)).await.json(200);
     assert_eq!(me["team"]["name"], "Alpha");
     assert_eq!(
-        me["turn"],
+        me["today"],
         json!({ "stage": site.stage().await, "day": "2026-03-01", "evaluation": null })
     );
     assert_eq!(me["active_submission"], json!(null));
-    let next = &me["next_cut"];
+    let next = &me["next_cutoff"];
     assert_eq!(
         (&next["day"], &next["at"]),
         (&json!("2026-03-01"), &json!(null))

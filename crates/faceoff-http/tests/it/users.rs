@@ -276,7 +276,7 @@ async fn session_works_from_pages_of_the_server_only() {
         let body = json!({ "name": name, "password": password });
         send(&site, Method::POST, "/sessions", None, &body).await
     };
-    for (name, password) in [("Ada", "wrong"), ("Nobody", "correct horse battery")] {
+    for (name, password) in [("Ada", "wrong"), ("Unknown", "correct horse battery")] {
         let wrong = sign_in(name, password).await;
         wrong.problem(401, "unauthenticated", &["wrong name or password"]);
     }

@@ -26,7 +26,7 @@ async fn remote_workers_are_listed_with_jobs_and_problems() {
     let worker_list = async || site.get("/api/v1/workers", Some(ADMIN)).await.json(200);
     let none = worker_list().await;
     assert_eq!(
-        (&none["own_slots"], &none["is_given"]),
+        (&none["own_slots"], &none["leases_jobs"]),
         (&json!(2), &json!(false))
     );
     let html = dashboard_page(&grace.open("/organiser/workers").await, 200);
@@ -94,7 +94,7 @@ async fn remote_workers_are_listed_with_jobs_and_problems() {
     let all = worker_list().await;
     let busy = &all["workers"][0]["busy"][0];
     assert_eq!(
-        (&busy["is_long"], &busy["trouble"]),
+        (&busy["is_long"], &busy["problem"]),
         (&json!(true), &json!("the stream is <full>"))
     );
     let named = format!("rack-1/slot-2, job {job} (hit episodes 0 to 49)");
@@ -102,7 +102,7 @@ async fn remote_workers_are_listed_with_jobs_and_problems() {
     let problem =
         format!("A worker cannot send the result of a job: {named}: the stream is <full>");
     assert_eq!(
-        (&all["alarms"], &all["troubles"]),
+        (&all["alarms"], &all["problems"]),
         (&json!([alarm]), &json!([problem]))
     );
     for path in ["/organiser", "/organiser/workers"] {
@@ -111,7 +111,7 @@ async fn remote_workers_are_listed_with_jobs_and_problems() {
         assert!(main.contains(&alarm) && main.contains(&problem), "{main}");
     }
     workers.record_job("rack-1", "slot-2", job, SlotReport::default(), site.now());
-    assert_eq!(worker_list().await["troubles"], json!([]));
+    assert_eq!(worker_list().await["problems"], json!([]));
     let metrics = site.get("/metrics", Some(ADMIN)).await.body;
     assert!(
         metrics.contains("faceoff_remote_long_units 1\n"),
@@ -123,7 +123,7 @@ async fn remote_workers_are_listed_with_jobs_and_problems() {
     workers.set_problem("give out work", Some("no connection to <NATS>"));
     let list = worker_list().await;
     assert_eq!(
-        list["troubles"],
+        list["problems"],
         json!(["The server cannot give out work: no connection to <NATS>"])
     );
     for path in ["/organiser", "/organiser/workers"] {

@@ -106,7 +106,7 @@ impl Heading {
             if is_shown {
                 heading = Some(Self {
                     times: times(&stage),
-                    next: stage.next_cut.as_ref().map(NextEvaluation::new),
+                    next: stage.next_cutoff.as_ref().map(NextEvaluation::new),
                     rules: (stage.revisions.len() > 1).then(|| {
                         format!("revision {}, since {}", board.revision, utc_minute(board.since))
                     }),

@@ -29,7 +29,7 @@ pub(super) struct TeamCell {
     pub(super) evaluation: EvaluationId,
     pub(super) day: civil::Date,
     /// Reason of an extra evaluation.
-    pub(super) extra_turn: Option<String>,
+    pub(super) extra_evaluation: Option<String>,
     /// Number of days in the mean, if there are several.
     pub(super) days: Option<usize>,
     /// Conditions of the evaluation, where they differ between rows.
@@ -182,7 +182,7 @@ impl<'a> Context<'a> {
             agent: row.agent.clone(),
             evaluation: row.evaluation,
             day: row.day,
-            extra_turn: row.extra_turn.clone(),
+            extra_evaluation: row.extra_evaluation.clone(),
             days: (row.evaluations.len() > 1).then_some(row.evaluations.len()),
             setting: (!self.has_common_setting).then(|| setting(row)),
             tier: (!self.is_by_rank).then(|| self.tier(row.tier)),

@@ -72,11 +72,11 @@ pub(super) async fn page_with(
     let terms = app.store.terms().await.map_err(Problem::from)?;
     let newest_terms = terms.first().map(|terms| terms.version);
     let user = member.caller.user();
-    let today = me.turn.evaluation.zip(me.turn.next.clone());
+    let today = me.today.evaluation.zip(me.today.next.clone());
     let page = Page {
         frame: Frame::for_app(app, season, "/desk"),
         head: DashboardHeader::new(&member.caller, "/desk", notice),
-        next_cutoff: me.next_cut.as_ref().map(ToString::to_string),
+        next_cutoff: me.next_cutoff.as_ref().map(ToString::to_string),
         active: active.map(SubmissionRow::from),
         today,
         newest,

@@ -128,6 +128,10 @@ static SOURCES: LazyLock<[(&str, Vec<Source>); 4]> = LazyLock::new(|| {
                     "security",
                     "How agents are isolated from each other, the server and future episodes."
                 ),
+                source!(
+                    "security-input",
+                    "How the server treats answers, bundles, text and connections from outside."
+                ),
             ],
         ),
         (

@@ -105,7 +105,7 @@ async fn server_items(app: &App) -> Result<(Vec<Item>, Option<(u32, u32)>), Prob
             links: vec![("/organiser/workers".into(), "Workers".into())],
         });
     }
-    for trouble in workers.troubles {
+    for trouble in workers.problems {
         items.push(Item {
             class: "bad",
             title: "Problem with remote workers".to_owned(),
@@ -114,13 +114,13 @@ async fn server_items(app: &App) -> Result<(Vec<Item>, Option<(u32, u32)>), Prob
         });
     }
     for team in storage::all(app).await? {
-        if team.archive_bytes.saturating_mul(100) >= team.quota_bytes.saturating_mul(NEARLY_FULL) {
+        if team.bundle_bytes.saturating_mul(100) >= team.quota_bytes.saturating_mul(NEARLY_FULL) {
             items.push(Item {
                 class: "waiting",
                 title: format!("{} has used up most of its upload quota", team.team_name),
                 detail: format!(
                     "{} of {} used by bundles.",
-                    dashboard_frame::bytes(team.archive_bytes),
+                    dashboard_frame::bytes(team.bundle_bytes),
                     dashboard_frame::bytes(team.quota_bytes)
                 ),
                 links: vec![("/organiser/storage".into(), "Storage".into())],

@@ -105,7 +105,7 @@ fn row(view: EvaluationView, replaced: &BTreeSet<EvaluationId>) -> Row {
     let expected = view.queue.and_then(|queue| queue.expected_at);
     let voided = view.voided.map(|ruling| ruling.reason);
     let extra = view
-        .extra_turn
+        .extra_evaluation
         .map(|reason| format!("extra evaluation: {reason}"));
     let detail = voided.or(detail).or(extra);
     Row {
@@ -170,8 +170,8 @@ pub(super) async fn page(
         .filter(|team| team.retired_at.is_none() && team.disqualified.is_none())
         .map(|team| (team.id, team.name, "no valid submission".to_owned()))
         .collect();
-    let not_taken = view.not_taken.into_iter();
-    excluded.extend(not_taken.map(|exclusion| (exclusion.team, exclusion.team_name, exclusion.reason)));
+    let excluded_teams = view.excluded.into_iter();
+    excluded.extend(excluded_teams.map(|exclusion| (exclusion.team, exclusion.team_name, exclusion.reason)));
     let is_archive = store.archived_season().is_some();
     let load = match is_archive {
         true => None,

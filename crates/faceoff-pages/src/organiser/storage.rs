@@ -68,7 +68,7 @@ pub(super) async fn page(
         stages.push((stage.id, stage.name, retention.to_string()));
     }
     let mut teams = storage::all(&app).await?;
-    teams.sort_by_key(|team| std::cmp::Reverse(team.archive_bytes + team.dataset_bytes));
+    teams.sort_by_key(|team| std::cmp::Reverse(team.bundle_bytes + team.dataset_bytes));
     let season = SeasonHead::load(&app).await?.name;
     let path = "/organiser/storage";
     let page = Page {

@@ -40,12 +40,12 @@ pub(super) async fn entrants(
                 agent: agent.map(|name| faceoff_types::escape_unprintable(&name).into_owned()),
             });
         }
-        let left = entrant.left.as_ref().map(|left| {
-            let how = standings::left_label(left.r#as);
-            let from = left.from_round;
+        let left = entrant.departure.as_ref().map(|departure| {
+            let how = standings::left_label(departure.r#as);
+            let from = departure.from_round;
             match spoilers.hides_results() {
                 true => format!("{how} from round {from}"),
-                false => format!("{how} from round {from}: {}", left.reason),
+                false => format!("{how} from round {from}: {}", departure.reason),
             }
         });
         entrants.push(Entrant {

@@ -67,7 +67,7 @@ fn progress_text(round: &RoundView) -> String {
             parts.push(format!("{count} {words}"));
         }
     }
-    let end = match round.over_at {
+    let end = match round.ended_at {
         Some(at) => format!(", finished {}", utc_minute(at)),
         None => String::new(),
     };

@@ -163,7 +163,7 @@ def make_vec_env(task: str = "defend", n_envs: int = 1, *, seed: int | None = No
         MissingError: if Stable-Baselines3 is not installed.
     """
     if "autoreset_mode" in others:
-        raise ArgumentError("autoreset_mode: expected to be left out, since Stable-Baselines3 knows one, got one")
+        raise ArgumentError("autoreset_mode: expected no value, since Stable-Baselines3 has a single mode, got one")
     try:
         from stable_baselines3.common.vec_env import VecEnv
     except ImportError as error:

@@ -3,7 +3,7 @@
 use faceoff_sim::{
     JOINTS,
     dynamics::{arm::Kinematics, spatial::Vec3},
-    robot::inverse_kinematics::full,
+    robot::inverse_kinematics::with_zero_universal,
 };
 use std::array::from_fn;
 
@@ -11,7 +11,7 @@ use std::array::from_fn;
 /// third of the time of `arm_forward`.
 #[inline(always)]
 pub fn kinematics_at(q: &[f64; JOINTS]) -> Kinematics<f64> {
-    Kinematics::new(&full(q))
+    Kinematics::new(&with_zero_universal(q))
 }
 
 /// Derivative of the end effector's position by each joint, m/rad.

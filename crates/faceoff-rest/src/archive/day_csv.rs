@@ -95,7 +95,7 @@ pub(super) fn day_table(evaluations: &[EvaluationView]) -> Vec<u8> {
                     .as_ref()
                     .map_or("", |ruling| ruling.reason.as_str()),
             ),
-            escape_formula(evaluation.extra_turn.as_deref().unwrap_or_default()),
+            escape_formula(evaluation.extra_evaluation.as_deref().unwrap_or_default()),
             or_empty(finished_at),
             or_empty(result.map(|result| result.score)),
             or_empty(result.map(|result| result.penalty_points)),

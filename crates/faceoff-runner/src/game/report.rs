@@ -9,7 +9,7 @@ use crate::{
     fault::PlatformFault,
     host_interference::{KernelCounters, InterferenceMonitor},
 };
-use faceoff_dataset::game::{GameArchives, GameRecorder, RecordedGame, clear_game};
+use faceoff_dataset::game::{GameArchives, GameRecorder, RecordedGame, remove_game};
 use faceoff_episode::{
     Arena, FinishedGame, RunningGame, GameSink, GameStepRow, RallyRow, RallyStart, RecordError,
 };
@@ -74,7 +74,7 @@ pub fn run_game_monitored(
     monitors: [&dyn InterferenceMonitor; 2],
 ) -> Result<GameReport, PlatformFault> {
     let clear =
-        || clear_game(out).map_err(PlatformFault::io(format!("clearing {}", out.display())));
+        || remove_game(out).map_err(PlatformFault::io(format!("clearing {}", out.display())));
     clear()?;
     let tables = out.join(TABLES);
     let report = record(spec, bundles, envs, out, &tables, observer, monitors);
@@ -104,7 +104,7 @@ fn record(
     let recorded = RecordedGame {
         spec,
         agents: &agents,
-        played,
+        finished: played,
         calibration,
         logs: &logs,
     };

@@ -7,7 +7,7 @@ use crate::{
 };
 use faceoff_dataset::{
     Dataset, assemble,
-    verify::{Verified, verify},
+    verify::{VerifiedDataset, verify},
 };
 use faceoff_types::{AgentFaultKind, Ruleset, Task};
 use faceoff_wire::job::EvaluationMeta;
@@ -105,7 +105,7 @@ fn meta() -> EvaluationMeta {
 }
 
 /// Runs one shard and simulates its recording again.
-fn verified(agent: &Agent, task: Task, episodes: u32) -> Verified {
+fn verified(agent: &Agent, task: Task, episodes: u32) -> VerifiedDataset {
     let dir = tempfile::tempdir().unwrap();
     let shard = dir.path().join("shard");
     run(&spec(task, 0..episodes), agent, &sandboxed(), &shard).unwrap();

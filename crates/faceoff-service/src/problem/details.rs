@@ -59,6 +59,13 @@ impl Problem {
         self
     }
 
+    /// Adds a renamed extension member under its name and, until the next minor version, its old name.
+    #[must_use]
+    pub fn with_renamed(self, name: &str, old_name: &str, value: impl Into<Value>) -> Self {
+        let value = value.into();
+        self.with(old_name, value.clone()).with(name, value)
+    }
+
     /// Adds a header of the response.
     pub fn with_header(mut self, name: HeaderName, value: HeaderValue) -> Self {
         self.headers.push((name, value));
@@ -162,7 +169,7 @@ impl Problem {
 #[schema(as = Problem)]
 pub struct ProblemBody<'a> {
     /// The kind of the problem; the server's page `/problems` explains it.
-    #[schema(example = "/problems#day-has-cut")]
+    #[schema(example = "/problems#cutoff-passed")]
     r#type: String,
     /// The kind in a few words.
     title: &'a str,

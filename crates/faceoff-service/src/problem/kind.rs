@@ -86,9 +86,9 @@ kinds! {
     NotConfirmed "not-confirmed" CONFLICT
         "Confirmation is required"
         "The request cannot be undone; the detail describes its effects. Send it again with the field “confirm” as the detail says."
-    CutoffPassed "day-has-cut" CONFLICT
+    CutoffPassed "cutoff-passed" CONFLICT
         "The day has had its cutoff"
-        "A day has one cutoff, at which the active submissions of all teams are evaluated. “next_cut” says when the next one is."
+        "A day has one cutoff, at which the active submissions of all teams are evaluated. “next_cutoff” says when the next one is."
     NotYet "not-yet" CONFLICT
         "Not yet"
         "Datasets and comparisons reveal the day's episodes. They are released for everyone at once, when the day's last evaluation has ended."
@@ -131,7 +131,7 @@ kinds! {
     StorageQuotaExceeded "stored-quota-spent" CONFLICT
         "The team's storage is full"
         "“limit_bytes” is the quota of stored bundles, “used_bytes” what the team has used. Delete old submissions, or ask an organiser for a higher quota."
-    DailyGameQuotaExceeded "free-games-spent" TOO_MANY_REQUESTS
+    DailyGameQuotaExceeded "daily-game-quota-exceeded" TOO_MANY_REQUESTS
         "The daily game quota is used up"
         "“limit” is the team's quota of test and friendly games per UTC day, “used” what it has used. “Retry-After” is the time to midnight UTC."
     TooManyRequests "too-many-requests" TOO_MANY_REQUESTS
@@ -148,7 +148,7 @@ kinds! {
         "The server lacks disk space for this request; this is not your fault and affects no verdict. Nothing was stored. Try again after the seconds in the header “Retry-After”."
     NotReady "not-ready" SERVICE_UNAVAILABLE
         "The server is not ready"
-        "The server responds, but is not fully working: “database”, “queue” and “room” say what is wrong. It recovers automatically once that is fixed."
+        "The server responds, but is not fully working: “database”, “queue” and “free_space” say what is wrong. It recovers automatically once that is fixed."
     Internal "internal" INTERNAL_SERVER_ERROR
         "The server failed"
         "An error of the server. Try again; if it persists, send the header “X-Request-Id” of the response to an organiser."
@@ -159,6 +159,16 @@ impl ProblemKind {
     #[must_use]
     pub const fn slug(self) -> &'static str {
         self.row().0
+    }
+
+    /// The name in `type` of earlier versions. Links to it keep working until the next minor version.
+    #[must_use]
+    pub const fn old_slug(self) -> Option<&'static str> {
+        match self {
+            Self::CutoffPassed => Some("day-has-cut"),
+            Self::DailyGameQuotaExceeded => Some("free-games-spent"),
+            _ => None,
+        }
     }
 
     #[must_use]
@@ -186,8 +196,11 @@ mod tests {
 
     #[test]
     fn kinds_have_unique_slugs_and_error_statuses() {
-        let slugs: BTreeSet<_> = ProblemKind::ALL.iter().map(|kind| kind.slug()).collect();
-        assert_eq!(slugs.len(), ProblemKind::ALL.len());
+        let kinds = ProblemKind::ALL;
+        let slugs: BTreeSet<_> = kinds.iter().map(|kind| kind.slug()).collect();
+        assert_eq!(slugs.len(), kinds.len());
+        let mut old_slugs = kinds.iter().filter_map(|kind| kind.old_slug());
+        assert!(old_slugs.all(|old| !slugs.contains(old)));
         for kind in ProblemKind::ALL {
             assert!(kind.status().is_client_error() || kind.status().is_server_error());
             assert!(kind.meaning().ends_with('.'));

@@ -77,8 +77,8 @@ async fn cutoff_passed(
     let next = serde_json::to_value(next).map_err(Problem::internal)?;
     Ok(Problem::new(ProblemKind::CutoffPassed, detail)
         .with("day", day.to_string())
-        .with("cut_at", cutoff_at.to_string())
-        .with("next_cut", next))
+        .with_renamed("cutoff_at", "cut_at", cutoff_at.to_string())
+        .with_renamed("next_cutoff", "next_cut", next))
 }
 
 /// Starts a missed day of a stage.

@@ -60,7 +60,7 @@ pub async fn start_final_day(
             ),
         )
         .with("day", day.to_string())
-        .with("cut_at", cutoff_at.to_string()),
+        .with_renamed("cutoff_at", "cut_at", cutoff_at.to_string()),
         error => error.into(),
     })?;
     tracing::info!(stage = %stage.name, evaluations = created.len(), "the final day was started");

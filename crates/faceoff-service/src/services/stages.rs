@@ -54,7 +54,7 @@ pub async fn check_robot(app: &AppState, settings: &PerturbationSettings) -> Res
     let seed = app.store.season().await?.secret.model_mismatch();
     let [least, most] = settings.model_mismatch.static_error_m;
     let settings = settings.clone();
-    let has_robot = move || faceoff_dataset::has_robot(&settings, seed);
+    let has_robot = move || faceoff_dataset::can_draw_plant(&settings, seed);
     if tokio::task::spawn_blocking(has_robot)
         .await
         .map_err(Problem::internal)?

@@ -18,7 +18,7 @@ pub fn view(attempt: GameAttempt) -> GameAttemptView {
     GameAttemptView {
         number: attempt.number,
         worker: attempt.worker,
-        begun_at: attempt.begun_at,
+        started_at: attempt.begun_at,
         ended_at: attempt.end.as_ref().map(|end| end.at),
         end,
         reason: attempt.end.and_then(|end| end.reason).map(printable),

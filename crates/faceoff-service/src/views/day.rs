@@ -29,7 +29,7 @@ pub async fn build(app: &AppState, stage_day: StageDay) -> Result<DayView, Probl
         day: stage_day.date,
         created,
         without_submission,
-        not_taken: excluded_teams,
+        excluded: excluded_teams,
     })
 }
 

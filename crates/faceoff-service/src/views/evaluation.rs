@@ -191,7 +191,7 @@ fn view(visibility: &Visibility, evaluation: Evaluation, team_name: TeamName) ->
         released_at: evaluation.released_at,
         deadline_at: evaluation.deadline_at,
         rerun_of: evaluation.rerun_of,
-        extra_turn: evaluation.extra_for,
+        extra_evaluation: evaluation.extra_for,
         voided: evaluation.voided.map(ruling::view),
         blind: hidden,
         public,

@@ -99,7 +99,7 @@ pub fn view(state: &TournamentState, viewer: Viewer, game: &Game) -> Result<Game
         seed_label: game.seed.to_string(),
         created_at: game.created_at,
         next: next(state, game).to_owned(),
-        taken_out_by: excluded_by,
+        excluded_by,
         status: status(state, viewer, game)?,
     })
 }
@@ -125,10 +125,10 @@ fn purpose(state: &TournamentState, game: &Game) -> Result<PurposeView, Problem>
             second_half: original.second_half,
         },
         GamePurpose::Test { asked_by } => PurposeView::Test {
-            asked_by: asked_by.map(|team| state.name(team)).transpose()?,
+            requested_by: asked_by.map(|team| state.name(team)).transpose()?,
         },
         GamePurpose::Friendly { asked_by } => PurposeView::Friendly {
-            asked_by: state.name(asked_by)?,
+            requested_by: state.name(asked_by)?,
         },
     })
 }

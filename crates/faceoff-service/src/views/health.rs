@@ -13,7 +13,7 @@ use faceoff_store::QueueHealth;
 /// disks have free space.
 ///
 /// # Errors
-/// [`ProblemKind::NotReady`]; its `database`, `queue` and `room` say what is wrong.
+/// [`ProblemKind::NotReady`]; its `database`, `queue` and `free_space` say what is wrong.
 #[boxed]
 pub async fn check(app: &AppState) -> Result<HealthView, Problem> {
     let free_space = app.store.free_space();
@@ -90,7 +90,8 @@ pub async fn check(app: &AppState) -> Result<HealthView, Problem> {
             },
         )
         .with("queue", queue)
-        .with(
+        .with_renamed(
+            "free_space",
             "room",
             match (is_short, out_of_space_jobs > 0) {
                 (true, _) => "short",
@@ -105,7 +106,7 @@ pub async fn check(app: &AppState) -> Result<HealthView, Problem> {
 /// Problems of a server whose jobs run on remote workers only.
 fn remote_problems(app: &AppState, waiting: u32) -> Vec<String> {
     let workers = workers::current(app);
-    let mut problems = workers.troubles;
+    let mut problems = workers.problems;
     if workers.remote_slots == 0 && waiting > 0 {
         problems.push(format!(
             "{waiting} jobs are pending, the server has no slots of its own, and no remote worker can lease them"

@@ -48,7 +48,7 @@ pub async fn build(app: &AppState, team: Team) -> Result<MeView, Problem> {
     let active = submissions.iter().find(|submission| submission.active);
     Ok(MeView {
         team: team::view(team),
-        turn: TodayView {
+        today: TodayView {
             stage: today.stage,
             day: today.date,
             evaluation: evaluation.as_ref().map(|evaluation| evaluation.id),
@@ -57,8 +57,8 @@ pub async fn build(app: &AppState, team: Team) -> Result<MeView, Problem> {
         },
         validating: validating.collect(),
         active_submission: active.map(|submission| submission.id),
-        not_taken: active.map_or_else(Vec::new, |active| active.not_taken.clone()),
-        next_cut: day::first_cutoff(app).await?,
+        excluded_by: active.map_or_else(Vec::new, |active| active.excluded_by.clone()),
+        next_cutoff: day::first_cutoff(app).await?,
         max_bundle_bytes: app.config.max_bundle_bytes,
     })
 }

@@ -255,7 +255,7 @@ async fn head(
 ) -> Result<ProposalView, Problem> {
     let stage = app.store.stage(proposal.stage).await?;
     let is_over = proposed.iter().all(|evaluation| evaluation.state.is_over());
-    let (state, settled_at) = match proposal.outcome {
+    let (state, decided_at) = match proposal.outcome {
         Some(ProposalOutcome::Applied(at)) => (ProposalStateView::Applied, Some(at)),
         Some(ProposalOutcome::Dropped(at)) => (ProposalStateView::Dropped, Some(at)),
         None if is_over => (ProposalStateView::Played, None),
@@ -276,7 +276,7 @@ async fn head(
         reason: proposal.reason.clone(),
         created_at: proposal.created_at,
         state,
-        settled_at,
+        decided_at,
         evaluations: Vec::new(),
         outcome: None,
     })

@@ -7,8 +7,8 @@ use faceoff_store::{QueueForecast, QueuePosition};
 
 pub fn view(position: QueuePosition) -> QueueView {
     QueueView {
-        place: position.position,
-        of: position.total,
+        position: position.position,
+        total: position.total,
         expected_at: position.expected_at,
     }
 }

@@ -41,13 +41,13 @@ pub async fn build(app: &AppState, viewer: Viewer) -> Result<SeasonView, Problem
         mismatch_seed: revealed(season.secret.model_mismatch()),
         today: stage::current(app).await?.day(app.config.clock.now()).date,
         stages: stage::all_for_viewer(app, viewer).await?,
-        next_cut: day::first_cutoff(app).await?,
+        next_cutoff: day::first_cutoff(app).await?,
         days: days
             .into_iter()
             .map(|(day, finished)| SeasonDay {
                 stage: day.stage_day.stage,
                 day: day.stage_day.date,
-                cut_at: day.cutoff_at,
+                cutoff_at: day.cutoff_at,
                 deadline_at: day.deadline_at,
                 released_at: day.released_at,
                 missed: missed.get(&day.stage_day).cloned(),

@@ -78,7 +78,7 @@ pub async fn build(app: &AppState, stage: Stage) -> Result<StageView, Problem> {
     let revisions = app.store.stage_revisions(stage.id).await?;
     Ok(StageView {
         retention: app.store.stage_retention(stage.id).await?,
-        next_cut: day::next_cutoff(app, &stage).await?,
+        next_cutoff: day::next_cutoff(app, &stage).await?,
         frozen: app.store.board_freeze(stage.id).await?.map(ruling::view),
         phase: phase(stage.phase(app.config.clock.now())),
         id: stage.id,

@@ -9,8 +9,8 @@ fn view(storage: TeamStorage, quota_bytes: u64, counted: StorageScope) -> Storag
     StorageView {
         team: storage.team,
         team_name: storage.name,
-        archives: storage.bundles,
-        archive_bytes: storage.bundle_bytes,
+        bundles: storage.bundles,
+        bundle_bytes: storage.bundle_bytes,
         quota_bytes,
         datasets: storage.datasets,
         dataset_bytes: storage.dataset_bytes,

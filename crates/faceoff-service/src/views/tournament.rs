@@ -96,7 +96,7 @@ pub fn entrant(entrant: Entrant) -> EntrantView {
         team: entrant.team,
         team_name: entrant.name,
         entered_at: entrant.entered_at,
-        left: entrant.departure.map(departure),
+        departure: entrant.departure.map(departure),
     }
 }
 
@@ -139,7 +139,7 @@ pub fn round_view(state: &TournamentState, round: &TournamentRound) -> Result<Ro
     Ok(RoundView {
         number: round.number,
         started_at: round.started_at,
-        over_at: round.over_at,
+        ended_at: round.over_at,
         matchdays,
         progress,
         groups: round.groups.iter().map(names).collect::<Result<_, _>>()?,

@@ -16,7 +16,7 @@ pub async fn read(app: &AppState, dataset: &str) -> Result<ViolationsView, Probl
         .artifacts()
         .local_path(dataset)
         .map_err(Problem::internal)?;
-    let read = move || Dataset::open_unread(&path)?.violations();
+    let read = move || Dataset::open_lazily(&path)?.violations();
     let file = tokio::task::spawn_blocking(read)
         .await
         .map_err(Problem::internal)?

@@ -42,8 +42,8 @@ pub fn delivery(delivery: Delivery) -> DeliveryView {
         }),
         state: match delivery.state {
             DeliveryState::Pending { next_at } => DeliveryStateView::Waiting { next_at },
-            DeliveryState::Delivered { at } => DeliveryStateView::Delivered { settled_at: at },
-            DeliveryState::GivenUp { at } => DeliveryStateView::GivenUp { settled_at: at },
+            DeliveryState::Delivered { at } => DeliveryStateView::Delivered { ended_at: at },
+            DeliveryState::GivenUp { at } => DeliveryStateView::GivenUp { ended_at: at },
         },
     }
 }

@@ -41,8 +41,8 @@ pub fn current(app: &AppState) -> WorkersView {
     WorkersView {
         own_slots: app.config.capacity.slots,
         remote_slots: workers.available_slots(now),
-        is_given: workers.are_enabled(),
-        troubles: problems,
+        leases_jobs: workers.are_enabled(),
+        problems,
         alarms,
         workers: all.into_iter().map(|heard| worker(heard, now)).collect(),
         bans: Vec::new(),
@@ -87,10 +87,10 @@ fn worker(worker: WorkerStatus, now: Timestamp) -> WorkerView {
     let busy = worker.busy_slots.into_iter().map(|(slot, busy)| BusySlotView {
         is_long: is_long(&busy, now),
         slot,
-        unit: busy.job,
-        what: busy.description,
+        job: busy.job,
+        job_description: busy.description,
         since: busy.since,
-        trouble: busy.problem,
+        problem: busy.problem,
     });
     WorkerView {
         busy: busy.collect(),

@@ -1,5 +1,5 @@
-//! What lies between an agent and its robot: the observation one way, commands the other, both subject
-//! to the perturbations.
+//! The channel between an agent and its robot: observations in one direction, commands in the other, both
+//! subject to the perturbations.
 
 mod command;
 mod latency;
@@ -22,8 +22,8 @@ pub struct AgentChannel {
 }
 
 impl AgentChannel {
-    /// The channel of a robot (0 or 1) in a world at its start. Draws come from streams of their own,
-    /// derived from `seed` by the factor's name; robot 2's are other ones than robot 1's.
+    /// The channel of a robot (0 or 1) in a world at its start. Each factor and each robot has its own random
+    /// stream, derived from `seed` by the factor's name.
     #[must_use]
     pub fn new(
         robot: usize,
@@ -48,21 +48,21 @@ impl AgentChannel {
                 .map(|stream| Latency::new(&settings.delay, interpolation, stream)),
             observation: [0.0; OBSERVATION_WITH_OPPONENT_LEN],
         };
-        channel.look(world, false);
+        channel.update_observation(world, false);
         channel
     }
 
-    /// What the agent was told last, with the opponent's end effector at the end; zero without one.
+    /// The latest observation. Its last three numbers are the opponent's end effector, or zero.
     #[must_use]
     pub fn observation(&self) -> &[f64; OBSERVATION_WITH_OPPONENT_LEN] {
         &self.observation
     }
 
-    /// From now on actions are of this interpolation.
-    pub fn interpolate(&mut self, interpolation: Interpolation) {
+    /// Sets the interpolation of later actions.
+    pub fn set_interpolation(&mut self, interpolation: Interpolation) {
         self.interpolation = interpolation;
         if let Some(latency) = &mut self.latency {
-            latency.interpolate(interpolation);
+            latency.set_interpolation(interpolation);
         }
     }
 
@@ -80,13 +80,13 @@ impl AgentChannel {
     }
 
     /// Observes the world; `lost` repeats the puck's last reported pose.
-    pub fn look(&mut self, world: &World, lost: bool) {
+    pub fn update_observation(&mut self, world: &World, lost: bool) {
         let [x, y, yaw, ..] = self.observation;
         self.observation = observe(world, self.robot);
         if let Some(latency) = &mut self.latency {
             latency.delay(&mut self.observation);
         }
-        // Noise is drawn for the lost puck too, so that a loss does not shift later draws.
+        // Draw noise for a lost puck too, so that a loss does not shift later draws.
         if let Some(noise) = &mut self.noise {
             noise.add(&mut self.observation);
             self.observation[2] = wrap(self.observation[2]);

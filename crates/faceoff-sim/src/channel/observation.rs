@@ -1,4 +1,4 @@
-//! What an agent observes (PROTOCOL and MODEL, "Observation").
+//! An agent's observation (PROTOCOL and MODEL, "Observation").
 
 use crate::{
     table::{geometry::TABLE, puck::Puck},
@@ -12,7 +12,7 @@ pub const OBSERVATION_LEN: usize = 20;
 /// Numbers in an observation with an opponent.
 pub const OBSERVATION_WITH_OPPONENT_LEN: usize = 23;
 
-/// Numbers in the observation of a task: the opponent of `hit` is seen.
+/// Numbers in the observation of a task. Only `hit` has an opponent.
 #[must_use]
 pub const fn len(task: Task) -> usize {
     match task {
@@ -21,7 +21,7 @@ pub const fn len(task: Task) -> usize {
     }
 }
 
-/// What a robot (0 or 1) sees of the world, in its own base frame, without noise: puck pose and
+/// The observation of a robot (0 or 1), in its own base frame, without noise: puck pose and
 /// velocity, joint positions, filtered joint velocities, and the opponent's end effector. The last
 /// three are zero without an opponent.
 #[must_use]
@@ -32,7 +32,7 @@ pub fn observe(world: &World, robot: usize) -> [f64; OBSERVATION_WITH_OPPONENT_L
     observation[13..20].copy_from_slice(world.filtered_velocities(robot));
     if world.robots() == 2 {
         let [x, y, z] = world.end_effector_before(1 - robot);
-        // The two base frames are each other's image under half a turn about the table's centre.
+        // Half a turn about the table's centre maps each base frame onto the other.
         observation[20..].copy_from_slice(&[2.0 * TABLE.base_x_m - x, -y, z]);
     }
     observation
@@ -50,7 +50,7 @@ fn puck_in_robot_frame(puck: &Puck, robot: usize) -> [f64; 6] {
 /// An angle in [−π, π).
 #[must_use]
 pub fn wrap(angle: f64) -> f64 {
-    let turned = (angle + PI) - TAU * ((angle + PI) / TAU).floor();
-    // Rounding may land on the open end.
-    if turned >= TAU { -PI } else { turned - PI }
+    let shifted = (angle + PI) - TAU * ((angle + PI) / TAU).floor();
+    // Rounding may give the open end of the interval.
+    if shifted >= TAU { -PI } else { shifted - PI }
 }

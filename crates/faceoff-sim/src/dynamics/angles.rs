@@ -1,9 +1,9 @@
-//! `libm`'s arc tangent, sine and cosine, lane by lane the same bits as the scalar functions.
+//! `libm`'s arc tangent, sine and cosine in lanes, with the same bits as the scalar functions.
 //!
-//! Where four lanes are all in the range of play, they are computed at once, in the order of operations of
-//! fdlibm, which `libm` follows; elsewhere, and for fewer lanes, each is `libm`'s own.
+//! If all four lanes are in the usual range, they are computed at once, in fdlibm's order of operations,
+//! which `libm` follows. Otherwise, and for fewer lanes, each lane calls `libm`.
 
-use super::lanes::{Lanes, MAX_LANES, PIO2_HEAD, PIO2_TAIL, turned};
+use super::lanes::{Lanes, MAX_LANES, PIO2_HEAD, PIO2_TAIL, rotate_quarters};
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, PI};
 
 /// Angle of the point (x, y), rad, as `libm::atan2`.
@@ -13,14 +13,14 @@ pub fn atan2<T: Lanes>(y: T, x: T) -> T {
         return T::from_fn(|lane| libm::atan2(y.lane(lane), x.lane(lane)));
     }
     let ratio = (y / x).abs();
-    // Leaves out what has no ratio: no numbers, infinities, both zero.
-    if T::bits(ratio.within(T::splat(STEEPEST))) != T::ALL {
+    // Excludes NaN, infinities, and x and y both zero.
+    if T::bits(ratio.less_or_equal(T::splat(STEEPEST))) != T::ALL {
         return atan2_lane_by_lane(&y, &x);
     }
     let z = arc_tangent(ratio);
-    let left = x.below(T::splat(0.0));
-    let z = T::choose(left, T::splat(PI) - (z - T::splat(PI_TAIL)), z);
-    z.with_sign_of(y)
+    let left = x.less_than(T::splat(0.0));
+    let z = T::select(left, T::splat(PI) - (z - T::splat(PI_TAIL)), z);
+    z.copysign(y)
 }
 
 /// Sine and cosine of an angle in rad, as `libm::sincos`.
@@ -30,25 +30,25 @@ pub fn sin_cos<T: Lanes>(angle: T) -> (T, T) {
         return sin_cos_lane_by_lane(&angle);
     }
     let size = angle.abs();
-    // Near to quarter and half a turn more digits of π are needed, and beyond more turns.
-    let near_quarter = T::unequal(
-        T::splat(QUARTER.0).within(size),
-        T::splat(QUARTER.1).within(size),
+    // Near a quarter turn more digits of π are needed; beyond half a turn, more reduction.
+    let near_quarter = T::mask_xor(
+        T::splat(QUARTER.0).less_or_equal(size),
+        T::splat(QUARTER.1).less_or_equal(size),
     );
-    let far = T::splat(HALF).within(size);
-    if T::bits(T::either(near_quarter, far)) != 0 || T::bits(size.within(size)) != T::ALL {
+    let far = T::splat(HALF).less_or_equal(size);
+    if T::bits(T::mask_or(near_quarter, far)) != 0 || T::bits(size.less_or_equal(size)) != T::ALL {
         return sin_cos_lane_by_lane(&angle);
     }
-    let quarters = T::choose(
-        T::splat(TWO_QUARTERS).within(size),
+    let quarters = T::select(
+        T::splat(TWO_QUARTERS).less_or_equal(size),
         T::splat(2.0),
-        T::choose(
-            T::splat(ONE_QUARTER).within(size),
+        T::select(
+            T::splat(ONE_QUARTER).less_or_equal(size),
             T::splat(1.0),
             T::splat(0.0),
         ),
     );
-    let signed = quarters.with_sign_of(angle);
+    let signed = quarters.copysign(angle);
     let z = angle - signed * T::splat(PIO2_HEAD);
     let x = z - signed * T::splat(PIO2_TAIL);
     let tail = (z - x) - signed * T::splat(PIO2_TAIL);
@@ -59,47 +59,47 @@ pub fn sin_cos<T: Lanes>(angle: T) -> (T, T) {
     let r = s2 + z * (s3 + z * s4) + z * w * (s5 + z * s6);
     let v = z * x;
     let half = T::splat(0.5);
-    let whole = T::choose(
-        half.below(quarters),
+    let whole = T::select(
+        half.less_than(quarters),
         x - ((z * (half * tail - v * r) - tail) - v * s1),
         x + v * (s1 + z * r),
     );
     // Keeps the sign of a zero.
-    let sin = T::choose(size.below(T::splat(TINY)), angle, whole);
+    let sin = T::select(size.less_than(T::splat(TINY)), angle, whole);
     let r = z * (c1 + z * (c2 + z * c3)) + w * w * (c4 + z * (c5 + z * c6));
     let half_square = half * z;
     let one = T::splat(1.0);
     let w = one - half_square;
     let cos = w + (((one - w) - half_square) + (z * r - x * tail));
-    turned(signed, sin, cos)
+    rotate_quarters(signed, sin, cos)
 }
 
 /// Arc tangent of a ratio that is not negative.
 #[inline(always)]
 fn arc_tangent<T: Lanes>(ratio: T) -> T {
     let one = T::splat(1.0);
-    // The angle less a known one: 0, atan ½, π/4, atan 1½, π/2.
-    let [half, quarter, steep, upright] = ARC_BOUNDS.map(|bound| T::splat(bound).within(ratio));
-    let pick = |of: [T; 5]| {
-        let low = T::choose(half, of[1], of[0]);
-        let middle = T::choose(quarter, of[2], low);
-        T::choose(upright, of[4], T::choose(steep, of[3], middle))
+    // Reduces by a reference angle: 0, atan ½, π/4, atan 1½, π/2.
+    let [half, quarter, steep, upright] = ARC_BOUNDS.map(|bound| T::splat(bound).less_or_equal(ratio));
+    let pick = |values: [T; 5]| {
+        let low = T::select(half, values[1], values[0]);
+        let middle = T::select(quarter, values[2], low);
+        T::select(upright, values[4], T::select(steep, values[3], middle))
     };
-    let over = pick([
+    let numerator = pick([
         ratio,
         T::splat(2.0) * ratio - one,
         ratio - one,
         ratio - T::splat(1.5),
         -one,
     ]);
-    let under = pick([
+    let denominator = pick([
         one,
         T::splat(2.0) + ratio,
         ratio + one,
         one + T::splat(1.5) * ratio,
         ratio,
     ]);
-    let x = over / under;
+    let x = numerator / denominator;
     let z = x * x;
     let w = z * z;
     let a = ARC_TANGENT.map(T::splat);
@@ -123,22 +123,23 @@ fn sin_cos_lane_by_lane<T: Lanes>(angle: &T) -> (T, T) {
     (T::from_fn(|i| sines[i]), T::from_fn(|i| cosines[i]))
 }
 
-/// Ratios up to this have an arc tangent of their own; beyond it is π/2.
+/// Ratios above this have the arc tangent π/2.
 const STEEPEST: f64 = 1_152_921_504_606_846_976.0;
-/// π less its nearest number.
+/// π minus the nearest `f64`.
 const PI_TAIL: f64 = 1.224_646_799_147_353_2e-16;
-/// Where `libm` takes one and two quarter turns off, rad.
+/// Angles from which `libm` subtracts one and two quarter turns, rad.
 const ONE_QUARTER: f64 = f64::from_bits(0x3fe9_21fc_0000_0000);
 const TWO_QUARTERS: f64 = f64::from_bits(0x4002_d97d_0000_0000);
-/// What is near to a quarter turn; from where on an angle is near to half a turn or beyond, rad.
+/// Range of angles near a quarter turn, rad.
 const QUARTER: (f64, f64) = (
     f64::from_bits(0x3ff9_21fb_0000_0000),
     f64::from_bits(0x3ff9_21fc_0000_0000),
 );
+/// Angles from here on are near half a turn or beyond, rad.
 const HALF: f64 = f64::from_bits(0x4009_21fb_0000_0000);
-/// Below this an angle is its own sine, rad.
+/// Below this angle, rad, the sine equals the angle.
 const TINY: f64 = f64::from_bits(0x3e46_a09e_0000_0000);
-/// Ratios from which the next known angle is nearer.
+/// Ratios at which the next reference angle becomes nearer.
 const ARC_BOUNDS: [f64; 4] = [0.4375, 0.6875, 1.1875, 2.4375];
 
 /// The published constants (fdlibm).
@@ -171,7 +172,7 @@ const ARC_TANGENT: [f64; 11] = [
     -0.036_531_572_744_216_916,
     0.016_285_820_115_365_782,
 ];
-/// The known angles, and what their numbers leave out, rad.
+/// The reference angles, rad, as a head and a correction.
 const ARC_HEAD: [f64; 5] = [
     0.0,
     0.463_647_609_000_806_1,
@@ -192,12 +193,13 @@ mod tests {
     use super::*;
     use wide::f64x4;
 
-    fn assert_same(ours: f64, theirs: f64, of: &str) {
-        let same = ours.to_bits() == theirs.to_bits() || (ours.is_nan() && theirs.is_nan());
-        assert!(same, "{of}: {ours:e} and {theirs:e}");
+    fn assert_same(actual: f64, expected: f64, label: &str) {
+        let same =
+            actual.to_bits() == expected.to_bits() || (actual.is_nan() && expected.is_nan());
+        assert!(same, "{label}: {actual:e} and {expected:e}");
     }
 
-    /// Numbers of all sizes and signs, and those at which a formula begins.
+    /// Numbers of all magnitudes and signs, and the limits of each formula.
     fn numbers() -> Vec<f64> {
         let mut all = vec![0.0, f64::INFINITY, f64::NAN, f64::MIN_POSITIVE, 5e-324];
         let edges = [
@@ -228,8 +230,8 @@ mod tests {
     }
 
     #[test]
-    fn sine_and_cosine_are_libms() {
-        // Each beside an ordinary one, so that lanes are computed together where they can be.
+    fn sin_cos_matches_libm() {
+        // Ordinary angles in the other lanes, so that the lanes are computed at once where possible.
         for x in numbers() {
             let (sines, cosines) = sin_cos(f64x4::new([x, 0.3, -1.2, 2.9]));
             for (lane, angle) in [x, 0.3, -1.2, 2.9].into_iter().enumerate() {
@@ -241,15 +243,15 @@ mod tests {
     }
 
     #[test]
-    fn arc_tangent_is_libms() {
+    fn atan2_matches_libm() {
         let numbers = numbers();
         for (i, &x) in numbers.iter().enumerate() {
             for &y in numbers.iter().skip(i % 7).step_by(7) {
                 let (ys, xs) = ([y, 0.1, x, -2.0], [x, 1.0, y, 0.5]);
                 let angles = atan2(f64x4::new(ys), f64x4::new(xs));
                 for lane in 0..4 {
-                    let of = format!("angle of ({:e}, {:e})", xs[lane], ys[lane]);
-                    assert_same(angles.lane(lane), libm::atan2(ys[lane], xs[lane]), &of);
+                    let label = format!("angle of ({:e}, {:e})", xs[lane], ys[lane]);
+                    assert_same(angles.lane(lane), libm::atan2(ys[lane], xs[lane]), &label);
                 }
             }
         }

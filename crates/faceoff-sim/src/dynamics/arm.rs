@@ -6,7 +6,7 @@ use super::{
 };
 use crate::model::{DOFS, GRAVITY_M_S2, JOINTS, LINKS, Mount, Offset, SUBSTEP_S, TOOL};
 
-/// Where everything is: frames and joint axes in the base frame.
+/// Frames of the links and joint axes, in the base frame.
 #[derive(Debug, Clone, Copy)]
 pub struct Kinematics<T> {
     /// Frames of links 1…7, at their joints.
@@ -130,8 +130,8 @@ impl<T: Lanes> Bodies<T> {
         }
     }
 
-    /// The inertia that each of the seven driven joints of the controller's model carries itself:
-    /// the end effector belongs to link 7, the mallet is missing.
+    /// Inertias of the seven links of the controller's model. Link 7 includes the end effector; there is no
+    /// mallet.
     #[inline(always)]
     pub fn controller(&self) -> [Inertia<T>; JOINTS] {
         let mut bodies = self.links;
@@ -154,10 +154,10 @@ impl<T: Lanes> Bodies<T> {
     }
 }
 
-/// What moves in the plant. The universal joint's first hinge carries nothing but the second one.
+/// The moving bodies of the plant. The universal joint's first hinge carries only the second one.
 #[derive(Debug, Clone, Copy)]
 pub struct PlantBodies<T> {
-    /// Links 1…7, the end effector belonging to the last.
+    /// Links 1…7; link 7 includes the end effector.
     pub links: [Inertia<T>; JOINTS],
     /// The mallet, on the second hinge.
     pub mallet: Inertia<T>,
@@ -176,7 +176,7 @@ pub fn controller_torques<T: Lanes>(
     ddq: &[T; JOINTS],
 ) -> [T; JOINTS] {
     let mut velocity = Motion::zero();
-    // Accelerating the base upwards is the same as gravity pulling down.
+    // An upward acceleration of the base is equivalent to gravity.
     let mut acceleration = Motion {
         angular: Vec3::zero(),
         linear: Vec3::splat([0.0, 0.0, GRAVITY_M_S2]),
@@ -199,7 +199,7 @@ pub fn controller_torques<T: Lanes>(
     torques
 }
 
-/// The force that moves a body so.
+/// The force that gives a body this motion.
 #[inline(always)]
 fn force_of<T: Lanes>(body: &Inertia<T>, velocity: Motion<T>, acceleration: Motion<T>) -> Force<T> {
     body.mul(acceleration) + velocity.cross_force(body.mul(velocity))

@@ -1,9 +1,9 @@
 //! Four lanes in the 256-bit registers of AVX, on machines that have them.
 //!
-//! The crate is built for any x86-64, which promises registers of two numbers. `wide` decides when it is
-//! compiled which ones it uses; the one way to decide when it runs is through the compiler's intrinsics,
-//! which are unsafe where AVX is not promised. Only plain arithmetic is used: AVX's additions,
-//! multiplications and divisions round as all others do, and nothing is fused.
+//! The crate is built for every x86-64 CPU, which guarantees registers of two numbers only. `wide` selects
+//! its instructions at compile time. Selecting them at run time needs the compiler's intrinsics, which are
+//! unsafe without a guarantee of AVX. Only plain arithmetic is used: it rounds as without AVX, and nothing
+//! is fused.
 
 #![expect(
     unsafe_code,
@@ -11,8 +11,8 @@
 )]
 
 use super::{
-    in_lanes::InLanes,
-    lanes::{Lanes, ROUNDING, SIZE},
+    lane_kernel::LaneKernel,
+    lanes::{Lanes, ROUNDING, ABS_MASK},
 };
 use std::{
     arch::x86_64::{
@@ -24,36 +24,35 @@ use std::{
     ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign},
 };
 
-/// Says that this machine has AVX: there is none otherwise.
+/// Proof that this machine has AVX: values exist only there.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Avx(());
 
 impl Avx {
-    /// If the machine has it.
+    /// `Some` on a machine with AVX.
     pub fn detect() -> Option<Self> {
         std::arch::is_x86_feature_detected!("avx").then_some(Self(()))
     }
 
-    /// Does something in four lanes.
-    pub fn run<I: InLanes>(self, work: I) -> I::Output {
+    /// Runs a kernel in four lanes.
+    pub fn run<I: LaneKernel>(self, kernel: I) -> I::Output {
         #[target_feature(enable = "avx")]
-        fn with_avx<I: InLanes>(work: I) -> I::Output {
-            work.run::<F64x4>()
+        fn with_avx<I: LaneKernel>(kernel: I) -> I::Output {
+            kernel.run::<F64x4>()
         }
-        // SAFETY: `self` exists on machines with AVX only.
-        unsafe { with_avx(work) }
+        // SAFETY: `self` exists only on machines with AVX.
+        unsafe { with_avx(kernel) }
     }
 }
 
-/// Four numbers. There are values of this type below [`Avx::run`] alone, so that whoever computes with
-/// one is on a machine with AVX.
+/// Four numbers. Values exist only within [`Avx::run`], so only on machines with AVX.
 #[derive(Debug, Clone, Copy)]
 pub struct F64x4(__m256d);
 
-/// One function of the trait's, as one or two instructions.
+/// A call of an intrinsic.
 macro_rules! intrinsic {
     ($result:expr) => {
-        // SAFETY: pure arithmetic on values, which exist on machines with AVX only (`F64x4`).
+        // SAFETY: pure arithmetic on values, which exist only on machines with AVX (`F64x4`).
         unsafe { $result }
     };
 }
@@ -115,7 +114,7 @@ impl Lanes for F64x4 {
 
     #[inline(always)]
     fn lane(self, index: usize) -> f64 {
-        // SAFETY: four numbers of 64 bits each, whatever their bits.
+        // SAFETY: four numbers of 64 bits each; every bit pattern is valid.
         let numbers: [f64; 4] = unsafe { std::mem::transmute(self.0) };
         numbers[index]
     }
@@ -127,11 +126,11 @@ impl Lanes for F64x4 {
 
     #[inline(always)]
     fn abs(self) -> Self {
-        Self(intrinsic!(_mm256_and_pd(self.0, _mm256_set1_pd(SIZE))))
+        Self(intrinsic!(_mm256_and_pd(self.0, _mm256_set1_pd(ABS_MASK))))
     }
 
     #[inline(always)]
-    fn with_sign_of(self, other: Self) -> Self {
+    fn copysign(self, other: Self) -> Self {
         Self(intrinsic!(_mm256_or_pd(
             _mm256_andnot_pd(_mm256_set1_pd(-0.0), self.0),
             _mm256_and_pd(_mm256_set1_pd(-0.0), other.0),
@@ -139,32 +138,32 @@ impl Lanes for F64x4 {
     }
 
     #[inline(always)]
-    fn below(self, other: Self) -> Self {
+    fn less_than(self, other: Self) -> Self {
         Self(intrinsic!(_mm256_cmp_pd::<_CMP_LT_OQ>(self.0, other.0)))
     }
 
     #[inline(always)]
-    fn within(self, other: Self) -> Self {
+    fn less_or_equal(self, other: Self) -> Self {
         Self(intrinsic!(_mm256_cmp_pd::<_CMP_LE_OQ>(self.0, other.0)))
     }
 
     #[inline(always)]
-    fn both(a: Self, b: Self) -> Self {
+    fn mask_and(a: Self, b: Self) -> Self {
         Self(intrinsic!(_mm256_and_pd(a.0, b.0)))
     }
 
     #[inline(always)]
-    fn either(a: Self, b: Self) -> Self {
+    fn mask_or(a: Self, b: Self) -> Self {
         Self(intrinsic!(_mm256_or_pd(a.0, b.0)))
     }
 
     #[inline(always)]
-    fn unequal(a: Self, b: Self) -> Self {
+    fn mask_xor(a: Self, b: Self) -> Self {
         Self(intrinsic!(_mm256_xor_pd(a.0, b.0)))
     }
 
     #[inline(always)]
-    fn choose(mask: Self, yes: Self, no: Self) -> Self {
+    fn select(mask: Self, yes: Self, no: Self) -> Self {
         Self(intrinsic!(_mm256_blendv_pd(no.0, yes.0, mask.0)))
     }
 
@@ -173,7 +172,7 @@ impl Lanes for F64x4 {
         intrinsic!(_mm256_movemask_pd(mask.0)).cast_unsigned()
     }
 
-    // The instructions keep their second operand where neither is greater, or one is not a number.
+    // The instructions return their second operand if the operands are equal or one of them is NaN.
     #[inline(always)]
     fn at_least(self, low: Self) -> Self {
         Self(intrinsic!(_mm256_max_pd(low.0, self.0)))

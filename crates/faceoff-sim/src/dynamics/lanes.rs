@@ -4,13 +4,12 @@ use std::f64::consts::FRAC_2_PI;
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 use wide::{f64x2, f64x4};
 
-/// No [`Lanes`] has more arms.
+/// Largest number of lanes of a [`Lanes`] type.
 pub const MAX_LANES: usize = 4;
 
-/// A number per arm. The arm's equations are written once for any `Lanes`: with `f64` they move one
-/// arm, with [`f64x2`] both arms of a table in the two halves of a SIMD register, with four lanes arms of
-/// several tables. Each lane is IEEE double precision without contraction, so that all ways give the same
-/// bits.
+/// A number per arm. The arm's equations are written once for any `Lanes`: with `f64` for one arm, with
+/// [`f64x2`] for both arms of a table in one SIMD register, with four lanes for arms of several tables.
+/// Each lane is IEEE double precision without contraction, so that all variants give the same bits.
 pub trait Lanes:
     Copy
     + Add<Output = Self>
@@ -21,13 +20,13 @@ pub trait Lanes:
     + AddAssign
     + SubAssign
 {
-    /// Yes or no per arm.
+    /// A boolean per arm.
     type Mask: Copy + std::fmt::Debug;
 
     /// Number of arms, at most [`MAX_LANES`].
     const COUNT: usize;
 
-    /// The [`Lanes::bits`] of a mask that says yes to all arms.
+    /// The [`Lanes::bits`] of a mask that is true for all arms.
     const ALL: u32 = (1 << Self::COUNT) - 1;
 
     /// The same number for every arm.
@@ -46,52 +45,49 @@ pub trait Lanes:
         *self = Self::from_fn(|i| if i == index { value } else { before.lane(i) });
     }
 
-    /// The nearest integer, ties to even, of a number below 2⁵¹ in size.
+    /// The nearest integer, ties to even, of a number below 2⁵¹ in magnitude.
     fn nearest(self) -> Self;
 
     fn abs(self) -> Self;
 
-    /// The size of `self` with the sign of `other`, the sign of a zero included.
-    fn with_sign_of(self, other: Self) -> Self;
+    /// The magnitude of `self` with the sign of `other`, also for zeros.
+    fn copysign(self, other: Self) -> Self;
 
-    /// `self < other`; no for what is not a number.
-    fn below(self, other: Self) -> Self::Mask;
+    /// `self < other`; false for NaN.
+    fn less_than(self, other: Self) -> Self::Mask;
 
-    /// `self <= other`; no for what is not a number.
-    fn within(self, other: Self) -> Self::Mask;
+    /// `self <= other`; false for NaN.
+    fn less_or_equal(self, other: Self) -> Self::Mask;
 
-    /// Where both say yes.
-    fn both(a: Self::Mask, b: Self::Mask) -> Self::Mask;
+    fn mask_and(a: Self::Mask, b: Self::Mask) -> Self::Mask;
 
-    /// Where one says yes.
-    fn either(a: Self::Mask, b: Self::Mask) -> Self::Mask;
+    fn mask_or(a: Self::Mask, b: Self::Mask) -> Self::Mask;
 
-    /// Where one says yes and the other no.
-    fn unequal(a: Self::Mask, b: Self::Mask) -> Self::Mask;
+    fn mask_xor(a: Self::Mask, b: Self::Mask) -> Self::Mask;
 
-    /// `yes` where the mask says so, `no` elsewhere.
-    fn choose(mask: Self::Mask, yes: Self, no: Self) -> Self;
+    /// `yes` where the mask is true, `no` elsewhere.
+    fn select(mask: Self::Mask, yes: Self, no: Self) -> Self;
 
-    /// A mask as bits, the first arm's the lowest.
+    /// A mask as bits; the first arm is the lowest bit.
     fn bits(mask: Self::Mask) -> u32;
 
     /// The mask of [`Lanes::bits`].
     #[inline]
     fn mask(bits: u32) -> Self::Mask {
         let yes = Self::from_fn(|i| f64::from(bits >> i & 1));
-        Self::splat(0.0).below(yes)
+        Self::splat(0.0).less_than(yes)
     }
 
-    /// `low` where `self` is below it. What is not a number stays so.
+    /// `low` where `self` is below it. NaN stays NaN.
     #[inline(always)]
     fn at_least(self, low: Self) -> Self {
-        Self::choose(self.below(low), low, self)
+        Self::select(self.less_than(low), low, self)
     }
 
-    /// `high` where `self` is above it. What is not a number stays so.
+    /// `high` where `self` is above it. NaN stays NaN.
     #[inline(always)]
     fn at_most(self, high: Self) -> Self {
-        Self::choose(high.below(self), high, self)
+        Self::select(high.less_than(self), high, self)
     }
 
     /// Sine and cosine of an angle in rad, the same bits for every number of lanes, within an ulp of
@@ -100,7 +96,7 @@ pub trait Lanes:
     fn sin_cos(self) -> (Self, Self) {
         let quarters = self * Self::splat(FRAC_2_PI);
         let quarters = quarters.nearest();
-        // Cody and Waite: two steps, the first exact, take whole quarter turns off.
+        // Cody and Waite: subtract whole quarter turns in two steps, the first one exact.
         let r = self - quarters * Self::splat(PIO2_HEAD) - quarters * Self::splat(PIO2_TAIL);
         let z = r * r;
         let sin = kernel_sin(r, z);
@@ -108,22 +104,22 @@ pub trait Lanes:
         if Self::COUNT <= 2 {
             return lane_by_lane(&quarters, &sin, &cos);
         }
-        if Self::bits(quarters.abs().below(Self::splat(COUNTABLE))) != Self::ALL {
-            return far_away(&quarters, &sin, &cos);
+        if Self::bits(quarters.abs().less_than(Self::splat(MAX_EXACT_QUARTERS))) != Self::ALL {
+            return large_angles(&quarters, &sin, &cos);
         }
-        // In −2…2: quarter turns less whole turns, all exact.
+        // Quarter turns without whole turns, −2…2; all exact.
         let turns = (quarters * Self::splat(0.25)).nearest();
-        turned(quarters - turns * Self::splat(4.0), sin, cos)
+        rotate_quarters(quarters - turns * Self::splat(4.0), sin, cos)
     }
 }
 
-/// Sine and cosine after quarter turns, from those before.
+/// Sine and cosine after some quarter turns, from those of the reduced angle.
 #[inline(always)]
 fn lane_by_lane<T: Lanes>(quarters: &T, sin: &T, cos: &T) -> (T, T) {
     let (mut sines, mut cosines) = ([0.0; MAX_LANES], [0.0; MAX_LANES]);
     for lane in 0..T::COUNT {
         let (s, c) = (sin.lane(lane), cos.lane(lane));
-        // Exact: a small integer. Beyond its range the angle means nothing any more.
+        // Exact: a small integer. Larger angles have no accurate sine.
         (sines[lane], cosines[lane]) = match quarters.lane(lane) as i64 & 3 {
             0 => (s, c),
             1 => (c, -s),
@@ -134,33 +130,33 @@ fn lane_by_lane<T: Lanes>(quarters: &T, sin: &T, cos: &T) -> (T, T) {
     (T::from_fn(|i| sines[i]), T::from_fn(|i| cosines[i]))
 }
 
-/// As [`lane_by_lane`], which is seldom needed for many lanes.
+/// [`lane_by_lane`] out of line: many lanes rarely need it.
 #[cold]
 #[inline(never)]
-fn far_away<T: Lanes>(quarters: &T, sin: &T, cos: &T) -> (T, T) {
+fn large_angles<T: Lanes>(quarters: &T, sin: &T, cos: &T) -> (T, T) {
     lane_by_lane(quarters, sin, cos)
 }
 
-/// Quarter turns below this are told apart exactly.
-const COUNTABLE: f64 = 1_125_899_906_842_624.0;
+/// Numbers of quarter turns below this are exact.
+const MAX_EXACT_QUARTERS: f64 = 1_125_899_906_842_624.0;
 
-/// Sine and cosine after −2…2 quarter turns, from those before.
+/// Sine and cosine after −2…2 quarter turns, from those of the reduced angle.
 #[inline(always)]
-pub(super) fn turned<T: Lanes>(quarters: T, sin: T, cos: T) -> (T, T) {
+pub(super) fn rotate_quarters<T: Lanes>(quarters: T, sin: T, cos: T) -> (T, T) {
     let half = T::splat(0.5);
     let size = quarters.abs();
-    let odd = T::unequal(half.below(size), T::splat(1.5).below(size));
-    let opposite = T::splat(1.5).below(size);
-    let behind = quarters.below(T::splat(0.0) - half);
-    let ahead = half.below(quarters);
-    let (s, c) = (T::choose(odd, cos, sin), T::choose(odd, sin, cos));
-    // The sine's sign turns at −1 and ±2 quarters, the cosine's at 1 and ±2.
-    let sin = T::choose(T::either(behind, opposite), -s, s);
-    let cos = T::choose(T::either(ahead, opposite), -c, c);
+    let odd = T::mask_xor(half.less_than(size), T::splat(1.5).less_than(size));
+    let opposite = T::splat(1.5).less_than(size);
+    let behind = quarters.less_than(T::splat(0.0) - half);
+    let ahead = half.less_than(quarters);
+    let (s, c) = (T::select(odd, cos, sin), T::select(odd, sin, cos));
+    // The sine changes sign at −1 and ±2 quarters, the cosine at 1 and ±2.
+    let sin = T::select(T::mask_or(behind, opposite), -s, s);
+    let cos = T::select(T::mask_or(ahead, opposite), -c, c);
     (sin, cos)
 }
 
-/// See `nearest`.
+/// 1.5 · 2⁵²: adding and subtracting it rounds to an integer, see `nearest`.
 pub(super) const ROUNDING: f64 = 6_755_399_441_055_744.0;
 /// The first 33 bits of π/2, and the rest of it (as in fdlibm).
 #[expect(
@@ -228,7 +224,7 @@ fn horner<T: Lanes>(z: T, coefficients: [f64; 6]) -> T {
     sum
 }
 
-/// The numbers of a row per arm.
+/// Transposes one row per arm into lanes.
 #[inline(always)]
 pub fn gather<'a, T: Lanes, const N: usize>(row: impl Fn(usize) -> &'a [f64; N]) -> [T; N] {
     let rows: [&[f64; N]; MAX_LANES] = std::array::from_fn(|lane| row(lane.min(T::COUNT - 1)));
@@ -281,37 +277,37 @@ impl Lanes for f64 {
     }
 
     #[inline(always)]
-    fn with_sign_of(self, other: Self) -> Self {
+    fn copysign(self, other: Self) -> Self {
         self.copysign(other)
     }
 
     #[inline(always)]
-    fn below(self, other: Self) -> bool {
+    fn less_than(self, other: Self) -> bool {
         self < other
     }
 
     #[inline(always)]
-    fn within(self, other: Self) -> bool {
+    fn less_or_equal(self, other: Self) -> bool {
         self <= other
     }
 
     #[inline(always)]
-    fn both(a: bool, b: bool) -> bool {
+    fn mask_and(a: bool, b: bool) -> bool {
         a & b
     }
 
     #[inline(always)]
-    fn either(a: bool, b: bool) -> bool {
+    fn mask_or(a: bool, b: bool) -> bool {
         a | b
     }
 
     #[inline(always)]
-    fn unequal(a: bool, b: bool) -> bool {
+    fn mask_xor(a: bool, b: bool) -> bool {
         a ^ b
     }
 
     #[inline(always)]
-    fn choose(mask: bool, yes: Self, no: Self) -> Self {
+    fn select(mask: bool, yes: Self, no: Self) -> Self {
         if mask { yes } else { no }
     }
 
@@ -351,41 +347,41 @@ macro_rules! wide_lanes {
 
             #[inline(always)]
             fn abs(self) -> Self {
-                self & Self::splat(SIZE)
+                self & Self::splat(ABS_MASK)
             }
 
             #[inline(always)]
-            fn with_sign_of(self, other: Self) -> Self {
+            fn copysign(self, other: Self) -> Self {
                 self.abs() | (other & Self::splat(-0.0))
             }
 
             #[inline(always)]
-            fn below(self, other: Self) -> Self {
+            fn less_than(self, other: Self) -> Self {
                 self.simd_lt(other)
             }
 
             #[inline(always)]
-            fn within(self, other: Self) -> Self {
+            fn less_or_equal(self, other: Self) -> Self {
                 self.simd_le(other)
             }
 
             #[inline(always)]
-            fn both(a: Self, b: Self) -> Self {
+            fn mask_and(a: Self, b: Self) -> Self {
                 a & b
             }
 
             #[inline(always)]
-            fn either(a: Self, b: Self) -> Self {
+            fn mask_or(a: Self, b: Self) -> Self {
                 a | b
             }
 
             #[inline(always)]
-            fn unequal(a: Self, b: Self) -> Self {
+            fn mask_xor(a: Self, b: Self) -> Self {
                 a ^ b
             }
 
             #[inline(always)]
-            fn choose(mask: Self, yes: Self, no: Self) -> Self {
+            fn select(mask: Self, yes: Self, no: Self) -> Self {
                 mask.bitselect(yes, no)
             }
 
@@ -397,8 +393,8 @@ macro_rules! wide_lanes {
     };
 }
 
-/// All bits of a number but its sign.
-pub(super) const SIZE: f64 = f64::from_bits(i64::MAX as u64);
+/// Mask of all bits except the sign.
+pub(super) const ABS_MASK: f64 = f64::from_bits(i64::MAX as u64);
 
 wide_lanes!(f64x2, 2);
 wide_lanes!(f64x4, 4);
@@ -408,7 +404,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn sine_and_cosine_are_libms_within_rounding() {
+    fn sin_cos_matches_libm_within_rounding() {
         for k in -2_000..2_000 {
             let angle = f64::from(k) * 0.003_7;
             let (sin, cos) = Lanes::sin_cos(angle);

@@ -17,7 +17,7 @@ impl<T: Lanes> Ldlt<T> {
         let mut l = *matrix;
         let one = T::splat(1.0);
         for j in 0..DOFS {
-            // Column j times D, of the rows handled so far.
+            // Column j times D, of the rows above the diagonal.
             let mut scaled = [one; DOFS];
             let mut pivot = l[j][j];
             for k in 0..j {

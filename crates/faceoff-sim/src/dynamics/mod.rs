@@ -4,7 +4,7 @@ pub mod angles;
 pub mod arm;
 #[cfg(target_arch = "x86_64")]
 mod avx;
-pub(crate) mod in_lanes;
+pub(crate) mod lane_kernel;
 pub mod lanes;
 pub mod ldlt;
 pub mod path;

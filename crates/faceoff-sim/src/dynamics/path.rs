@@ -1,11 +1,11 @@
-//! Which registers four lanes are computed in.
+//! Selects the instruction set of four lanes.
 
 #[cfg(target_arch = "x86_64")]
 use super::avx::Avx;
-use super::{in_lanes::InLanes, lanes::MAX_LANES};
+use super::{lane_kernel::LaneKernel, lanes::MAX_LANES};
 use wide::{f64x2, f64x4};
 
-/// How four arms are computed at once. All ways give the same bits.
+/// The instruction set that computes four arms at once. All of them give the same bits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct LanePath(Registers);
 
@@ -17,10 +17,10 @@ enum Registers {
 }
 
 impl LanePath {
-    /// In the registers that every machine of this kind has: of two numbers each on x86-64.
+    /// The baseline registers of the target: two numbers each on x86-64.
     pub const PLAIN: Self = Self(Registers::Plain);
 
-    /// In the 256-bit registers of AVX; none on a machine without them.
+    /// The 256-bit registers of AVX; `None` on a machine without AVX.
     #[must_use]
     pub fn avx() -> Option<Self> {
         #[cfg(target_arch = "x86_64")]
@@ -29,14 +29,14 @@ impl LanePath {
         None
     }
 
-    /// The fastest one that this machine has.
+    /// The fastest one of this machine.
     #[must_use]
     pub fn fastest() -> Self {
         Self::avx().unwrap_or(Self::PLAIN)
     }
 
-    /// How many worlds of so many robots are moved at once. Registers of two numbers are full with the two
-    /// arms of a table.
+    /// Number of worlds with `robots` robots that are stepped at once. The two arms of a table fill a register
+    /// of two numbers.
     pub(crate) fn worlds_at_once(self, robots: usize) -> usize {
         match self.0 {
             Registers::Plain if robots == 2 => 1,
@@ -44,13 +44,13 @@ impl LanePath {
         }
     }
 
-    /// Does something with so many arms in lanes, at most [`MAX_LANES`].
-    pub(crate) fn run<I: InLanes>(self, arms: usize, work: I) -> I::Output {
+    /// Runs a kernel on `arms` arms in lanes, at most [`MAX_LANES`].
+    pub(crate) fn run<I: LaneKernel>(self, arms: usize, kernel: I) -> I::Output {
         match self.0 {
-            Registers::Plain if arms <= 2 => work.run::<f64x2>(),
-            Registers::Plain => work.run::<f64x4>(),
+            Registers::Plain if arms <= 2 => kernel.run::<f64x2>(),
+            Registers::Plain => kernel.run::<f64x4>(),
             #[cfg(target_arch = "x86_64")]
-            Registers::Avx(avx) => avx.run(work),
+            Registers::Avx(avx) => avx.run(kernel),
         }
     }
 }

@@ -1,7 +1,7 @@
 //! Spatial (six-dimensional) vectors and inertias, all taken about the origin of the arm's base frame.
 //!
-//! With one common origin, velocities, forces and inertias of different links add without being
-//! transformed, which is what makes the recursions of this module short.
+//! With one common origin, velocities, forces and inertias of different links add without a transform. This
+//! keeps the recursions short.
 
 use super::lanes::Lanes;
 use std::ops::{Add, Sub};
@@ -308,14 +308,14 @@ pub struct Inertia<T> {
 }
 
 impl<T: Lanes> Inertia<T> {
-    /// Of a body whose rotational inertia about its centre of mass is given in its own frame.
+    /// From the rotational inertia about the centre of mass, in the body's own frame.
     #[inline(always)]
     pub fn of_body(frame: &Frame<T>, mass: f64, centre: [f64; 3], rotational: [f64; 6]) -> Self {
         let about_centre = Symmetric::splat(rotational).rotated(frame);
         Self::about(frame.point(centre), mass, about_centre)
     }
 
-    /// Of a body whose rotational inertia about its centre of mass is the same about every axis.
+    /// From a rotational inertia about the centre of mass that is the same about every axis.
     #[inline(always)]
     pub fn isotropic(centre: Vec3<T>, mass: f64, rotational: f64) -> Self {
         let zero = T::splat(0.0);

@@ -22,7 +22,7 @@ pub struct ConstraintValues {
     pub joint_pos: f64,
     /// Filtered joint velocities against 95 % of their limits.
     pub joint_vel: f64,
-    /// End effector over its part of the table and at its height.
+    /// End effector within its area of the table and at its height.
     pub ee: f64,
     /// Height of elbow (link 4) and wrist (link 7).
     pub link: f64,
@@ -36,7 +36,7 @@ impl ConstraintValues {
         link: 0.0,
     };
 
-    /// Of a robot (0 or 1) now.
+    /// Constraint values of a robot (0 or 1) in its current state.
     #[must_use]
     pub fn of(world: &World, robot: usize) -> Self {
         Self::new(
@@ -77,7 +77,7 @@ impl ConstraintValues {
         values
     }
 
-    /// Marks what these values break.
+    /// Sets the flags of the violated groups.
     pub fn mark(&self, violations: &mut Violations) {
         violations.ee |= self.ee > 0.0;
         violations.link |= self.link > 0.0;

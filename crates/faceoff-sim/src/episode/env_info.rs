@@ -1,4 +1,4 @@
-//! What an agent is told about its environment (PROTOCOL, "env").
+//! The description of its environment that an agent receives (PROTOCOL, "env").
 
 use crate::{
     model::{CONTROL_STEP_S, EE_DESIRED_HEIGHT_M, JOINTS, LINKS, TOOL},
@@ -9,7 +9,7 @@ use crate::{
 };
 use faceoff_types::Task;
 
-/// `env` of the protocol's hello, as plain data. SI units, radians; always the nominal robot's.
+/// `env` of the protocol's hello, as plain data. SI units, radians; always of the nominal robot.
 #[derive(Debug, Clone, PartialEq)]
 pub struct EnvInfo {
     /// Robots on the table.
@@ -51,7 +51,7 @@ pub fn env_info(task: Task) -> EnvInfo {
     env_info_for(if task == Task::Hit { 2 } else { 1 }, 0)
 }
 
-/// The environment of `robots` robots, as seen by one of them (0 or 1).
+/// The environment of `robots` robots, as seen by robot `own` (0 or 1).
 #[must_use]
 pub fn env_info_for(robots: u32, own: usize) -> EnvInfo {
     let both = |limit: fn(usize) -> f64| {

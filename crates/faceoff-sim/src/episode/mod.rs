@@ -37,8 +37,8 @@ pub struct Episode {
 
 impl Episode {
     /// An episode at its start. `plant` is nominal unless the factors contain
-    /// [`Factor::ModelMismatch`]; the caller chooses it through [`Plant::mismatched`]. The initial
-    /// state and every factor draw from streams of their own, derived from `seed` by name.
+    /// [`Factor::ModelMismatch`]; the caller passes [`Plant::mismatched`] then. The initial state and each
+    /// factor have their own random stream, derived from `seed` by name.
     #[must_use]
     pub fn new(
         task: Task,
@@ -49,12 +49,12 @@ impl Episode {
         seed: Seed,
     ) -> Self {
         let puck = task::initial_puck(task, &mut Stream::new(&seed, "initial_state"));
-        Self::starting_with(task, interpolation, factors, settings, plant, seed, puck)
+        Self::with_initial_puck(task, interpolation, factors, settings, plant, seed, puck)
     }
 
     /// As [`Episode::new`], with a given initial puck [x, y, yaw, vx, vy, yaw rate].
     #[must_use]
-    pub fn starting_with(
+    pub fn with_initial_puck(
         task: Task,
         interpolation: Interpolation,
         factors: Factors,
@@ -78,9 +78,9 @@ impl Episode {
         }
     }
 
-    /// The same episode within other bounds than the current ruleset's.
+    /// The same episode with other bounds than those of the current ruleset.
     #[must_use]
-    pub fn within(mut self, bounds: Bounds) -> Self {
+    pub fn with_bounds(mut self, bounds: Bounds) -> Self {
         self.world.set_bounds(bounds);
         self
     }
@@ -92,16 +92,16 @@ impl Episode {
     }
 
     /// One control step. `action` is row-major, of length [`Interpolation::len`], finite. Must not
-    /// be called after an end. A world that diverges ends as [`EpisodeEnd::AgentFault`]: nothing but the
-    /// agent's commands can bring it so far.
+    /// be called after an end. A world that diverges ends as [`EpisodeEnd::AgentFault`]: only the agent's
+    /// commands can cause it.
     pub fn step(&mut self, action: &[f64]) -> StepOutcome {
         self.command(action);
-        let (world, air) = self.moving();
+        let (world, air) = self.world_and_air_force();
         world.control_step(air);
         self.observe()
     }
 
-    /// A control step's beginning: the commands of all robots.
+    /// Starts a control step: sets the commands of all robots.
     pub(crate) fn command(&mut self, action: &[f64]) {
         self.channel.command(&mut self.world, Command::Act(action));
         if let Some(opponent) = &mut self.opponent {
@@ -110,16 +110,16 @@ impl Episode {
         }
     }
 
-    /// What moves in a control step, and the force of the air on the puck, N.
-    pub(crate) fn moving(&mut self) -> (&mut World, impl FnMut(&Puck) -> [f64; 2]) {
+    /// The world to be stepped, and the force of the air on the puck, N.
+    pub(crate) fn world_and_air_force(&mut self) -> (&mut World, impl FnMut(&Puck) -> [f64; 2]) {
         let table = &mut self.table;
         (&mut self.world, |puck: &Puck| table.force(puck))
     }
 
-    /// A control step's end: what the agent is told, and what the step led to.
+    /// Ends a control step: updates the observation and returns the result.
     pub(crate) fn observe(&mut self) -> StepOutcome {
         self.puck_lost = self.table.is_lost();
-        self.channel.look(&self.world, self.puck_lost);
+        self.channel.update_observation(&self.world, self.puck_lost);
         self.steps += 1;
 
         let constraints = self.constraints();
@@ -131,13 +131,13 @@ impl Episode {
         StepOutcome { end, constraints }
     }
 
-    /// Set once the world has diverged; all its numbers are finite all the same.
+    /// Set once the world has diverged; its numbers are still finite then.
     #[must_use]
     pub fn divergence(&self) -> Option<Divergence> {
         self.world.divergence()
     }
 
-    /// Has tracking lost the puck, so that its observation repeats an earlier place?
+    /// Has tracking lost the puck, so that the observation repeats an earlier position?
     #[must_use]
     pub fn is_puck_lost(&self) -> bool {
         self.puck_lost
@@ -154,7 +154,7 @@ impl Episode {
         task::success(self.task, self.world.puck())
     }
 
-    /// Constraints broken so far.
+    /// Constraints violated so far.
     #[must_use]
     pub fn violations(&self) -> Violations {
         self.violations
@@ -190,10 +190,10 @@ impl Episode {
     }
 }
 
-/// What a control step led to.
+/// Result of a control step.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StepOutcome {
-    /// The episode's end, if it came.
+    /// The end of the episode, if this step ended it.
     pub end: Option<EpisodeEnd>,
     /// Constraint values at this step.
     pub constraints: ConstraintValues,

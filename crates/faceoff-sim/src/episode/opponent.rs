@@ -13,7 +13,7 @@ const CENTRE_X_M: f64 = 0.65;
 const HALF_X_M: f64 = 0.1;
 const HALF_Y_M: f64 = 0.16;
 
-/// Where the opponent is in its figure.
+/// Position of the opponent on its figure.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Opponent {
     steps: u32,

@@ -1,4 +1,4 @@
-//! The three tasks: where the puck starts, when an episode ends, what counts as success
+//! The three tasks: start of the puck, end of an episode, success
 //! (RULES, "Tasks").
 
 use crate::{
@@ -25,7 +25,7 @@ pub struct TaskRules {
     pub hit_angle_rad: f64,
     /// Largest yaw rate at the start of `hit`, rad/s.
     pub hit_yaw_rate_rad_s: f64,
-    /// Least speed at which a goal counts, m/s: the paper asks for one, ref does not.
+    /// Least speed at which a goal counts, m/s: the paper requires one, ref does not.
     pub hit_min_goal_speed_m_s: f64,
     /// Range of x at the start of `defend`, m.
     pub defend_x_m: [f64; 2],
@@ -49,7 +49,7 @@ pub struct TaskRules {
     pub success_x_m: [f64; 2],
     /// vx below which the puck counts as held, m/s.
     pub success_vx_m_s: f64,
-    /// A faster puck is taken as gone, m/s.
+    /// A faster puck counts as lost, m/s.
     pub lost_speed_m_s: f64,
 }
 
@@ -73,14 +73,14 @@ pub const TASK_RULES: TaskRules = TaskRules {
     lost_speed_m_s: 100.0,
 };
 
-/// |y| up to which a puck can be played without touching the long rims: a puck and a whole mallet
-/// from the rim, 0.39105 m.
+/// |y| up to which a mallet reaches the puck without touching the long rims: the puck's radius and a
+/// mallet's diameter from the rim, 0.39105 m.
 pub const PLAYABLE_Y_M: f64 = TABLE.half_width_m() - PUCK.radius_m - 2.0 * TOOL.cylinder_radius_m;
 
 /// |y| at the outer edge of the strips of `prepare`, 0.48535 m.
 const STRIP_Y_M: f64 = TABLE.half_width_m() - PUCK.radius_m - 0.002;
 
-/// Draws the puck's first state [x, y, yaw, vx, vy, yaw rate]. Always six draws.
+/// Draws the puck's initial state [x, y, yaw, vx, vy, yaw rate]. Always six draws.
 pub fn initial_puck(task: Task, stream: &mut Stream) -> [f64; 6] {
     let u: [f64; 6] = std::array::from_fn(|_| stream.unit());
     let between = |[low, high]: [f64; 2], u: f64| low + (high - low) * u;
@@ -129,7 +129,7 @@ pub fn initial_puck(task: Task, stream: &mut Stream) -> [f64; 6] {
     }
 }
 
-/// Why an episode ends in this true state, `steps` control steps after its start.
+/// The reason if an episode ends in this true state, `steps` control steps after its start.
 #[must_use]
 pub fn end(task: Task, puck: &Puck, steps: u32) -> Option<EpisodeEnd> {
     end_on_table(task, puck).or((steps >= EPISODE_STEPS).then_some(EpisodeEnd::Horizon))
@@ -139,7 +139,7 @@ fn end_on_table(task: Task, puck: &Puck) -> Option<EpisodeEnd> {
     let [x, y, _] = puck.pose;
     let vx = puck.velocity[0];
     let speed = puck.speed();
-    // Written so that a state that is not a number ends the episode too.
+    // Negated, so that NaN ends the episode too.
     let on_table = x.abs() <= TABLE.half_length_m()
         && y.abs() <= TABLE.half_width_m()
         && speed <= TASK_RULES.lost_speed_m_s;

@@ -5,7 +5,7 @@ use crate::{
     dynamics::arm::Kinematics,
     episode::constraints::{HEIGHT_TOLERANCE_M, LINK_HEIGHT_M},
     model::{EE_DESIRED_HEIGHT_M, INITIAL_Q, JOINTS, LINKS, Offset, TOOL},
-    robot::inverse_kinematics::full,
+    robot::inverse_kinematics::with_zero_universal,
     table::{
         frames::robot_from_table,
         geometry::{PUCK, TABLE},
@@ -13,8 +13,8 @@ use crate::{
 };
 use std::fmt::{Display, Write as _};
 
-/// Both views have the base frame's x to the right; from the side z points up, from above y does. Lengths are
-/// written in mm.
+/// Both views have the base frame's x to the right. In the side view z points up, in the top view y. Lengths
+/// are labelled in mm.
 #[must_use]
 pub fn drawing() -> String {
     let mut picture = Picture {
@@ -26,14 +26,15 @@ pub fn drawing() -> String {
     format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {height}\" width=\"{width}\" \
          height=\"{height}\" font-family=\"sans-serif\" font-size=\"12\">\n\
-         <!-- SavedState by `faceoff sim export`. -->\n\
+         <!-- Written by `faceoff sim export`. -->\n\
          <rect width=\"{width}\" height=\"{height}\" fill=\"white\"/>\n{}</svg>\n",
         picture.text
     )
 }
 
-/// Pixels, across and down, and per metre.
+/// Width and height, pixels.
 const SIZE: [f64; 2] = [1000.0, 870.0];
+/// Pixels per metre.
 const SCALE: f64 = 340.0;
 /// The base frame's origin in each of the views, pixels.
 const SIDE_ORIGIN: [f64; 2] = [90.0, 370.0];
@@ -52,29 +53,29 @@ fn side_view(picture: &mut Picture) {
         "stroke=\"black\" stroke-width=\"3\"",
     );
     let end = at(far, surface);
-    picture.words(
+    picture.label(
         [end[0] - 250.0, end[1] + 18.0],
         format_args!("surface of the table, {} mm above the base", mm(surface)),
     );
-    for (height, words) in [
+    for (height, text) in [
         (EE_DESIRED_HEIGHT_M, "end effector's height"),
         (LINK_HEIGHT_M, "least height of links 4 and 7"),
     ] {
         picture.line(at(-0.2, height), at(far, height), FAINT);
         let end = at(far, height);
-        picture.words(
+        picture.label(
             [end[0] - 250.0, end[1] - 4.0],
-            format_args!("{words}: {} mm", mm(height)),
+            format_args!("{text}: {} mm", mm(height)),
         );
     }
     let end = at(far, EE_DESIRED_HEIGHT_M);
-    picture.words(
+    picture.label(
         [end[0] - 250.0, end[1] + 12.0],
         format_args!("± {} mm", mm(HEIGHT_TOLERANCE_M)),
     );
     arm(picture);
     axes(picture, SIDE_ORIGIN, "z");
-    picture.words(
+    picture.label(
         [SIDE_ORIGIN[0] - 70.0, 24.0],
         "From the side: start pose, all joints in the plane y = 0",
     );
@@ -82,7 +83,7 @@ fn side_view(picture: &mut Picture) {
 
 fn arm(picture: &mut Picture) {
     let at = |[x, _, z]: [f64; 3]| pixels(SIDE_ORIGIN, [x, z]);
-    let kinematics = Kinematics::new(&full(&INITIAL_Q));
+    let kinematics = Kinematics::new(&with_zero_universal(&INITIAL_Q));
     let ee = kinematics.end_effector.origin.lane(0);
     let mut points = vec![[0.0; 3]];
     points.extend(kinematics.links.map(|link| link.origin.lane(0)));
@@ -97,9 +98,9 @@ fn arm(picture: &mut Picture) {
         };
         let [x, y] = [0, 1].map(|k| (from[k] + to[k]) / 2.0);
         if is_level(from, to) {
-            picture.words([x - 18.0, y + 24.0], mm(length));
+            picture.label([x - 18.0, y + 24.0], mm(length));
         } else {
-            picture.words([x + 14.0, y + 12.0], mm(length));
+            picture.label([x + 14.0, y + 12.0], mm(length));
         }
     }
     for (i, ends) in points.windows(2).take(JOINTS).enumerate() {
@@ -114,9 +115,9 @@ fn arm(picture: &mut Picture) {
         } else {
             [x - 26.0, y - 4.0]
         };
-        picture.words(beside, format_args!("q{}", i + 1));
+        picture.label(beside, format_args!("q{}", i + 1));
     }
-    // The universal joint holds the mallet's axis upright, its own z downwards.
+    // The universal joint holds the mallet's axis vertical, with z downwards.
     let centre = [ee[0], 0.0, ee[2] - TOOL.cylinder_centre_z_m];
     let [x, y] = at(centre);
     let (radius, half) = (
@@ -131,7 +132,7 @@ fn arm(picture: &mut Picture) {
     );
     let [x, y] = at(ee);
     picture.disc([x, y], 4.0, "fill=\"#1d3557\"");
-    picture.words(
+    picture.label(
         [x + 22.0, y - 16.0],
         "universal joint = end effector; below it the mallet",
     );
@@ -157,20 +158,20 @@ fn top_view(picture: &mut Picture) {
         [right - left, bottom - top],
         "fill=\"#4a6fa5\" fill-opacity=\"0.08\" stroke=\"#4a6fa5\" stroke-dasharray=\"4 3\"",
     );
-    picture.words(
+    picture.label(
         [left + 8.0, bottom - 8.0],
-        "where the rules let the end effector be",
+        "allowed area of the end effector",
     );
     picture.disc(at([0.0, 0.0]), PUCK.radius_m * SCALE, "fill=\"#333333\"");
-    picture.words([at([0.0, 0.0])[0] + 16.0, at([0.0, 0.0])[1] - 10.0], "puck");
-    let start = Kinematics::new(&full(&INITIAL_Q))
+    picture.label([at([0.0, 0.0])[0] + 16.0, at([0.0, 0.0])[1] - 10.0], "puck");
+    let start = Kinematics::new(&with_zero_universal(&INITIAL_Q))
         .end_effector
         .origin
         .lane(0);
     let mallet = pixels(TOP_ORIGIN, [start[0], start[1]]);
     picture.disc(mallet, radius * SCALE, "fill=\"#b23a48\"");
-    picture.words([mallet[0] - 16.0, mallet[1] - 24.0], "mallet");
-    for (point, words) in [
+    picture.label([mallet[0] - 16.0, mallet[1] - 24.0], "mallet");
+    for (point, text) in [
         (
             [-x, 0.0],
             format!("own goal: {} mm", mm(TABLE.goal_width_m)),
@@ -178,21 +179,21 @@ fn top_view(picture: &mut Picture) {
         ([x - 0.3, 0.0], "the other goal".to_owned()),
     ] {
         let [x, y] = at(point);
-        picture.words([x + 8.0, y + 40.0], words);
+        picture.label([x + 8.0, y + 40.0], text);
     }
     let [left, bottom] = at([-x, -y]);
-    picture.words(
+    picture.label(
         [left + 300.0, bottom + 20.0],
         format_args!("{} × {} mm", mm(TABLE.length_m), mm(TABLE.width_m)),
     );
     let base = TOP_ORIGIN;
-    picture.words(
+    picture.label(
         [base[0] - 70.0, base[1] + 34.0],
         format_args!("base, {} mm from", mm(TABLE.base_x_m)),
     );
-    picture.words([base[0] - 70.0, base[1] + 50.0], "the middle");
+    picture.label([base[0] - 70.0, base[1] + 50.0], "the middle");
     axes(picture, TOP_ORIGIN, "y");
-    picture.words(
+    picture.label(
         [SIDE_ORIGIN[0] - 70.0, 440.0],
         "From above: the table and robot 1's base frame",
     );
@@ -214,11 +215,11 @@ fn axes(picture: &mut Picture, origin: [f64; 2], up: &str) {
     let style = "stroke=\"#2a7f3f\" stroke-width=\"2\"";
     picture.line([x, y], [x + LENGTH, y], style);
     picture.line([x, y], [x, y - LENGTH], style);
-    picture.words([x + LENGTH + 4.0, y + 4.0], "x");
-    picture.words([x - 18.0, y - LENGTH + 8.0], up);
+    picture.label([x + LENGTH + 4.0, y + 4.0], "x");
+    picture.label([x - 18.0, y - LENGTH + 8.0], up);
 }
 
-/// More across than up or down, in pixels.
+/// Is a line closer to horizontal than to vertical, in pixels?
 fn is_level(from: [f64; 2], to: [f64; 2]) -> bool {
     (to[0] - from[0]).abs() > (to[1] - from[1]).abs()
 }
@@ -258,9 +259,9 @@ impl Picture {
         ));
     }
 
-    fn words(&mut self, at: [f64; 2], words: impl Display) {
+    fn label(&mut self, at: [f64; 2], text: impl Display) {
         self.put(format_args!(
-            "<text x=\"{:.1}\" y=\"{:.1}\">{words}</text>",
+            "<text x=\"{:.1}\" y=\"{:.1}\">{text}</text>",
             at[0], at[1]
         ));
     }

@@ -2,7 +2,7 @@
 
 use super::{
     numbers::{spaced, tidy},
-    parts::{Model, end_of_link, level, quaternion, shown_radius_m, vector},
+    parts::{Model, end_of_link, level, quaternion, visual_radius_m, vector},
 };
 use crate::{
     model::{GRAVITY_M_S2, INITIAL_Q, JOINTS, LINKS, SUBSTEP_S, TOOL},
@@ -37,7 +37,7 @@ fn write(model: Model, out: &mut String) -> std::fmt::Result {
          <option timestep=\"{SUBSTEP_S}\" gravity=\"0 0 {}\" integrator=\"Euler\" cone=\"elliptic\"/>",
         -GRAVITY_M_S2
     )?;
-    // Nothing touches anything but what is paired below.
+    // No contacts but those of the pairs below.
     writeln!(
         out,
         "  <default>\n    <geom contype=\"0\" conaffinity=\"0\" rgba=\"0.6 0.6 0.65 1\"/>\n    \
@@ -54,7 +54,7 @@ fn write(model: Model, out: &mut String) -> std::fmt::Result {
         "    <light pos=\"0 0 3\" dir=\"0 0 -1\" directional=\"true\"/>"
     )?;
     let rims = table(out)?;
-    puck_behind_arm(model, out)?;
+    arm_and_puck(model, out)?;
     writeln!(out, "  </worldbody>")?;
     pairs(model, &rims, out)?;
     motors(model, out)?;
@@ -70,7 +70,7 @@ fn write(model: Model, out: &mut String) -> std::fmt::Result {
     )
 }
 
-/// The surface and the rims; the names of the rims' parts.
+/// Writes the surface and the rims; returns the names of the rims' parts.
 fn table(out: &mut String) -> Result<Vec<String>, std::fmt::Error> {
     const SURFACE_HALF_THICKNESS_M: f64 = 0.01;
     let (half_length, half_width) = (TABLE.half_length_m(), TABLE.half_width_m());
@@ -101,22 +101,22 @@ fn table(out: &mut String) -> Result<Vec<String>, std::fmt::Error> {
         names.push(name);
         written
     };
-    for (side, word) in [(1.0, "left"), (-1.0, "right")] {
+    for (side, name_suffix) in [(1.0, "left"), (-1.0, "right")] {
         let y = side * (half_width + thickness / 2.0);
         rim(
             out,
-            format!("rim_{word}"),
+            format!("rim_{name_suffix}"),
             "box",
             [0.0, y],
             &[outer_x, thickness / 2.0],
         )?;
     }
-    // A short rim's end at the goal is rounded: a box, a smaller one before it, and a cylinder at each corner.
+    // The end of a short rim at the goal is rounded: a box, a smaller box and a cylinder at each corner.
     let mouth = TABLE.goal_width_m / 2.0;
     let (box_y, box_half) = middle_and_half(mouth + post, half_width);
     for (end, near) in [(1.0, "far"), (-1.0, "near")] {
-        for (side, word) in [(1.0, "left"), (-1.0, "right")] {
-            let name = |part: &str| format!("rim_{near}_{word}{part}");
+        for (side, name_suffix) in [(1.0, "left"), (-1.0, "right")] {
+            let name = |part: &str| format!("rim_{near}_{name_suffix}{part}");
             let x = end * (half_length + thickness / 2.0);
             rim(
                 out,
@@ -154,11 +154,11 @@ fn middle_and_half(from: f64, to: f64) -> (f64, f64) {
     ((from + to) / 2.0, (to - from) / 2.0)
 }
 
-/// The arm first, so that its joints come first; then the puck.
-fn puck_behind_arm(model: Model, out: &mut String) -> std::fmt::Result {
+/// The arm before the puck, so that the arm's joints come first.
+fn arm_and_puck(model: Model, out: &mut String) -> std::fmt::Result {
     let base = table_from_robot(0, [0.0; 3]).map(tidy);
     writeln!(out, "    <body name=\"base\" pos=\"{}\">", spaced(&base))?;
-    shown(out, vector(LINKS[0].offset), shown_radius_m(0))?;
+    visual_capsule(out, vector(LINKS[0].offset), visual_radius_m(0))?;
     for (i, link) in LINKS.iter().enumerate() {
         writeln!(
             out,
@@ -185,7 +185,7 @@ fn puck_behind_arm(model: Model, out: &mut String) -> std::fmt::Result {
             link.mass_kg,
             spaced(&link.inertia_kg_m2),
         )?;
-        shown(out, end_of_link(i), shown_radius_m(i))?;
+        visual_capsule(out, end_of_link(i), visual_radius_m(i))?;
     }
     let ee = end_of_link(JOINTS - 1);
     writeln!(
@@ -233,7 +233,7 @@ fn mallet(out: &mut String) -> std::fmt::Result {
     writeln!(out, "    </body>")
 }
 
-/// It neither rises nor tips: of its inertia only that of the yaw is of any account.
+/// The puck neither rises nor tips: only its yaw inertia matters.
 fn puck(out: &mut String) -> std::fmt::Result {
     writeln!(out, "    <body name=\"puck\">")?;
     for (name, kind, axis, damping) in [
@@ -264,7 +264,7 @@ fn isotropic(out: &mut String, z: f64, mass: f64, inertia: f64) -> std::fmt::Res
     )
 }
 
-fn shown(out: &mut String, end: [f64; 3], radius: f64) -> std::fmt::Result {
+fn visual_capsule(out: &mut String, end: [f64; 3], radius: f64) -> std::fmt::Result {
     writeln!(
         out,
         "      <geom type=\"capsule\" fromto=\"0 0 0 {}\" size=\"{radius}\"/>",
@@ -312,7 +312,7 @@ fn motors(model: Model, out: &mut String) -> std::fmt::Result {
     writeln!(out, "  </actuator>")
 }
 
-/// A material's time constant, s, and damping ratio, from which MuJoCo gets its damping and stiffness.
+/// A material's time constant, s, and damping ratio. MuJoCo derives damping and stiffness from them.
 fn solref(material: &Material) -> String {
     let full = material.impedance_1;
     let time_constant_s = 2.0 / (full * material.damping_per_s);
@@ -320,8 +320,8 @@ fn solref(material: &Material) -> String {
     spaced(&[time_constant_s, damping_ratio].map(tidy))
 }
 
-/// Impedance at no and at full penetration, the depth of the latter, and the shape of the way between: a
-/// quadratic spline around its middle.
+/// Impedance at zero and at full penetration, the depth of full penetration, and the shape in between: a
+/// quadratic spline around the middle.
 fn solimp(material: &Material) -> String {
     spaced(&[
         material.impedance_0,
@@ -337,7 +337,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn materials_are_told_in_the_engines_words() {
+    fn materials_convert_to_mujoco_parameters() {
         assert_eq!(solref(&RIM), "0.0075 0.1");
         assert_eq!(solref(&MALLET), "0.02 0.3");
         assert_eq!(solref(&JOINT), "0.02 1");
@@ -345,7 +345,7 @@ mod tests {
     }
 
     #[test]
-    fn without_its_mallet_the_arm_has_seven_joints() {
+    fn controller_model_has_no_mallet() {
         let (plant, controller) = (mjcf(Model::Plant), mjcf(Model::Controller));
         assert!(plant.contains("universal_x") && plant.contains("geom1=\"mallet\""));
         assert!(!controller.contains("universal") && !controller.contains("mallet"));

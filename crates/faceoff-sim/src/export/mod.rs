@@ -1,8 +1,8 @@
-//! The ideal model as text that other programs read: URDF and MJCF for simulators and libraries of robotics,
-//! a Python module of its numbers, and a drawing.
+//! Exports of the ideal model: URDF and MJCF for other simulators and robotics libraries, a Python module of
+//! constants, and a drawing.
 //!
-//! All of it is written from the constants that the simulator itself uses. Geometry is made of primitives;
-//! where it only shows something (the shape of the arm) it has no part in the physics.
+//! All of it is generated from the constants that the simulator uses. Geometry consists of primitives. The
+//! shape of the arm is visual only.
 
 mod drawing;
 mod mjcf;

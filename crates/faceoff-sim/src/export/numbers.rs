@@ -1,14 +1,14 @@
-//! Numbers as text: as many digits as bring the same 64-bit value back.
+//! Numbers as text, with enough digits to parse to the same 64-bit value.
 
-/// Numbers with spaces between them, as XML's attributes have them.
+/// Numbers separated by spaces, for XML attributes.
 pub(super) fn spaced(numbers: &[f64]) -> String {
-    let words: Vec<String> = numbers.iter().map(f64::to_string).collect();
-    words.join(" ")
+    let texts: Vec<String> = numbers.iter().map(f64::to_string).collect();
+    texts.join(" ")
 }
 
-/// A number that came out of arithmetic on the model's, without the last digits' noise: rounded to 1e-12.
+/// Removes rounding noise of arithmetic: rounds to 1e-12.
 pub(super) fn tidy(number: f64) -> f64 {
-    // The sum makes a zero of a negative zero.
+    // The sum turns −0 into 0.
     (number * 1e12).round() / 1e12 + 0.0
 }
 
@@ -17,7 +17,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn numbers_come_back_as_they_were() {
+    fn written_numbers_parse_to_the_same_bits() {
         for number in [-2.897243e-7, 85.0_f64.to_radians(), 1e4, 0.0] {
             assert_eq!(spaced(&[number]).parse(), Ok(number));
         }

@@ -1,21 +1,21 @@
-//! What all formats say of the arm, in the words of each.
+//! Properties of the arm in the notations of the export formats.
 
 use super::numbers::tidy;
 use crate::{
     dynamics::arm::Kinematics,
     model::{JOINTS, LINKS, Mount, Offset, TOOL},
-    robot::{inverse_kinematics::full, universal_joint::vertical},
+    robot::{inverse_kinematics::with_zero_universal, universal_joint::vertical},
 };
 use std::f64::consts::{FRAC_1_SQRT_2, FRAC_PI_2, PI};
 
-/// Which arm is exported.
+/// The arm that is exported.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Model {
-    /// What moves: seven driven joints, the two of the universal joint, the mallet.
+    /// The simulated arm: seven driven joints, the two of the universal joint, the mallet.
     #[default]
     Plant,
-    /// What the controller believes, and what recordings call the robot's model: seven joints and the end
-    /// effector, no mallet.
+    /// The controller's model, which recordings call the robot's model: seven joints and the end effector, no
+    /// mallet.
     Controller,
 }
 
@@ -55,7 +55,7 @@ pub(super) fn vector(offset: Offset) -> [f64; 3] {
     }
 }
 
-/// Where what follows on link `i` (0…6) sits in its frame, m: the next joint, or the end effector.
+/// Position of the next joint, or of the end effector, in the frame of link `i` (0…6), m.
 pub(super) fn end_of_link(i: usize) -> [f64; 3] {
     match LINKS.get(i + 1) {
         Some(next) => vector(next.offset),
@@ -63,15 +63,15 @@ pub(super) fn end_of_link(i: usize) -> [f64; 3] {
     }
 }
 
-/// Radius with which link `i` (0…6) is shown, m. The last one ends in a rod.
-pub(super) fn shown_radius_m(i: usize) -> f64 {
-    const SHOWN: [f64; JOINTS] = [0.075, 0.07, 0.065, 0.06, 0.055, 0.05, 0.015];
-    SHOWN[i]
+/// Visual radius of link `i` (0…6), m. The last link ends in a rod.
+pub(super) fn visual_radius_m(i: usize) -> f64 {
+    const RADII_M: [f64; JOINTS] = [0.075, 0.07, 0.065, 0.06, 0.055, 0.05, 0.015];
+    RADII_M[i]
 }
 
-/// Angles of the universal joint, rad, with which the mallet is vertical at a pose.
+/// Angles of the universal joint, rad, at which the mallet is vertical.
 pub(super) fn level(q: &[f64; JOINTS]) -> [f64; 2] {
-    let ee = Kinematics::new(&full(q)).end_effector;
+    let ee = Kinematics::new(&with_zero_universal(q)).end_effector;
     vertical(ee.x, ee.y, [0.0; 2]).map(tidy)
 }
 
@@ -79,9 +79,8 @@ pub(super) fn level(q: &[f64; JOINTS]) -> [f64; 2] {
 mod tests {
     use super::*;
 
-    /// The mount of a link in the three notations, held to the dynamics' own.
     #[test]
-    fn the_notations_of_a_mount_agree_with_the_dynamics() {
+    fn mount_notations_agree_with_the_dynamics() {
         let frames = Kinematics::new(&[0.0; 9]).links;
         let mut parent = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
         for (link, frame) in LINKS.iter().zip(frames) {

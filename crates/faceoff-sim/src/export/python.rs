@@ -1,4 +1,4 @@
-//! A Python module of the model's numbers, and nothing else.
+//! A Python module of the model's constants.
 
 use super::parts::{level, rotation, vector};
 use crate::{
@@ -90,7 +90,7 @@ pub fn python() -> String {
     out.line(
         "START_UNIVERSAL_RAD",
         tuple(&level(&INITIAL_Q)),
-        "the universal joint's there, the mallet vertical",
+        "angles of the universal joint in that pose, mallet vertical",
     );
     out.section("The tool: on link 7 the end effector, on it by the universal joint the mallet.");
     let z = "along the mallet's z";
@@ -192,7 +192,7 @@ pub fn python() -> String {
     out.text
 }
 
-/// A module in the making.
+/// The text of the module.
 struct Module {
     text: String,
 }
@@ -201,7 +201,7 @@ impl Module {
     fn new() -> Self {
         Self {
             text: "\"\"\"The numbers of robot, table and puck, as the simulator has them. SI units, radians.\n\n\
-                   SavedState by `faceoff sim export --format python`; a test compares it with what the program writes.\n\
+                   Written by `faceoff sim export --format python`; a test compares it with what the program writes.\n\
                    \"\"\"\n\nfrom typing import Final\n"
                 .to_owned(),
         }
@@ -217,7 +217,7 @@ impl Module {
         self.put(format_args!("\n# {title}\n"));
     }
 
-    /// A remark on the constant that follows.
+    /// A comment on the next constant.
     fn note(&mut self, note: &str) {
         if !note.is_empty() {
             self.put(format_args!("# {note}\n"));
@@ -250,14 +250,14 @@ impl Module {
     }
 }
 
-/// What can stand behind an equals sign.
+/// A value as a Python literal.
 trait Literal {
     fn literal(self) -> String;
 }
 
 impl Literal for f64 {
     fn literal(self) -> String {
-        // With its point or exponent, so that Python reads a float.
+        // With a decimal point or exponent, so that Python reads a float.
         format!("{self:?}")
     }
 }
@@ -269,6 +269,6 @@ impl Literal for String {
 }
 
 fn tuple(numbers: &[f64]) -> String {
-    let words: Vec<String> = numbers.iter().map(|number| number.literal()).collect();
-    format!("({})", words.join(", "))
+    let literals: Vec<String> = numbers.iter().map(|number| number.literal()).collect();
+    format!("({})", literals.join(", "))
 }

@@ -2,7 +2,7 @@
 
 use super::{
     numbers::{spaced, tidy},
-    parts::{Model, end_of_link, roll_pitch_yaw, shown_radius_m, vector},
+    parts::{Model, end_of_link, roll_pitch_yaw, visual_radius_m, vector},
 };
 use crate::{
     model::{JOINTS, LINKS, TOOL},
@@ -13,7 +13,7 @@ use std::{f64::consts::FRAC_PI_2, fmt::Write as _};
 /// The arm as URDF 1.0: links `base`, `link_1` … `link_7`, `end_effector` and, of the plant, `mallet`; joints
 /// `joint_1` … `joint_7`, `universal_y`, `universal_x`. Its root is the robot's base frame. SI units, radians.
 ///
-/// URDF has no word for rotor inertia: [`crate::model::Link::armature_kg_m2`] of joint 7 is told in a comment.
+/// URDF has no rotor inertia: a comment states [`crate::model::Link::armature_kg_m2`] of joint 7.
 #[must_use]
 pub fn urdf(model: Model) -> String {
     let mut out = String::new();
@@ -31,7 +31,7 @@ fn write(model: Model, out: &mut String) -> std::fmt::Result {
         if link.armature_kg_m2 != 0.0 {
             writeln!(
                 out,
-                "<!-- Not told by URDF: the rotor of joint_{} adds {} kg m² to the inertia about it. -->",
+                "<!-- Not part of URDF: the rotor of joint_{} adds {} kg m² to the inertia about it. -->",
                 i + 1,
                 link.armature_kg_m2
             )?;
@@ -39,7 +39,7 @@ fn write(model: Model, out: &mut String) -> std::fmt::Result {
     }
     writeln!(out, "<robot name=\"faceoff_iiwa\">")?;
     writeln!(out, "  <link name=\"base\">")?;
-    stick(out, vector(LINKS[0].offset), shown_radius_m(0))?;
+    visual_cylinder(out, vector(LINKS[0].offset), visual_radius_m(0))?;
     writeln!(out, "  </link>")?;
     for i in 0..JOINTS {
         driven_joint(out, i)?;
@@ -92,11 +92,11 @@ fn link(out: &mut String, i: usize) -> std::fmt::Result {
     let link = &LINKS[i];
     writeln!(out, "  <link name=\"link_{}\">", i + 1)?;
     inertial(out, link.mass_kg, link.centre_m, link.inertia_kg_m2)?;
-    stick(out, end_of_link(i), shown_radius_m(i))?;
+    visual_cylinder(out, end_of_link(i), visual_radius_m(i))?;
     writeln!(out, "  </link>")
 }
 
-/// A hinge about the end effector's y carries nothing but a hinge about the turned x, which carries the mallet.
+/// A hinge about the end effector's y carries a hinge about the rotated x, which carries the mallet.
 fn universal_joint(out: &mut String) -> std::fmt::Result {
     for (axis, parent, child) in [
         ("y", "end_effector", "universal"),
@@ -107,7 +107,7 @@ fn universal_joint(out: &mut String) -> std::fmt::Result {
         ends(out, parent, child)?;
         let direction = if axis == "y" { "0 1 0" } else { "1 0 0" };
         writeln!(out, "    <axis xyz=\"{direction}\"/>")?;
-        // Nothing bounds its speed; URDF asks for a number.
+        // Its speed has no limit, but URDF requires a number.
         limit(out, FRAC_PI_2, TORQUE_LIMIT, 1000.0)?;
         writeln!(out, "  </joint>")?;
         if child == "universal" {
@@ -173,8 +173,8 @@ fn inertial(out: &mut String, mass: f64, centre: [f64; 3], inertia: [f64; 6]) ->
     writeln!(out, "    </inertial>")
 }
 
-/// A cylinder from the origin to a point on y or z, to be looked at.
-fn stick(out: &mut String, end: [f64; 3], radius: f64) -> std::fmt::Result {
+/// A visual cylinder from the origin to a point on y or z.
+fn visual_cylinder(out: &mut String, end: [f64; 3], radius: f64) -> std::fmt::Result {
     let along_y = end[1] != 0.0;
     let rpy = [if along_y { FRAC_PI_2 } else { 0.0 }, 0.0, 0.0];
     let middle = end.map(|x| tidy(x / 2.0));

@@ -18,18 +18,18 @@ use faceoff_types::{
 };
 use referee::{GAME_RULES, RallyEnd, Referee};
 
-/// What a game is played with.
+/// Settings of a game.
 #[derive(Debug, Clone)]
 pub struct GameSetup {
     /// How the two agents' actions become trajectories.
     pub interpolation: [Interpolation; 2],
-    /// Perturbations. The table, the puck's tracking and the plant are the same for both robots, noise and
-    /// delays each robot's own.
+    /// Perturbations. Both robots share the table, the puck's tracking and the plant; noise and delays are
+    /// separate.
     pub factors: Factors,
     pub settings: PerturbationSettings,
     /// Both arms; nominal unless the factors contain the model mismatch.
     pub plant: Plant,
-    /// Each rally's draws derive from it and the rally's number.
+    /// The random streams of a rally derive from it and the rally's number.
     pub seed: Seed,
 }
 
@@ -41,11 +41,11 @@ pub struct Game {
     referee: Referee,
     rally: Rally,
     steps: u32,
-    /// Constraints broken in the current window.
+    /// Constraints violated in the current window.
     violations: [Violations; 2],
 }
 
-/// What starts anew with each rally.
+/// State that is created for each rally.
 #[derive(Debug, Clone)]
 struct Rally {
     number: u32,
@@ -54,14 +54,15 @@ struct Rally {
     table: TableFactors,
 }
 
-/// What a control step of a game led to. Robot 1's first.
+/// Result of a control step of a game. Pairs list robot 1 first.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GameStep {
-    /// The rally's end, if it came. The next step plays a new rally, which both agents are to be told.
+    /// The end of the rally, if this step ended it. The next step belongs to a new rally; the caller resets
+    /// both agents.
     pub rally_end: Option<RallyEnd>,
     /// Constraint values at this step, before a new rally.
     pub constraints: [ConstraintValues; 2],
-    /// At the end of a window: the constraints broken in it.
+    /// At the end of a window: the constraints violated in it.
     pub window: Option<[Violations; 2]>,
     /// The true state after this step, before a new rally.
     pub state: GameState,
@@ -90,22 +91,22 @@ impl Game {
         }
     }
 
-    /// The same game within other bounds than the current ruleset's.
+    /// The same game with other bounds than those of the current ruleset.
     #[must_use]
-    pub fn within(mut self, bounds: Bounds) -> Self {
+    pub fn with_bounds(mut self, bounds: Bounds) -> Self {
         self.bounds = bounds;
         self.rally.world.set_bounds(bounds);
         self
     }
 
-    /// What a robot's agent is told: 23 numbers in its own base frame.
+    /// The observation of a robot's agent: 23 numbers in its own base frame.
     #[must_use]
     pub fn observation(&self, robot: usize) -> &[f64; OBSERVATION_WITH_OPPONENT_LEN] {
         self.rally.channels[robot].observation()
     }
 
-    /// One control step of both robots. When the game is over is the caller's to
-    /// decide. A world that diverges ends the rally: a fault of the robots that the end names.
+    /// One control step of both robots. The caller decides when the game is over. A world that diverges ends
+    /// the rally: a fault of the robots that the end names.
     pub fn step(&mut self, commands: [Command<'_>; 2]) -> GameStep {
         let Rally {
             world,
@@ -118,7 +119,7 @@ impl Game {
         }
         let lost = table.control_step(world);
         for channel in channels {
-            channel.look(world, lost);
+            channel.update_observation(world, lost);
         }
         self.steps += 1;
 
@@ -131,7 +132,7 @@ impl Game {
         let rally_end = match divergence {
             Some(Divergence { by, .. }) => {
                 let end = RallyEnd::Diverged { by };
-                self.referee.ends_by(end);
+                self.referee.record_end(end);
                 Some(end)
             }
             None => self.referee.judge(world.puck()),
@@ -155,14 +156,14 @@ impl Game {
         }
     }
 
-    /// From now on a robot's actions are of this interpolation: its agent was started anew. For between
-    /// two rallies alone: what was commanded in this one was of the other.
-    pub fn interpolate(&mut self, robot: usize, interpolation: Interpolation) {
+    /// Sets the interpolation of a robot's later actions, after a restart of its agent. Call it only between two
+    /// rallies: commands of the current rally use the previous interpolation.
+    pub fn set_interpolation(&mut self, robot: usize, interpolation: Interpolation) {
         self.setup.interpolation[robot] = interpolation;
-        self.rally.channels[robot].interpolate(interpolation);
+        self.rally.channels[robot].set_interpolation(interpolation);
     }
 
-    /// The true state now.
+    /// The current true state.
     #[must_use]
     pub fn state(&self) -> GameState {
         GameState::with_constraints(&self.rally.world).0
@@ -179,7 +180,7 @@ impl Game {
         self.rally.number
     }
 
-    /// The count so far.
+    /// Goals and fouls so far.
     #[must_use]
     pub fn referee(&self) -> &Referee {
         &self.referee

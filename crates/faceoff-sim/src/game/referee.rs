@@ -17,7 +17,7 @@ pub struct GameRules {
     pub middle_x_m: f64,
     /// A puck in the middle is stuck below this |vx|, m/s.
     pub stuck_vx_m_s: f64,
-    /// A faster puck is taken as gone, m/s.
+    /// A faster puck counts as lost, m/s.
     pub lost_speed_m_s: f64,
 }
 
@@ -32,7 +32,7 @@ pub const GAME_RULES: GameRules = GameRules {
 /// Control steps after which a puck on one side is a foul.
 const FOUL_STEPS: u32 = (GAME_RULES.foul_after_s / CONTROL_STEP_S + 0.5) as u32;
 
-/// Why a rally ended. Robots are 0 and 1.
+/// Reason why a rally ended. Robots are 0 and 1.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum RallyEnd {
     /// The puck passed the goal line of the other robot.
@@ -45,19 +45,18 @@ pub enum RallyEnd {
         /// The robot on whose side it stayed.
         by: usize,
     },
-    /// The puck came to rest in the middle, where nobody reaches it.
+    /// The puck stopped in the middle, where no robot reaches it.
     Stuck,
     /// The puck left the table beside the goals.
     LeftTable,
-    /// The world diverged: a fault, which counts for nobody's score. The rally starts again on the same
-    /// side.
+    /// The world diverged: a fault, which changes no score. The rally is repeated on the same side.
     Diverged {
         /// The robots whose commands or states left their bounds first.
         by: [bool; 2],
     },
 }
 
-/// Keeps the count of a game, and decides whose side the next rally starts on.
+/// Counts goals and fouls of a game, and decides on which side the next rally starts.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Referee {
     /// Goals scored by each robot, without points for fouls.
@@ -66,9 +65,9 @@ pub struct Referee {
     pub fouls: [u32; 2],
     /// The robot on whose side the next rally starts.
     pub serves: usize,
-    /// The robot on whose side the puck was seen last, and for how many control steps since then;
-    /// `None` before a rally's first step.
-    pub watched: Option<(usize, u32)>,
+    /// The robot on whose side the puck is, and for how many control steps; `None` before a rally's first
+    /// step.
+    pub puck_side: Option<(usize, u32)>,
 }
 
 impl Referee {
@@ -79,26 +78,26 @@ impl Referee {
             goals: [0; 2],
             fouls: [0; 2],
             serves,
-            watched: None,
+            puck_side: None,
         }
     }
 
-    /// Goals and the points for the opponent's fouls.
+    /// Goals plus the points for the opponent's fouls.
     #[must_use]
     pub fn score(&self) -> [u32; 2] {
         [0, 1].map(|robot| self.goals[robot] + self.fouls[1 - robot] / FOULS_PER_POINT)
     }
 
-    /// Judges the true puck after a control step. An end sets who serves next and resets the clock.
+    /// Judges the true puck after a control step. An end sets the next serving side and resets the clock.
     pub fn judge(&mut self, puck: &Puck) -> Option<RallyEnd> {
-        let end = self.end_of_rally(puck)?;
-        self.ends_by(end);
+        let end = self.rally_end(puck)?;
+        self.record_end(end);
         Some(end)
     }
 
     /// Counts a rally's end.
-    pub(super) fn ends_by(&mut self, end: RallyEnd) {
-        self.watched = None;
+    pub(super) fn record_end(&mut self, end: RallyEnd) {
+        self.puck_side = None;
         match end {
             RallyEnd::Goal { by } => {
                 self.goals[by] += 1;
@@ -112,25 +111,25 @@ impl Referee {
         }
     }
 
-    fn end_of_rally(&mut self, puck: &Puck) -> Option<RallyEnd> {
+    fn rally_end(&mut self, puck: &Puck) -> Option<RallyEnd> {
         let [x, y, _] = puck.pose;
-        let seen = usize::from(x > 0.0);
-        let steps = match self.watched {
-            Some((side, steps)) if side == seen => steps + 1,
+        let side_of_puck = usize::from(x > 0.0);
+        let steps = match self.puck_side {
+            Some((side, steps)) if side == side_of_puck => steps + 1,
             _ => 0,
         };
-        self.watched = Some((seen, steps));
+        self.puck_side = Some((side_of_puck, steps));
         let in_middle = x.abs() < GAME_RULES.middle_x_m;
         if steps > FOUL_STEPS && !in_middle {
-            return Some(RallyEnd::Foul { by: seen });
+            return Some(RallyEnd::Foul { by: side_of_puck });
         }
         if x.abs() > TABLE.half_length_m() && y.abs() <= TABLE.goal_width_m / 2.0 {
-            return Some(RallyEnd::Goal { by: 1 - seen });
+            return Some(RallyEnd::Goal { by: 1 - side_of_puck });
         }
         if in_middle && puck.velocity[0].abs() < GAME_RULES.stuck_vx_m_s {
             return Some(RallyEnd::Stuck);
         }
-        // Written so that a state that is not a number ends the rally too.
+        // Negated, so that NaN ends the rally too.
         let on_table = x.abs() <= TABLE.half_length_m()
             && y.abs() <= TABLE.half_width_m()
             && puck.speed() <= GAME_RULES.lost_speed_m_s;

@@ -14,7 +14,7 @@ pub struct GameState {
 }
 
 impl GameState {
-    /// Of a world of two robots now, with the constraint values: both need the same kinematics.
+    /// The current state and constraint values of a world of two robots: both need the same kinematics.
     pub(super) fn with_constraints(world: &World) -> (Self, [ConstraintValues; 2]) {
         let kinematics = [0, 1].map(|robot| world.kinematics(robot));
         let constraints = [0, 1].map(|robot| {
@@ -29,7 +29,7 @@ impl GameState {
             q: [0, 1].map(|robot| world.joints(robot)),
             dq: [0, 1].map(|robot| world.joint_velocities(robot)),
             universal: [0, 1].map(|robot| world.universal(robot)),
-            ee: kinematics.map(|of_one| of_one.end_effector.origin.lane(0)),
+            ee: kinematics.map(|robot| robot.end_effector.origin.lane(0)),
         };
         (state, constraints)
     }

@@ -30,7 +30,7 @@ impl Disturbance {
         }
     }
 
-    /// Advances the process by a substep and gives the force in it, N.
+    /// Advances the process by a substep and returns the force in it, N.
     pub fn force(&mut self, puck: &Puck) -> [f64; 2] {
         let noise = self.stream.normal_pair();
         for (state, noise) in self.state.iter_mut().zip(noise) {

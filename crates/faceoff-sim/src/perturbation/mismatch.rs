@@ -1,10 +1,10 @@
-//! The season's plant.
+//! The plant of a season, with its model mismatch.
 
 use crate::{
     dynamics::arm::{Bodies, Kinematics, controller_torques, plant_bias},
     model::{DOFS, EE_DESIRED_HEIGHT_M, INITIAL_Q, JOINTS, LINKS},
     robot::{
-        inverse_kinematics::{full, inverse_kinematics},
+        inverse_kinematics::{with_zero_universal, inverse_kinematics},
         plant::Plant,
         universal_joint::vertical,
     },
@@ -12,24 +12,24 @@ use crate::{
 };
 use faceoff_types::{Factor, Factors, MismatchSettings, PerturbationSettings, Seed};
 
-/// Where the static error is looked at: end-effector positions over the table, m, base frame.
+/// End-effector positions over the table at which the static error is evaluated, m, base frame.
 const WORKSPACE_X_M: [f64; 4] = [0.65, 0.85, 1.05, 1.2];
 const WORKSPACE_Y_M: [f64; 5] = [-0.4, -0.2, 0.0, 0.2, 0.4];
 
-/// Draws before the last one is taken as it is. About one draw in three is accepted with the
-/// ruleset's settings, so that only settings that cannot be met come this far.
+/// Limit of draws, after which the last one is used. The ruleset's settings accept about one draw in three, so
+/// only settings that cannot be met reach it.
 const DRAWS: usize = 10_000;
 
-/// What one must expect to be enough of magnitudes that can be met at all.
+/// Number of draws that suffices for all settings that can be met in practice.
 const EXPECTED_DRAWS: usize = 300;
 
-/// Rounds of the fixed-point iteration for the sag; each gains two to three digits.
+/// Iterations of the fixed-point iteration for the sag; each adds two to three digits.
 const SAG_ROUNDS: usize = 12;
 
 impl Plant {
-    /// The plant under these factors: nominal, or that of the season with this mismatch seed.
+    /// The plant for these factors: nominal, or that of the season with this mismatch seed.
     #[must_use]
-    pub fn under(factors: Factors, settings: &PerturbationSettings, mismatch_seed: Seed) -> Self {
+    pub fn for_factors(factors: Factors, settings: &PerturbationSettings, mismatch_seed: Seed) -> Self {
         if factors.contains(Factor::ModelMismatch) {
             Self::mismatched(settings, mismatch_seed)
         } else {
@@ -42,39 +42,40 @@ impl Plant {
     /// is the season's mismatch seed.
     #[must_use]
     pub fn mismatched(settings: &PerturbationSettings, seed: Seed) -> Self {
-        drawn(&settings.model_mismatch, seed, DRAWS).0
+        draw_in_range(&settings.model_mismatch, seed, DRAWS).0
     }
 
-    /// Is a plant found within these settings' range before the draws become many? Magnitudes that are not met by any
-    /// would be played outside of it, after seconds of draws.
+    /// Is a plant within these settings' range found in a reasonable number of draws? Otherwise episodes would use a
+    /// plant out of range, after seconds of draws.
     #[must_use]
     pub fn can_be_drawn(settings: &PerturbationSettings, seed: Seed) -> bool {
-        drawn(&settings.model_mismatch, seed, EXPECTED_DRAWS).1
+        draw_in_range(&settings.model_mismatch, seed, EXPECTED_DRAWS).1
     }
 
-    /// The largest distance, m, between commanded and reached end-effector position over the
-    /// workspace, at rest, once the joints have crept to where friction no longer carries.
+    /// The largest distance, m, between commanded and reached end-effector position over the workspace, at
+    /// rest, when friction carries no load.
     #[must_use]
     pub fn largest_static_error(&self) -> f64 {
         largest_static_error(self, &workspace())
     }
 }
 
-/// The first plant of at most so many whose static error is in range, or else the last one; and whether it is.
-fn drawn(settings: &MismatchSettings, seed: Seed, draws: usize) -> (Plant, bool) {
+/// The first plant of at most `draws` whose static error is in range, otherwise the last one; and whether it is
+/// in range.
+fn draw_in_range(settings: &MismatchSettings, seed: Seed, draws: usize) -> (Plant, bool) {
     let [least, most] = settings.static_error_m;
     let workspace = workspace();
-    let is_met = |plant: &Plant| (least..=most).contains(&largest_static_error(plant, &workspace));
+    let is_in_range = |plant: &Plant| (least..=most).contains(&largest_static_error(plant, &workspace));
     let mut stream = Stream::new(&seed, "plant");
     let mut plant = draw(settings, &mut stream);
     for _ in 1..draws {
-        if is_met(&plant) {
+        if is_in_range(&plant) {
             return (plant, true);
         }
         plant = draw(settings, &mut stream);
     }
-    let met = is_met(&plant);
-    (plant, met)
+    let in_range = is_in_range(&plant);
+    (plant, in_range)
 }
 
 fn draw(settings: &MismatchSettings, stream: &mut Stream) -> Plant {
@@ -122,8 +123,8 @@ fn largest_static_error(plant: &Plant, workspace: &[[f64; JOINTS]]) -> f64 {
 
 /// Distance between the commanded end-effector position and where gravity and gains balance.
 fn static_error(plant: &Plant, desired: &[f64; JOINTS]) -> f64 {
-    let target = Kinematics::new(&full(desired)).end_effector.origin;
-    let mut q = full(desired);
+    let target = Kinematics::new(&with_zero_universal(desired)).end_effector.origin;
+    let mut q = with_zero_universal(desired);
     for _ in 0..SAG_ROUNDS {
         let kinematics = Kinematics::new(&q);
         let ee = &kinematics.end_effector;

@@ -1,4 +1,4 @@
-//! How the evaluator's world differs from the ideal one. Every factor has a stream of its own.
+//! Differences between the evaluator's world and the ideal one. Each factor has its own random stream.
 
 pub mod disturbance;
 mod mismatch;

@@ -1,9 +1,9 @@
-//! Gaussian noise on what the agent observes.
+//! Gaussian noise on the agent's observations.
 
 use crate::{model::JOINTS, stream::Stream};
 use faceoff_types::NoiseSettings;
 
-/// Draws the noise of one observation after the other.
+/// Draws the noise of successive observations.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ObservationNoise {
     stream: Stream,
@@ -11,7 +11,6 @@ pub struct ObservationNoise {
 }
 
 impl ObservationNoise {
-    /// From its stream.
     #[must_use]
     pub fn new(settings: &NoiseSettings, stream: Stream) -> Self {
         Self {

@@ -1,4 +1,4 @@
-//! The factors that act on the table and on how the puck is tracked: the same for all robots on it.
+//! The factors that act on the table and on the tracking of the puck: shared by all robots.
 
 use super::{
     disturbance::Disturbance, rehearsal_table::RehearsalTable, tracking_loss::TrackingLoss,
@@ -20,7 +20,7 @@ pub struct TableFactors {
 }
 
 impl TableFactors {
-    /// From the seed of the episode or rally; sets up the world's table.
+    /// Draws from the seed of the episode or rally, and sets the puck's damping in the world.
     #[must_use]
     pub fn new(
         factors: Factors,
@@ -28,24 +28,24 @@ impl TableFactors {
         seed: &Seed,
         world: &mut World,
     ) -> Self {
-        let on = |factor: Factor, label: &str| {
+        let stream = |factor: Factor, label: &str| {
             factors.contains(factor).then(|| Stream::new(seed, label))
         };
-        let table = on(Factor::Delay, "delay, table")
+        let table = stream(Factor::Delay, "delay, table")
             .map(|stream| RehearsalTable::draw(&settings.delay, stream));
         if let Some(table) = &table {
             world.set_puck_damping(table.puck_damping_per_s);
         }
         Self {
-            disturbance: on(Factor::Disturbance, Factor::Disturbance.as_str())
+            disturbance: stream(Factor::Disturbance, Factor::Disturbance.as_str())
                 .map(|stream| Disturbance::new(&settings.disturbance, stream)),
-            tracking_loss: on(Factor::TrackingLoss, Factor::TrackingLoss.as_str())
+            tracking_loss: stream(Factor::TrackingLoss, Factor::TrackingLoss.as_str())
                 .map(|stream| TrackingLoss::new(&settings.tracking_loss, stream)),
             tilt_n: table.map_or([0.0; 2], |table| table.tilt_m_s2.map(|a| PUCK.mass_kg * a)),
         }
     }
 
-    /// The force on the puck in the coming substep, N, table frame. To be asked once per substep.
+    /// The force on the puck in the coming substep, N, table frame. Call it once per substep.
     pub fn force(&mut self, puck: &Puck) -> [f64; 2] {
         let [x, y] = self
             .disturbance
@@ -54,13 +54,13 @@ impl TableFactors {
         [x + self.tilt_n[0], y + self.tilt_n[1]]
     }
 
-    /// Advances the world by a control step; tells whether the puck is lost at its end.
+    /// Advances the world by a control step; returns whether the puck is lost at its end.
     pub fn control_step(&mut self, world: &mut World) -> bool {
         world.control_step(|puck| self.force(puck));
         self.is_lost()
     }
 
-    /// Whether the puck is lost at the end of a control step. To be asked once per control step.
+    /// Whether the puck is lost at the end of a control step. Call it once per control step.
     pub fn is_lost(&mut self) -> bool {
         self.tracking_loss
             .as_mut()

@@ -1,9 +1,9 @@
-//! Losing sight of the puck.
+//! Loss of the puck's tracking.
 
 use crate::stream::Stream;
 use faceoff_types::TrackingLossSettings;
 
-/// Decides at which control steps the puck is not seen.
+/// Draws the control steps at which the puck is lost.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TrackingLoss {
     stream: Stream,
@@ -12,7 +12,7 @@ pub struct TrackingLoss {
 }
 
 impl TrackingLoss {
-    /// Tracked at first.
+    /// Starts with the puck tracked.
     #[must_use]
     pub fn new(settings: &TrackingLossSettings, stream: Stream) -> Self {
         Self {
@@ -22,8 +22,7 @@ impl TrackingLoss {
         }
     }
 
-    /// Whether the puck is lost at the next control step. Not to be asked for an episode's first
-    /// observation.
+    /// Whether the puck is lost at the next control step. Do not call it for an episode's first observation.
     pub fn advance(&mut self) -> bool {
         // Always two draws, so that the draws of a step do not depend on earlier ones.
         let chance = self.stream.unit();

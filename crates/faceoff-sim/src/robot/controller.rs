@@ -6,14 +6,14 @@ use crate::{
     model::{JOINTS, LINKS, SUBSTEP_S},
 };
 
-/// How fast the limiter lets a joint approach its stop, 1/s (ref).
+/// Largest approach velocity of a joint per distance to its stop, 1/s (ref).
 pub(crate) const LIMITER_GAIN: f64 = 20.0;
 
-/// Weight of the newest joint velocity in the low-pass filter, and of the older ones (ref).
+/// Weights of the new and of the previous value in the low-pass filter of the joint velocity (ref).
 pub(crate) const FILTER_NEW: f64 = 0.274;
 const FILTER_OLD: f64 = 0.726;
 
-/// Keeps commands within position and velocity limits.
+/// Limits commands to the position and velocity limits.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Limiter<T = f64> {
     /// The previously commanded position, rad.
@@ -33,15 +33,15 @@ impl<T: Lanes> Limiter<T> {
         Self { commanded: q }
     }
 
-    /// Those of several arms.
+    /// Collects the limiters of several arms.
     #[inline(always)]
-    pub fn gather<'a>(of: impl Fn(usize) -> &'a Limiter) -> Self {
+    pub fn gather<'a>(limiter: impl Fn(usize) -> &'a Limiter) -> Self {
         Self {
-            commanded: gather(|lane| &of(lane).commanded),
+            commanded: gather(|lane| &limiter(lane).commanded),
         }
     }
 
-    /// That of one arm.
+    /// The limiter of one arm.
     pub fn lane(&self, lane: usize) -> Limiter {
         Limiter {
             commanded: row(&self.commanded, lane),
@@ -64,9 +64,9 @@ impl<T: Lanes> Limiter<T> {
             let within = |v: T| clamp(v, T::splat(-v_max), T::splat(v_max));
             let slowest = within(gain * (p + q_max));
             let fastest = within(gain * (p - q_max));
-            command.velocity[i] = clamp(or(desired.velocity[i], zero), slowest, fastest);
+            command.velocity[i] = clamp(or_else(desired.velocity[i], zero), slowest, fastest);
             command.position[i] = clamp(
-                or(desired.position[i], p),
+                or_else(desired.position[i], p),
                 p + step * slowest,
                 p + step * fastest,
             );
@@ -91,7 +91,7 @@ pub fn torque<T: Lanes>(
             + plant.kd[i] * (command.velocity[i] - dq_filtered[i]);
         let limit = LINKS[i].torque_limit_n_m;
         clamp(
-            or(feedback + feed_forward[i], T::splat(0.0)),
+            or_else(feedback + feed_forward[i], T::splat(0.0)),
             T::splat(-limit),
             T::splat(limit),
         )
@@ -106,13 +106,13 @@ pub fn filter_velocity<T: Lanes>(dq_filtered: &mut [T; JOINTS], dq: &[T]) {
     }
 }
 
-/// A desired value that is not a number is none: the joint stays, or is left alone.
+/// `otherwise` if a desired value is NaN: the joint then stays where it is.
 #[inline(always)]
-fn or<T: Lanes>(x: T, otherwise: T) -> T {
-    T::choose(x.within(x), x, otherwise)
+fn or_else<T: Lanes>(x: T, otherwise: T) -> T {
+    T::select(x.less_or_equal(x), x, otherwise)
 }
 
-/// `f64::clamp` without its panic; the bounds are in order by construction.
+/// `f64::clamp` without its panic: the bounds are ordered by construction.
 #[inline(always)]
 fn clamp<T: Lanes>(x: T, low: T, high: T) -> T {
     x.at_least(low).at_most(high)

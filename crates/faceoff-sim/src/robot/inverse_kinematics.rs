@@ -22,7 +22,7 @@ const ITERATIONS: usize = 1000;
 pub fn inverse_kinematics(target: [f64; 3], start: &[f64; JOINTS]) -> [f64; JOINTS] {
     let mut q = *start;
     for _ in 0..ITERATIONS {
-        let kinematics = Kinematics::new(&full(&q));
+        let kinematics = Kinematics::new(&with_zero_universal(&q));
         let ee = kinematics.end_effector.origin;
         let error = Vector3::new(target[0] - ee.x, target[1] - ee.y, target[2] - ee.z);
         if error.norm() < TOLERANCE_M {
@@ -52,8 +52,8 @@ pub fn inverse_kinematics(target: [f64; 3], start: &[f64; JOINTS]) -> [f64; JOIN
     q
 }
 
-/// The driven joints with the universal joint at zero.
-pub fn full(q: &[f64; JOINTS]) -> [f64; DOFS] {
+/// Appends the universal joint's angles, both zero, to the driven joints' positions.
+pub fn with_zero_universal(q: &[f64; JOINTS]) -> [f64; DOFS] {
     let mut all = [0.0; DOFS];
     all[..JOINTS].copy_from_slice(q);
     all

@@ -1,4 +1,4 @@
-//! What physically moves: nominal, or off by the season's model mismatch.
+//! The physical properties of the arm: nominal, or changed by the season's model mismatch.
 
 use crate::{
     dynamics::{
@@ -9,9 +9,8 @@ use crate::{
     model::{DOFS, JOINTS, LINKS},
 };
 
-/// The robot as it really is: masses, gains, damping and dry friction. Made once per season and
-/// shared by all episodes; every arm on the table is alike. The controller's feed-forward and the
-/// agent's model stay nominal, whatever the plant.
+/// The true robot: masses, gains, damping and dry friction. Created once per season and shared by all
+/// episodes and by both arms. The controller's feed-forward and the agent's model are always nominal.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Plant {
     /// Factor on the masses and inertias of links 1…7, end effector and mallet.
@@ -68,7 +67,7 @@ impl Plant {
     }
 }
 
-/// What moves several arms, which may be different ones.
+/// The plants of several arms, which may differ.
 #[derive(Debug, Clone, Copy)]
 pub struct PlantLanes<T> {
     pub(crate) mass_scale: [T; 9],
@@ -78,14 +77,14 @@ pub struct PlantLanes<T> {
 }
 
 impl<T: Lanes> PlantLanes<T> {
-    /// Of the plant of each arm.
+    /// Collects the plants of several arms.
     #[inline(always)]
-    pub fn gather<'a>(of: impl Fn(usize) -> &'a Plant) -> Self {
+    pub fn gather<'a>(plant: impl Fn(usize) -> &'a Plant) -> Self {
         Self {
-            mass_scale: gather(|lane| &of(lane).mass_scale),
-            kp: gather(|lane| &of(lane).kp),
-            kd: gather(|lane| &of(lane).kd),
-            damping: gather(|lane| &of(lane).damping),
+            mass_scale: gather(|lane| &plant(lane).mass_scale),
+            kp: gather(|lane| &plant(lane).kp),
+            kd: gather(|lane| &plant(lane).kd),
+            damping: gather(|lane| &plant(lane).damping),
         }
     }
 }

@@ -18,13 +18,13 @@ pub struct Setpoint<L = f64> {
 }
 
 impl<L: Lanes> Setpoint<L> {
-    /// Those of several arms.
+    /// Collects the setpoints of several arms.
     #[inline(always)]
-    pub fn gather<'a>(of: impl Fn(usize) -> &'a Setpoint) -> Self {
+    pub fn gather<'a>(setpoint: impl Fn(usize) -> &'a Setpoint) -> Self {
         Self {
-            position: gather(|lane| &of(lane).position),
-            velocity: gather(|lane| &of(lane).velocity),
-            acceleration: gather(|lane| &of(lane).acceleration),
+            position: gather(|lane| &setpoint(lane).position),
+            velocity: gather(|lane| &setpoint(lane).velocity),
+            acceleration: gather(|lane| &setpoint(lane).acceleration),
         }
     }
 }
@@ -40,7 +40,7 @@ impl Setpoint {
     }
 }
 
-/// The desired motion at t = 1…20 ms of a control step; the last one starts the next step.
+/// The desired motion at t = 1…20 ms of a control step; the next step starts from the last setpoint.
 pub type Trajectory = [Setpoint; SUBSTEPS];
 
 /// Below this distance, rad, a quadratic starts at rest (ref).

@@ -15,7 +15,7 @@ pub(crate) const KD: f64 = 0.31;
 pub(crate) const TORQUE_LIMIT: f64 = 10.0;
 /// Desired angles stay within this, rad (ref).
 pub(crate) const RANGE: f64 = 0.95 * FRAC_PI_2;
-/// Weight of the newest hinge velocity in the filter, and of the older ones (ref).
+/// Weights of the new and of the previous value in the filter of the hinge velocity (ref).
 pub(crate) const FILTER_NEW: f64 = 0.273;
 const FILTER_OLD: f64 = 0.727;
 
@@ -32,15 +32,15 @@ impl<T: Lanes> UniversalJoint<T> {
         }
     }
 
-    /// Those of several arms.
+    /// Collects the controllers of several arms.
     #[inline(always)]
-    pub fn gather<'a>(of: impl Fn(usize) -> &'a UniversalJoint) -> Self {
+    pub fn gather<'a>(joint: impl Fn(usize) -> &'a UniversalJoint) -> Self {
         Self {
-            velocity_filtered: gather(|lane| &of(lane).velocity_filtered),
+            velocity_filtered: gather(|lane| &joint(lane).velocity_filtered),
         }
     }
 
-    /// That of one arm.
+    /// The controller of one arm.
     pub fn lane(&self, lane: usize) -> UniversalJoint {
         UniversalJoint {
             velocity_filtered: row(&self.velocity_filtered, lane),
@@ -82,9 +82,9 @@ pub fn vertical<T: Lanes>(x: Vec3<T>, y: Vec3<T>, previous: [T; 2]) -> [T; 2] {
 #[inline(always)]
 fn unwrap<T: Lanes>(angle: T, previous: T) -> T {
     let (pi, turn) = (T::splat(PI), T::splat(TAU));
-    let apart = angle - previous;
-    let behind = T::choose(apart.below(-pi), angle + turn, angle);
-    T::choose(pi.below(apart), angle - turn, behind)
+    let difference = angle - previous;
+    let behind = T::select(difference.less_than(-pi), angle + turn, angle);
+    T::select(pi.less_than(difference), angle - turn, behind)
 }
 
 /// Angle from `a` to `b` about `axis`, rad.
@@ -94,8 +94,8 @@ fn signed_angle<T: Lanes>(a: Vec3<T>, b: Vec3<T>, axis: Vec3<T>) -> T {
 }
 
 /// The reference's rotation of `v` about `axis`: Rodrigues' formula, but with the cross-product
-/// matrix squared entry by entry instead of multiplied with itself. Kept, because agents were
-/// tuned on the mallet's resulting tilt.
+/// matrix squared entry by entry instead of multiplied with itself. It stays, because agents are tuned to
+/// the mallet's resulting tilt.
 #[inline(always)]
 fn ref_rotate<T: Lanes>(axis: Vec3<T>, angle: T, v: Vec3<T>) -> Vec3<T> {
     let (sin, cos) = angles::sin_cos(angle);

@@ -1,13 +1,12 @@
-//! Who touches whom: the boundary to rapier.
+//! Contact detection with rapier.
 //!
 //! Table, puck and mallets are rapier colliders; rapier's narrow-phase queries find normals and
-//! depths. Everything of interest happens in the plane of the surface, where a disc is represented
-//! exactly by a ball that meets walls of any height; a leaning mallet is cut at the heights where it
-//! can touch first. The goal
-//! posts' rounding is a contact skin around sharp-edged cuboids, which is the same set of points.
-//! The queries are pure functions of the poses, so that a world is saved without them.
+//! depths. All contacts are in the plane of the surface, where a ball between high walls represents a disc
+//! exactly. A leaning mallet is cut at the heights where it can touch first. The rounding of the goal posts
+//! is a contact skin around sharp-edged cuboids, which is the same set of points. The queries are pure
+//! functions of the poses, so that a saved world does not contain them.
 //!
-//! Rapier's math types end in this module.
+//! Only this module uses rapier's math types.
 
 use super::{
     geometry::{PUCK, TABLE},
@@ -23,20 +22,20 @@ use rapier3d_f64::{
 };
 use std::sync::LazyLock;
 
-/// A place where two bodies overlap.
+/// A contact: two bodies overlap.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Touch {
     /// Unit normal in the table frame, into the second body.
     pub normal: [f64; 3],
     /// Depth of the overlap, m, positive.
     pub depth_m: f64,
-    /// Where the force acts, m, table frame; its height is 0 where that does not matter.
+    /// Point of action of the force, m, table frame; its height is 0 where it has no effect.
     pub point: [f64; 3],
     /// Distance of that point from the second body's centre, m.
     pub lever_m: f64,
 }
 
-/// The table's rims never move: two long ones and the four parts beside the goals.
+/// The rims, which never move (two long ones and the four parts beside the goals), and the puck.
 struct Colliders {
     long_rims: [Collider; 2],
     short_rims: [Collider; 4],
@@ -56,7 +55,7 @@ static COLLIDERS: LazyLock<Colliders> = LazyLock::new(|| {
             .translation(Vector::new(0.0, side * (half_width + half_thickness), 0.0))
             .build()
     };
-    // From the post's centre of rounding to the outer face of the long rim, which hides that end.
+    // From the centre of the post's rounding to the outer face of the long rim, which covers that end.
     let (post_y, end_y) = (
         TABLE.goal_width_m / 2.0 + skin,
         half_width + TABLE.rim_thickness_m - skin,
@@ -100,7 +99,7 @@ fn overlap(
     (depth_m > 0.0).then_some(([contact.normal1.x, contact.normal1.y], depth_m))
 }
 
-/// Contact of the puck with a rim. The force acts in the middle of the overlap.
+/// Contact of the puck with a rim. The force acts at the middle of the overlap.
 fn rim_and_puck(rim: &Collider, puck: [f64; 2]) -> Option<Touch> {
     let (n, depth_m) = overlap(
         (rim.shape(), *rim.position()),
@@ -116,8 +115,8 @@ fn rim_and_puck(rim: &Collider, puck: [f64; 2]) -> Option<Touch> {
     })
 }
 
-/// Contact of two discs, given by centre and radius, at a height. The force acts where the line
-/// between the centres is divided as the radii are.
+/// Contact of two discs, given by centre and radius, at a height. The point of action divides the line between
+/// the centres in proportion to the radii.
 fn discs(
     (first, first_radius): ([f64; 2], f64),
     (second, second_radius): ([f64; 2], f64),
@@ -144,12 +143,12 @@ fn at(position: [f64; 2]) -> Pose {
     Pose::from_translation(Vector::new(position[0], position[1], 0.0))
 }
 
-/// Makes the table's colliders, once per process, so that no substep has to.
-pub fn make_ready() {
+/// Builds the table's colliders, once per process, so that no substep does it.
+pub fn build_colliders() {
     LazyLock::force(&COLLIDERS);
 }
 
-/// The broad phase of the rims: whether the puck may touch a long, a short one.
+/// The broad phase of the rims: whether the puck may touch a long rim, and a short one.
 #[inline(always)]
 fn near(puck: [f64; 2]) -> [bool; 2] {
     [
@@ -191,8 +190,8 @@ pub fn mallets_near([x_1, y_1, _]: [f64; 3], [x_2, y_2, _]: [f64; 3]) -> bool {
     within([x_1, y_1], [x_2, y_2], 2.0 * FARTHEST_M).is_some()
 }
 
-/// Contact of a mallet with the puck, normal into the puck. A leaning cylinder meets the puck first at
-/// the puck's upper or lower edge, and pushes at right angles to its axis.
+/// Contact of a mallet with the puck, normal into the puck. A leaning cylinder touches the puck first at
+/// the puck's upper or lower edge, and pushes perpendicular to its axis.
 pub fn mallet_and_puck(mallet: &MalletCylinder, puck: [f64; 2]) -> Option<Touch> {
     if !mallet_near_puck(mallet.centre, puck) {
         return None;
@@ -222,7 +221,7 @@ pub fn mallets(first: &MalletCylinder, second: &MalletCylinder) -> Option<Touch>
     })
 }
 
-/// The deeper contact of the two ends of a range of heights; none if the range is empty.
+/// The deeper contact at the two ends of a range of heights; `None` if the range is empty.
 fn deepest_of([low, high]: [f64; 2], contact: impl Fn(f64) -> Option<Touch>) -> Option<Touch> {
     if low >= high {
         return None;
@@ -233,7 +232,7 @@ fn deepest_of([low, high]: [f64; 2], contact: impl Fn(f64) -> Option<Touch>) -> 
     }
 }
 
-/// The broad phase: nothing to find beyond this distance.
+/// The broad phase: `Some` if two points are closer than a distance.
 #[inline(always)]
 fn within(a: [f64; 2], b: [f64; 2], distance: f64) -> Option<()> {
     let (dx, dy) = (a[0] - b[0], a[1] - b[1]);

@@ -23,7 +23,7 @@ pub(crate) const WIDTH_M: f64 = 0.001;
 /// of which the puck cannot move (the reference engine's estimate).
 const PUCK_INVERSE_INERTIA: f64 = 200.0 / 3.0;
 
-/// That of a mallet at the end of its arm, 1/kg.
+/// Inverse inertia of a mallet at the end of its arm, 1/kg.
 pub const MALLET_INVERSE_INERTIA: f64 = 1.07;
 
 /// Puck and rims: hard, and so rough that the puck never slips.
@@ -89,7 +89,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn impedance_rises_smoothly_from_first_to_second_value() {
+    fn impedance_rises_from_first_to_second_value() {
         assert_eq!(RIM.impedance(0.0), 0.99);
         assert!((RIM.impedance(0.0005) - 0.9945).abs() < 1e-12);
         assert_eq!(RIM.impedance(0.002), 0.999);

@@ -1,8 +1,8 @@
-//! The two robots stand face to face: their base frames and the table frame. Robots are 0 and 1.
+//! The table frame and the base frames of the two robots, which face each other. Robots are 0 and 1.
 
 use super::geometry::TABLE;
 
-/// A robot's side of the table: its base frame is turned by π for robot 2.
+/// Sign of a robot's x and y axes in the table frame: robot 2's base frame is rotated by π.
 #[inline(always)]
 pub fn side(robot: usize) -> f64 {
     if robot == 0 { 1.0 } else { -1.0 }

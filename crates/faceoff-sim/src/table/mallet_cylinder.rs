@@ -1,5 +1,5 @@
-//! The mallet's striking cylinder, which leans a little whenever the arm moves: the universal joint
-//! follows the vertical with a lag.
+//! The mallet's striking cylinder. It leans slightly while the arm moves, since the universal joint follows the
+//! vertical with a lag.
 //!
 //! A lean of 0.05 rad brings the cylinder's side half a millimetre closer to the puck at the height of
 //! the puck's edge, as much as a glancing contact is deep.
@@ -10,15 +10,15 @@ use crate::model::TOOL;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MalletCylinder {
     pub centre: [f64; 3],
-    /// How far the axis moves in x and y per metre of height.
+    /// Shift of the axis in x and y per metre of height.
     pub lean: [f64; 2],
 }
 
-/// Beyond this lean the mallet lies on its side, and horizontal cuts say nothing about it.
+/// Beyond this lean the mallet lies on its side, and horizontal sections do not describe it.
 const STEEPEST_LEAN: f64 = 1.0;
 
-/// No cut reaches further from the centre than this, m, whatever the lean: an axis of half height times √2
-/// and a radius times √3.
+/// Largest reach of a horizontal section from the centre, m, for any lean: half height times √2 plus radius
+/// times √3.
 pub const FARTHEST_M: f64 = 1.415 * TOOL.cylinder_half_height_m + 1.733 * TOOL.cylinder_radius_m;
 
 impl MalletCylinder {
@@ -30,7 +30,7 @@ impl MalletCylinder {
         }
     }
 
-    /// With its axis along a unit vector, up or down.
+    /// A cylinder with its axis along a unit vector, up or down.
     #[inline(always)]
     pub fn along(centre: [f64; 3], axis: [f64; 3]) -> Self {
         let up = axis[2].signum() * axis[2].abs().max(1e-3);
@@ -49,7 +49,7 @@ impl MalletCylinder {
         [self.centre[2] - half, self.centre[2] + half]
     }
 
-    /// Where its axis passes a height, m.
+    /// Position of its axis at a height, m.
     #[inline(always)]
     pub fn at(&self, z: f64) -> [f64; 2] {
         let up = z - self.centre[2];
@@ -59,8 +59,8 @@ impl MalletCylinder {
         ]
     }
 
-    /// How far its horizontal cut, an ellipse, reaches from the axis in a direction, m. The direction
-    /// need not have unit length.
+    /// Reach of its horizontal section, an ellipse, from the axis in a direction, m. The direction need not have
+    /// unit length.
     #[inline(always)]
     pub fn reach(&self, direction: [f64; 2]) -> f64 {
         let [x, y] = direction;
@@ -72,8 +72,7 @@ impl MalletCylinder {
         TOOL.cylinder_radius_m * (1.0 + along * along / square).sqrt()
     }
 
-    /// The unit normal of its side where that is met in a horizontal direction: at right angles to
-    /// its axis.
+    /// The unit normal of its side for a contact in a horizontal direction: perpendicular to its axis.
     #[inline(always)]
     pub fn side_normal(&self, horizontal: [f64; 3]) -> [f64; 3] {
         let [x, y, _] = horizontal;
@@ -88,7 +87,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn an_upright_cylinder_is_the_same_at_every_height() {
+    fn upright_cylinder_is_the_same_at_every_height() {
         let cylinder = MalletCylinder::along([0.1, 0.2, 0.0145], [0.0, 0.0, 1.0]);
         assert_eq!(cylinder, MalletCylinder::upright([0.1, 0.2, 0.0145]));
         assert_eq!(
@@ -101,7 +100,7 @@ mod tests {
     }
 
     #[test]
-    fn a_leaning_cylinder_reaches_further_along_its_lean_only() {
+    fn leaning_cylinder_reaches_further_only_along_its_lean() {
         let (sin, cos) = libm::sincos(0.05);
         let cylinder = MalletCylinder::along([0.0, 0.0, 0.01], [sin, 0.0, cos]);
         let [x, y] = cylinder.at(0.02);
@@ -112,7 +111,7 @@ mod tests {
     }
 
     #[test]
-    fn a_fallen_mallet_stays_finite() {
+    fn fallen_mallet_stays_finite() {
         let cylinder = MalletCylinder::along([0.0; 3], [1.0, 0.0, -0.0]);
         assert!(cylinder.at(0.02)[0].is_finite() && cylinder.heights()[1] > 0.0);
     }

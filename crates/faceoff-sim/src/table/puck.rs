@@ -26,7 +26,7 @@ pub struct Damping([f64; 3]);
 impl Damping {
     pub const NOMINAL: Self = Self([PUCK.damping, PUCK.damping, PUCK.yaw_damping]);
 
-    /// With another decay rate of the velocity, 1/s.
+    /// Damping with a given decay rate of the velocity, 1/s.
     #[must_use]
     pub fn per_s(rate: f64) -> Self {
         let linear = rate * PUCK.mass_kg;

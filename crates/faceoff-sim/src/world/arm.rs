@@ -6,7 +6,7 @@ use crate::{
     model::{DOFS, JOINTS, SUBSTEP_S, SUBSTEPS},
     robot::{
         controller::Limiter,
-        inverse_kinematics::full,
+        inverse_kinematics::with_zero_universal,
         plant::Plant,
         trajectory::{Setpoint, Trajectory, interpolate},
         universal_joint::{UniversalJoint, vertical},
@@ -14,7 +14,7 @@ use crate::{
 };
 use faceoff_types::Interpolation;
 
-/// One arm with its controller, exactly as far as its future depends on it.
+/// One arm with its controller: all state that its future depends on.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Arm {
     pub(super) q: [f64; DOFS],
@@ -26,17 +26,17 @@ pub struct Arm {
     pub(super) universal: UniversalJoint,
     pub(super) constraints: JointConstraints,
     pub(super) ee_before: [f64; 3],
-    /// Control steps since the last action that the trajectory has run on.
+    /// Control steps for which the trajectory has continued since the last action.
     coasted: u32,
 }
 
-/// A late action's predecessor runs on for this many control steps: 80 ms.
+/// If an action is late, the previous trajectory continues for this many control steps: 80 ms.
 const COAST_STEPS: u32 = 4;
 
 impl Arm {
     /// At rest, the mallet vertical.
     pub fn new(plant: &Plant, joints: &[f64; JOINTS]) -> Self {
-        let mut q = full(joints);
+        let mut q = with_zero_universal(joints);
         let ee = Kinematics::new(&q).end_effector;
         let universal = vertical(ee.x, ee.y, [0.0; 2]);
         q[JOINTS..].copy_from_slice(&universal);
@@ -65,7 +65,7 @@ impl Arm {
         self.coasted = 0;
     }
 
-    /// Is the trajectory made of numbers?
+    /// Are all numbers of the trajectory finite?
     pub fn is_commanded_finitely(&self) -> bool {
         self.trajectory.iter().all(|setpoint| {
             let Setpoint {
@@ -84,8 +84,8 @@ impl Arm {
         self.command(interpolation, &action[..interpolation.len()]);
     }
 
-    /// Starts a control step in which the last trajectory runs on at constant velocity, or stops after
-    /// [`COAST_STEPS`] of them.
+    /// Starts a control step in which the last trajectory continues at constant velocity. After [`COAST_STEPS`]
+    /// such steps the arm stops.
     pub fn coast(&mut self) {
         let end = *self.end();
         self.trajectory = std::array::from_fn(|k| {

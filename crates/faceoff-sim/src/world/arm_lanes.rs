@@ -1,4 +1,4 @@
-//! The state of several arms, one in each lane, while they are moved.
+//! The state of several arms, one in each lane, during their substeps.
 
 use super::{arm::Arm, friction::FrictionLanes};
 use crate::{
@@ -34,10 +34,10 @@ pub struct MotionLanes<T> {
 }
 
 impl<T: Lanes> ArmLanes<T> {
-    /// Takes arms into the lanes; each lane's arm is `of` its index.
+    /// Collects arms into the lanes; `source` returns the arm and the plant of a lane.
     #[inline(always)]
-    pub fn gather<'a>(of: impl Fn(usize) -> (&'a Arm, &'a Plant)) -> Self {
-        let arm = |lane: usize| of(lane).0;
+    pub fn gather<'a>(source: impl Fn(usize) -> (&'a Arm, &'a Plant)) -> Self {
+        let arm = |lane: usize| source(lane).0;
         Self {
             motion: MotionLanes {
                 q: gather(|lane| &arm(lane).q),
@@ -52,11 +52,11 @@ impl<T: Lanes> ArmLanes<T> {
                 let [x, y, z] = gather(|lane| &arm(lane).ee_before);
                 Vec3::new(x, y, z)
             },
-            plant: PlantLanes::gather(|lane| of(lane).1),
+            plant: PlantLanes::gather(|lane| source(lane).1),
         }
     }
 
-    /// Gives an arm back what became of it.
+    /// Writes one lane back to its arm.
     pub fn store(&self, lane: usize, arm: &mut Arm) {
         self.motion.store(lane, arm);
         arm.torque = row(&self.torque, lane);
@@ -68,17 +68,17 @@ impl<T: Lanes> ArmLanes<T> {
 }
 
 impl<T: Lanes> MotionLanes<T> {
-    /// Gives an arm its positions and velocities.
+    /// Writes positions and velocities of one lane to its arm.
     pub fn store(&self, lane: usize, arm: &mut Arm) {
         arm.q = row(&self.q, lane);
         arm.dq = row(&self.dq, lane);
         arm.dq_filtered = row(&self.dq_filtered, lane);
     }
 
-    /// Takes one arm's from another moment.
-    pub fn replace(&mut self, lane: usize, by: &Self) {
-        set_row(&mut self.q, lane, &row(&by.q, lane));
-        set_row(&mut self.dq, lane, &row(&by.dq, lane));
-        set_row(&mut self.dq_filtered, lane, &row(&by.dq_filtered, lane));
+    /// Replaces one lane by that of another instant.
+    pub fn replace(&mut self, lane: usize, other: &Self) {
+        set_row(&mut self.q, lane, &row(&other.q, lane));
+        set_row(&mut self.dq, lane, &row(&other.dq, lane));
+        set_row(&mut self.dq_filtered, lane, &row(&other.dq_filtered, lane));
     }
 }

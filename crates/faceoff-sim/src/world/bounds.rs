@@ -1,5 +1,5 @@
-//! Where a world stops being one: beyond these bounds a millisecond is too long a step, and numbers
-//! grow without limit or stop being numbers.
+//! Bounds of the simulation: beyond them a step of a millisecond is too long, and numbers grow without limit or
+//! become NaN.
 
 use super::{arm::Arm, arm_lanes::MotionLanes};
 use crate::{
@@ -10,8 +10,8 @@ use crate::{
 use faceoff_types::Ruleset;
 use std::{f64::consts::FRAC_PI_2, fmt};
 
-/// The bounds of what is simulated, far beyond what robot and puck do. A world that is about to leave
-/// them stands still from then on.
+/// The bounds of the simulation, far beyond ordinary motion of robot and puck. A world that would leave them stops
+/// in its last state within them.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Bounds {
     /// How far a joint may be beyond its stop, rad.
@@ -24,12 +24,12 @@ pub struct Bounds {
     pub puck_rad_s: f64,
 }
 
-/// A joint that turns this many times faster than its drive may is beyond what any command asks for
-/// that the robot can follow: the robot that is so first is to blame for what comes of it.
+/// A joint that turns this many times faster than its velocity limit cannot follow from a feasible command. The
+/// first robot with such a joint is at fault for a later divergence.
 const RUNAWAY: f64 = 10.0;
 
 impl Bounds {
-    /// Half a turn beyond a stop; a radian, and ten metres, in a millisecond.
+    /// Half a turn beyond a stop; a radian (joint) and ten metres (puck) in a millisecond.
     pub const WIDE: Self = Self {
         beyond_stop_rad: std::f64::consts::PI,
         joint_rad_s: 1e3,
@@ -37,7 +37,7 @@ impl Bounds {
         puck_rad_s: 1e6,
     };
 
-    /// Anything that is a number.
+    /// Any finite state.
     pub const FINITE: Self = Self {
         beyond_stop_rad: f64::MAX,
         joint_rad_s: f64::MAX,
@@ -45,7 +45,7 @@ impl Bounds {
         puck_rad_s: f64::MAX,
     };
 
-    /// Those of a ruleset.
+    /// The bounds of a ruleset.
     #[must_use]
     pub const fn of(ruleset: Ruleset) -> Self {
         match ruleset {
@@ -54,8 +54,8 @@ impl Bounds {
         }
     }
 
-    /// The joint of an arm that is out of bounds, one that is not a number included.
-    pub(super) fn joint_beyond(&self, arm: &Arm) -> Option<usize> {
+    /// The joint of an arm that is out of bounds or NaN.
+    pub(super) fn joint_out_of_bounds(&self, arm: &Arm) -> Option<usize> {
         (0..DOFS).find(|&i| {
             let range = LINKS.get(i).map_or(FRAC_PI_2, |link| link.range_rad);
             let inside = arm.dq[i].abs() <= self.joint_rad_s
@@ -64,8 +64,8 @@ impl Bounds {
         })
     }
 
-    /// Is the puck out of bounds, or no number?
-    pub(super) fn puck_beyond(&self, puck: &Puck) -> bool {
+    /// Is the puck out of bounds or NaN?
+    pub(super) fn is_puck_out_of_bounds(&self, puck: &Puck) -> bool {
         let [vx, vy, yaw_rate] = puck.velocity;
         let inside = vx.abs() <= self.puck_m_s
             && vy.abs() <= self.puck_m_s
@@ -75,7 +75,7 @@ impl Bounds {
     }
 }
 
-/// Is everything about an arm as it is in ordinary play? The one question of every substep.
+/// Is an arm in its ordinary range of motion? The only check of the bounds in every substep.
 #[inline(always)]
 pub(super) fn is_ordinary<T: Lanes>(motion: &MotionLanes<T>) -> T::Mask {
     let limits = |i: usize| match LINKS.get(i) {
@@ -87,26 +87,26 @@ pub(super) fn is_ordinary<T: Lanes>(motion: &MotionLanes<T>) -> T::Mask {
     };
     let joint = |i: usize| {
         let (fastest, farthest) = limits(i);
-        T::both(
-            motion.dq[i].abs().within(T::splat(fastest)),
-            motion.q[i].abs().within(T::splat(farthest)),
+        T::mask_and(
+            motion.dq[i].abs().less_or_equal(T::splat(fastest)),
+            motion.q[i].abs().less_or_equal(T::splat(farthest)),
         )
     };
     let mut ordinary = joint(0);
     for i in 1..DOFS {
-        ordinary = T::both(ordinary, joint(i));
+        ordinary = T::mask_and(ordinary, joint(i));
     }
     ordinary
 }
 
-/// As [`is_ordinary`], of the puck: tasks and games take a faster one as gone.
+/// [`is_ordinary`] for the puck: in tasks and games a faster puck counts as lost.
 #[inline(always)]
 pub(super) fn is_ordinary_puck(puck: &Puck) -> bool {
     let [vx, vy, yaw_rate] = puck.velocity;
     vx.abs() <= 100.0 && vy.abs() <= 100.0 && yaw_rate.abs() <= 1e4
 }
 
-/// Does a driven joint turn as no command asks for that the robot can follow?
+/// Does a driven joint turn faster than any feasible command demands?
 pub(super) fn is_runaway(arm: &Arm) -> bool {
     (0..JOINTS).any(|i| {
         let ordinary = arm.dq[i].abs() <= RUNAWAY * LINKS[i].velocity_limit_rad_s;
@@ -114,17 +114,17 @@ pub(super) fn is_runaway(arm: &Arm) -> bool {
     })
 }
 
-/// A world that came to the end of its bounds.
+/// A world that would have left its bounds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Divergence {
-    /// The robots (0 and 1) whose command or state left its bounds first; both only if in the same
+    /// The robots (0 and 1) at fault: their command or state left its bounds first. Both only if in the same
     /// millisecond.
     pub by: [bool; 2],
-    /// What was about to leave the bounds.
-    pub what: Runaway,
+    /// The joint or puck that would have left the bounds.
+    pub cause: Runaway,
 }
 
-/// What leaves the bounds of a world.
+/// The part of a world that leaves its bounds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Runaway {
     /// A joint of a robot: 0 to 6 are driven, 7 and 8 hold the mallet.

@@ -6,20 +6,20 @@
 /// Normal, horizontal tangent, upright tangent.
 pub const DIRECTIONS: usize = 3;
 
-/// Sweeps over several contacts of which one slips, and the relative change at which they end.
+/// Largest number of sweeps over several contacts if one of them slips, and the relative change that ends them.
 const SWEEPS: usize = 20_000;
 const SWEEP_TOLERANCE: f64 = 1e-13;
-/// Directions of slip that are tried, all around, before the search between the best one's neighbours.
+/// Directions of slip on the full circle that are tried before the search around the best one.
 const DIRECTIONS_TRIED: usize = 16;
-/// Halvings in that search: down to rounding.
+/// Bisections in that search: down to rounding.
 const BISECTIONS: usize = 54;
 
 /// One contact's force: normal, horizontal tangent, upright tangent.
 type ContactForce = [f64; DIRECTIONS];
 
 /// Minimises ½ f·matrix·f − target·f where each contact's tangential force stays within friction times
-/// its normal force; rows are normal, horizontal and upright tangent of each contact. This is the reference's notion of
-/// friction: a convex problem, in which slipping adds to the normal force.
+/// its normal force; rows are normal, horizontal and upright tangent of each contact. This is the reference's
+/// friction model: a convex problem, in which slipping increases the normal force.
 ///
 /// The matrix is symmetric and positive definite in the rows of the contacts, one friction coefficient
 /// each; later rows are ignored.
@@ -37,7 +37,7 @@ pub fn solve_cone<const N: usize>(
     if friction.iter().enumerate().all(sticks) {
         return force;
     }
-    // One contact after the other, the forces of the others held: a single contact needs one sweep.
+    // Solve one contact at a time with the other forces fixed: a single contact needs one sweep.
     for _ in 0..SWEEPS {
         let (mut change, mut size) = (0.0f64, 0.0f64);
         for (c, &mu) in friction.iter().enumerate() {
@@ -57,31 +57,31 @@ pub fn solve_cone<const N: usize>(
                 force[first + d] = next[d];
             }
         }
-        // Written so that forces that are no numbers end it too: they will not become any.
-        let goes_on = change > SWEEP_TOLERANCE * size;
-        if friction.len() == 1 || !goes_on || !size.is_finite() {
+        // Negated, so that NaN forces end the sweeps too.
+        let continues = change > SWEEP_TOLERANCE * size;
+        if friction.len() == 1 || !continues || !size.is_finite() {
             break;
         }
     }
     force
 }
 
-/// As [`solve_cone`], for one contact.
+/// [`solve_cone`] for one contact.
 fn solve_one_cone(
     matrix: &[ContactForce; DIRECTIONS],
     target: &ContactForce,
     mu: f64,
 ) -> ContactForce {
-    let stuck = eliminate(matrix, target, DIRECTIONS);
-    if norm([stuck[1], stuck[2]]) <= mu * stuck[0] {
-        return stuck;
+    let sticking = eliminate(matrix, target, DIRECTIONS);
+    if norm([sticking[1], sticking[2]]) <= mu * sticking[0] {
+        return sticking;
     }
     let pull = [target[1], target[2]];
     if target[0] + mu * norm(pull) <= 0.0 {
         return [0.0; DIRECTIONS];
     }
-    // The force lies on the edge of the cone. Along a given edge it is a matter of one unknown; the edge
-    // sought is the best of all, found roughly first and then between its neighbours.
+    // The force is on the surface of the cone. Along a given edge there is one unknown. The best edge is found
+    // roughly first and then between its neighbours.
     let edge = |u: [f64; 2]| [1.0, mu * u[0], mu * u[1]];
     let response = |edge: &ContactForce| matrix.map(|row| dot(&row, edge));
     let gain = |u: [f64; 2]| {
@@ -96,18 +96,18 @@ fn solve_one_cone(
     };
     let gain_across = |u: [f64; 2]| {
         let force = along(u);
-        let left: ContactForce = std::array::from_fn(|d| target[d] - dot(&matrix[d], &force));
-        left[2] * u[0] - left[1] * u[1]
+        let residual: ContactForce = std::array::from_fn(|d| target[d] - dot(&matrix[d], &force));
+        residual[2] * u[0] - residual[1] * u[1]
     };
     let mut best = unit(pull);
     let mut direction = best;
     for _ in 1..DIRECTIONS_TRIED {
-        direction = turned(direction, 1.0);
+        direction = rotate(direction, 1.0);
         if gain(direction) > gain(best) {
             best = direction;
         }
     }
-    let (mut before, mut after) = (turned(best, -1.0), turned(best, 1.0));
+    let (mut before, mut after) = (rotate(best, -1.0), rotate(best, 1.0));
     for _ in 0..BISECTIONS {
         let middle = unit([before[0] + after[0], before[1] + after[1]]);
         if gain_across(middle) > 0.0 {
@@ -119,8 +119,8 @@ fn solve_one_cone(
     along(before)
 }
 
-/// Turned by one of [`DIRECTIONS_TRIED`] parts of a full turn, forwards (+1) or backwards (−1).
-fn turned([x, y]: [f64; 2], sign: f64) -> [f64; 2] {
+/// Rotates by one of [`DIRECTIONS_TRIED`] parts of a full turn, forwards (+1) or backwards (−1).
+fn rotate([x, y]: [f64; 2], sign: f64) -> [f64; 2] {
     const COS: f64 = 0.923_879_532_511_286_7;
     const SIN: f64 = 0.382_683_432_365_089_8;
     let sin = sign * SIN;
@@ -135,12 +135,12 @@ fn block<const N: usize>(row: &[f64; N], contact: usize) -> ContactForce {
     std::array::from_fn(|d| row[DIRECTIONS * contact + d])
 }
 
-/// Not `hypot`, which is the platform's.
+/// Not `hypot`, which depends on the platform.
 fn norm(v: [f64; 2]) -> f64 {
     (v[0] * v[0] + v[1] * v[1]).sqrt()
 }
 
-/// A unit vector in a direction; any, where there is none.
+/// A unit vector in a direction; an arbitrary one for the zero vector.
 fn unit(v: [f64; 2]) -> [f64; 2] {
     let size = norm(v);
     if size > 0.0 {
@@ -186,7 +186,7 @@ mod tests {
     use crate::stream::Stream;
     use faceoff_types::Seed;
 
-    /// A random symmetric, positive definite matrix and a target whose pushes are as often off as on.
+    /// A random symmetric, positive definite matrix, and a target that pushes and pulls equally often.
     fn problem<const N: usize>(stream: &mut Stream) -> ([[f64; N]; N], [f64; N]) {
         let root: [[f64; N]; N] =
             std::array::from_fn(|_| std::array::from_fn(|_| stream.uniform(-1.0, 1.0)));
@@ -200,8 +200,8 @@ mod tests {
         (matrix, std::array::from_fn(|_| stream.uniform(-20.0, 20.0)))
     }
 
-    /// The conditions of the optimum: forces in their cones, what is left in the polar cones, and nothing
-    /// to gain along the forces. Returns how many contacts are open, stick and slip.
+    /// Checks the conditions of the optimum: forces in their cones, residuals in the polar cones, and no gain along
+    /// the forces. Returns how many contacts are open, stick and slip.
     fn check<const N: usize>(
         matrix: &[[f64; N]; N],
         target: &[f64; N],
@@ -211,7 +211,7 @@ mod tests {
         let mut kinds = [0; 3];
         for (c, &mu) in friction.iter().enumerate() {
             let [f, a, b] = block(&force, c);
-            let left: ContactForce = std::array::from_fn(|d| {
+            let residual: ContactForce = std::array::from_fn(|d| {
                 let row = matrix[DIRECTIONS * c + d];
                 let response: f64 = row.iter().zip(&force).map(|(m, f)| m * f).sum();
                 target[DIRECTIONS * c + d] - response
@@ -221,14 +221,14 @@ mod tests {
                 norm([a, b]) <= mu * f + tolerance,
                 "outside its cone: {force:?}"
             );
-            let outward = left[0] + mu * norm([left[1], left[2]]);
+            let outward = residual[0] + mu * norm([residual[1], residual[2]]);
             assert!(
                 outward <= 1e-8 * (1.0 + mu),
-                "something is left to gain: {left:?} {force:?}"
+                "not optimal: {residual:?} {force:?}"
             );
             assert!(
-                dot(&left, &[f, a, b]).abs() <= tolerance * 1e3,
-                "{left:?} {force:?}"
+                dot(&residual, &[f, a, b]).abs() <= tolerance * 1e3,
+                "{residual:?} {force:?}"
             );
             let kind = if f == 0.0 {
                 0
@@ -243,7 +243,7 @@ mod tests {
     }
 
     #[test]
-    fn one_contact_meets_the_conditions_of_the_optimum() {
+    fn single_contact_satisfies_the_optimality_conditions() {
         let mut stream = Stream::new(&Seed::from_number(1), "one contact");
         let mut kinds = [0; 3];
         for _ in 0..2000 {
@@ -255,7 +255,7 @@ mod tests {
     }
 
     #[test]
-    fn several_contacts_meet_them_together() {
+    fn several_contacts_satisfy_the_optimality_conditions() {
         let mut stream = Stream::new(&Seed::from_number(2), "several contacts");
         let mut kinds = [0; 3];
         for _ in 0..300 {

@@ -1,8 +1,8 @@
-//! The contact forces of one substep, solved together through the bodies that they share.
+//! The contact forces of one substep, solved jointly for all bodies.
 
 use super::{
     cone::{DIRECTIONS, solve_cone},
-    impacts::Met,
+    impacts::ContactBody,
 };
 use crate::{
     model::DOFS,
@@ -21,18 +21,18 @@ const MAX_ROWS: usize = DIRECTIONS * MAX_CONTACTS;
 /// z.
 pub type MalletJacobian = [[f64; DOFS]; 3];
 
-/// A mallet as a contact sees it.
+/// Motion of a mallet at a contact point.
 #[derive(Debug, Clone, Copy)]
 pub struct MalletMotion {
-    /// Of the arm; `None` if the mallet's motion is imposed.
+    /// The arm's Jacobian; `None` if the mallet's motion is imposed.
     pub jacobian: Option<MalletJacobian>,
     /// m/s, table frame.
     pub velocity: [f64; 3],
 }
 
 impl MalletMotion {
-    /// How an imposed mallet yields in the contact's equations, 1/kg: the reference solves them with
-    /// the arm beneath even where it overwrites its motion.
+    /// Inverse inertia of an imposed mallet in the contact's equations, 1/kg: the reference solves them with the arm,
+    /// although it overwrites the arm's motion.
     fn inverse_inertia(&self) -> f64 {
         if self.jacobian.is_some() {
             0.0
@@ -58,11 +58,11 @@ pub struct Contacts {
     count: usize,
     rows: [Row; MAX_ROWS],
     friction: [f64; MAX_CONTACTS],
-    /// What touches the puck, as bits.
+    /// The bodies that touch the puck, as bits of [`ContactBody`].
     touching: u8,
 }
 
-/// Who moves on the two sides of a contact.
+/// The two bodies of a contact.
 #[derive(Debug, Clone, Copy)]
 pub enum Pair<'a> {
     /// A rim and the puck.
@@ -99,17 +99,16 @@ impl Contacts {
         }
     }
 
-    /// Is nothing in contact?
     pub fn is_empty(&self) -> bool {
         self.count == 0
     }
 
-    /// What touches the puck, as bits of [`Met`].
+    /// The bodies that touch the puck, as bits of [`ContactBody`].
     pub fn touching(&self) -> u8 {
         self.touching
     }
 
-    /// Which arms a contact pushes.
+    /// The arms in contact.
     pub fn pushed(&self) -> [bool; 2] {
         let rows = &self.rows[..DIRECTIONS * self.count];
         [0, 1].map(|arm| rows.iter().any(|row| row.arms[arm].is_some()))
@@ -128,9 +127,9 @@ impl Contacts {
         let impedance = material.impedance(touch.depth_m);
         let regularisation = Material::softness(impedance) * material.inverse_inertia;
         let push = material.stiffness_per_s2 * impedance * touch.depth_m;
-        // Where MODEL leaves a choice, the recordings decide: the force acts inside the overlap, which is
-        // millimetres deep, and there is a second, upright tangent: the puck does not move along z, but its
-        // friction brakes a mallet that does, and shares the cone with the horizontal one.
+        // MODEL leaves two choices open; these match the recordings. The force acts inside the overlap, which is
+        // millimetres deep. And there is an upright tangent: the puck does not move along z, but its friction
+        // brakes a mallet that does, and shares the cone with the horizontal tangent.
         let across = 1.0 / (n[0] * n[0] + n[1] * n[1]).sqrt();
         let horizontal = [-n[1] * across, n[0] * across, 0.0];
         let upward = [
@@ -182,10 +181,10 @@ impl Contacts {
             self.rows[DIRECTIONS * self.count + k] = row;
         }
         self.touching |= match pair {
-            Pair::Rim { .. } if n[1].abs() > n[0].abs() => Met::LongRim.bit(),
-            Pair::Rim { .. } => Met::ShortRim.bit(),
-            Pair::Mallet { robot: 0, .. } => Met::Mallet(0).bit(),
-            Pair::Mallet { .. } => Met::Mallet(1).bit(),
+            Pair::Rim { .. } if n[1].abs() > n[0].abs() => ContactBody::LongRim.bit(),
+            Pair::Rim { .. } => ContactBody::ShortRim.bit(),
+            Pair::Mallet { robot: 0, .. } => ContactBody::Mallet(0).bit(),
+            Pair::Mallet { .. } => ContactBody::Mallet(1).bit(),
             Pair::Mallets { .. } => 0,
         };
         self.friction[self.count] = material.friction;
@@ -247,7 +246,7 @@ impl Contacts {
     }
 }
 
-/// What the contacts do to puck and arms.
+/// Forces of the contacts on puck and arms.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ContactForces {
     /// N, N, N m, table frame.

@@ -1,5 +1,5 @@
-//! Dry friction of the joints of several arms, where no joint is at its stop: the ordinary case of
-//! `joints.rs`, with the same operations lane by lane.
+//! Dry friction of the joints of several arms without a joint at its stop: the ordinary case of `joints.rs`, with
+//! the same operations in lanes.
 
 use super::joints::{Friction, JointConstraints};
 use crate::{
@@ -8,51 +8,51 @@ use crate::{
     table::contact_law::JOINT,
 };
 
-/// The frictions of several arms.
+/// Dry friction of several arms.
 #[derive(Debug, Clone, Copy)]
 pub struct FrictionLanes<T: Lanes> {
     stiffness: [T; JOINTS],
     bound: [T; JOINTS],
     target: [T; JOINTS],
-    /// Whose force is at its upper, and lower, bound.
+    /// Masks of the arms whose friction is at its upper and at its lower bound.
     at_upper: [T::Mask; JOINTS],
     at_lower: [T::Mask; JOINTS],
 }
 
-/// Frictions whose set is looked for.
-pub struct Classified<T: Lanes> {
+/// The sets of frictions at their bounds.
+pub struct BoundSets<T: Lanes> {
     at_upper: [T::Mask; JOINTS],
     at_lower: [T::Mask; JOINTS],
-    /// The arms whose set is another one than before, as [`Lanes::bits`].
+    /// The arms whose set has changed, as [`Lanes::bits`].
     pub changed: u32,
 }
 
 impl<T: Lanes> FrictionLanes<T> {
-    /// Of several arms.
+    /// Collects the frictions of several arms.
     #[inline(always)]
-    pub fn gather<'a>(of: impl Fn(usize) -> &'a JointConstraints) -> Self {
-        let whose = |state: Friction| {
+    pub fn gather<'a>(constraints: impl Fn(usize) -> &'a JointConstraints) -> Self {
+        let mask_of = |state: Friction| {
             std::array::from_fn(|i| {
-                let is_so = |lane: usize| u32::from(of(lane).friction[i] == state) << lane;
-                T::mask((0..T::COUNT).map(is_so).sum())
+                let bit = |lane: usize| u32::from(constraints(lane).friction[i] == state) << lane;
+                T::mask((0..T::COUNT).map(bit).sum())
             })
         };
         Self {
-            stiffness: gather(|lane| &of(lane).friction_stiffness),
-            bound: gather(|lane| &of(lane).friction_bound),
-            target: gather(|lane| &of(lane).friction_target),
-            at_upper: whose(Friction::AtUpper),
-            at_lower: whose(Friction::AtLower),
+            stiffness: gather(|lane| &constraints(lane).friction_stiffness),
+            bound: gather(|lane| &constraints(lane).friction_bound),
+            target: gather(|lane| &constraints(lane).friction_target),
+            at_upper: mask_of(Friction::AtUpper),
+            at_lower: mask_of(Friction::AtLower),
         }
     }
 
-    /// Tells one arm's constraints of its frictions.
+    /// Writes one lane to an arm's constraints.
     pub fn store(&self, lane: usize, constraints: &mut JointConstraints) {
-        let is_so = |mask: T::Mask| T::bits(mask) >> lane & 1 == 1;
+        let contains = |mask: T::Mask| T::bits(mask) >> lane & 1 == 1;
         constraints.friction = std::array::from_fn(|i| {
-            if is_so(self.at_upper[i]) {
+            if contains(self.at_upper[i]) {
                 Friction::AtUpper
-            } else if is_so(self.at_lower[i]) {
+            } else if contains(self.at_lower[i]) {
                 Friction::AtLower
             } else {
                 Friction::Inside
@@ -61,7 +61,7 @@ impl<T: Lanes> FrictionLanes<T> {
         constraints.friction_target = row(&self.target, lane);
     }
 
-    /// Takes the set of bounds that was found for one arm.
+    /// Loads the set of bounds that was found for one arm.
     #[cold]
     pub fn load(&mut self, lane: usize, constraints: &JointConstraints) {
         let replace = |mask: &mut T::Mask, yes: bool| {
@@ -88,7 +88,7 @@ impl<T: Lanes> FrictionLanes<T> {
         }
     }
 
-    /// What the frictions inside their bounds add to the inertia's diagonal, and all of them to the load:
+    /// Contributions of the frictions within their bounds to the inertia's diagonal, and of all frictions to the load:
     /// `(M + diag) a = load`.
     #[inline(always)]
     pub fn assemble(&self) -> ([T; JOINTS], [T; JOINTS]) {
@@ -96,36 +96,36 @@ impl<T: Lanes> FrictionLanes<T> {
         let (mut diagonal, mut load) = ([zero; JOINTS], [zero; JOINTS]);
         for i in 0..JOINTS {
             let (upper, lower) = (self.at_upper[i], self.at_lower[i]);
-            diagonal[i] = T::choose(T::either(upper, lower), zero, self.stiffness[i]);
+            diagonal[i] = T::select(T::mask_or(upper, lower), zero, self.stiffness[i]);
             let inside = self.stiffness[i] * self.target[i];
-            let not_upper = T::choose(lower, -self.bound[i], inside);
-            load[i] = T::choose(upper, self.bound[i], not_upper);
+            let not_upper = T::select(lower, -self.bound[i], inside);
+            load[i] = T::select(upper, self.bound[i], not_upper);
         }
         (diagonal, load)
     }
 
-    /// Which frictions are at their bounds at these accelerations.
+    /// The frictions at their bounds at these accelerations.
     #[inline(always)]
-    pub fn classify(&self, acceleration: &[T; DOFS]) -> Classified<T> {
+    pub fn classify(&self, acceleration: &[T; DOFS]) -> BoundSets<T> {
         let (mut at_upper, mut at_lower) = (self.at_upper, self.at_lower);
-        let mut changed = T::unequal(at_upper[0], at_upper[0]);
+        let mut changed = T::mask_xor(at_upper[0], at_upper[0]);
         for i in 0..JOINTS {
             let force = self.stiffness[i] * (self.target[i] - acceleration[i]);
-            at_upper[i] = self.bound[i].below(force);
-            at_lower[i] = force.below(-self.bound[i]);
-            changed = T::either(changed, T::unequal(at_upper[i], self.at_upper[i]));
-            changed = T::either(changed, T::unequal(at_lower[i], self.at_lower[i]));
+            at_upper[i] = self.bound[i].less_than(force);
+            at_lower[i] = force.less_than(-self.bound[i]);
+            changed = T::mask_or(changed, T::mask_xor(at_upper[i], self.at_upper[i]));
+            changed = T::mask_or(changed, T::mask_xor(at_lower[i], self.at_lower[i]));
         }
-        Classified {
+        BoundSets {
             at_upper,
             at_lower,
             changed: T::bits(changed),
         }
     }
 
-    /// Takes a set over.
+    /// Adopts a set.
     #[inline(always)]
-    pub fn accept(&mut self, set: &Classified<T>) {
+    pub fn accept(&mut self, set: &BoundSets<T>) {
         self.at_upper = set.at_upper;
         self.at_lower = set.at_lower;
     }

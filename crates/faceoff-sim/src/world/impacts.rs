@@ -1,10 +1,10 @@
-//! When the puck came to touch what, within a control step. Nothing of the physics depends on it.
+//! Impacts of the puck within a control step, for records only: the physics does not depend on them.
 
 use crate::{model::SUBSTEP_S, table::puck::Puck};
 
-/// What the puck came to touch.
+/// A body that the puck touches.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Met {
+pub enum ContactBody {
     /// A rim along the table.
     LongRim,
     /// A rim beside a goal, or a goal post.
@@ -13,7 +13,7 @@ pub enum Met {
     Mallet(u8),
 }
 
-impl Met {
+impl ContactBody {
     const ALL: [Self; 4] = [
         Self::LongRim,
         Self::ShortRim,
@@ -21,7 +21,7 @@ impl Met {
         Self::Mallet(1),
     ];
 
-    /// Its bit among those of a substep.
+    /// Its bit in a set of bodies.
     pub(super) const fn bit(self) -> u8 {
         match self {
             Self::LongRim => 1,
@@ -32,48 +32,47 @@ impl Met {
     }
 }
 
-/// The beginning of a contact.
+/// The start of a contact.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Impact {
-    /// The substep of the control step before which the bodies were found to overlap, from 0.
+    /// The substep of the control step at whose start the bodies overlap, from 0.
     pub substep: u8,
-    /// What the puck touches.
-    pub met: Met,
-    /// The puck's centre then, m, table frame.
+    pub body: ContactBody,
+    /// The puck's centre at that time, m, table frame.
     pub puck: [f64; 2],
 }
 
 impl Impact {
-    /// Time since the control step's beginning, s.
+    /// Time since the start of the control step, s.
     #[must_use]
     pub fn after_s(&self) -> f64 {
         f64::from(self.substep) * SUBSTEP_S
     }
 }
 
-/// Contacts that begin in one control step; more than these are not noted.
+/// Largest number of recorded impacts in a control step; further ones are dropped.
 const CAPACITY: usize = 6;
 
-/// The contacts of the puck that began in a control step, in their order.
+/// The contacts of the puck that began in a control step, in order.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Impacts {
-    /// What touches the puck, as bits.
+    /// The bodies that touch the puck, as bits.
     touching: u8,
     count: usize,
-    begun: [Impact; CAPACITY],
+    impacts: [Impact; CAPACITY],
 }
 
 impl Default for Impacts {
     fn default() -> Self {
-        let nothing = Impact {
+        let unused = Impact {
             substep: 0,
-            met: Met::LongRim,
+            body: ContactBody::LongRim,
             puck: [0.0; 2],
         };
         Self {
             touching: 0,
             count: 0,
-            begun: [nothing; CAPACITY],
+            impacts: [unused; CAPACITY],
         }
     }
 }
@@ -82,31 +81,31 @@ impl std::ops::Deref for Impacts {
     type Target = [Impact];
 
     fn deref(&self) -> &[Impact] {
-        &self.begun[..self.count]
+        &self.impacts[..self.count]
     }
 }
 
 impl Impacts {
-    /// Forgets those of the control step before; what touches the puck still does.
+    /// Removes the impacts of the previous control step; contacts that persist do not start again.
     pub(super) fn begin_step(&mut self) {
         self.count = 0;
     }
 
-    /// Nothing touches the puck.
+    /// Records that no body touches the puck.
     #[inline(always)]
-    pub(super) fn part(&mut self) {
+    pub(super) fn clear_touching(&mut self) {
         self.touching = 0;
     }
 
-    /// Takes note of what touches the puck before a substep, as [`Met::bit`]s.
-    pub(super) fn touch(&mut self, touching: u8, substep: usize, puck: &Puck) {
-        let begun = touching & !self.touching;
+    /// Records the bodies that touch the puck at the start of a substep, as [`ContactBody::bit`]s.
+    pub(super) fn record_touching(&mut self, touching: u8, substep: usize, puck: &Puck) {
+        let started = touching & !self.touching;
         self.touching = touching;
-        for met in Met::ALL {
-            if begun & met.bit() != 0 && self.count < CAPACITY {
-                self.begun[self.count] = Impact {
+        for body in ContactBody::ALL {
+            if started & body.bit() != 0 && self.count < CAPACITY {
+                self.impacts[self.count] = Impact {
                     substep: u8::try_from(substep).unwrap_or(u8::MAX),
-                    met,
+                    body,
                     puck: [puck.pose[0], puck.pose[1]],
                 };
                 self.count += 1;
@@ -121,23 +120,23 @@ mod tests {
     use crate::{Plant, World};
 
     #[test]
-    fn a_bounce_is_noted_once_where_and_when_it_begins() {
-        // 1.4 m/s towards the long rim, which it meets in the second control step.
+    fn bounce_is_recorded_once_with_time_and_position() {
+        // 1.4 m/s towards the long rim, which it touches in the second control step.
         let mut world = World::new(&Plant::nominal(), &[], [0.2, 0.44, 0.0, 0.0, 1.4, 0.0]);
-        let mut noted = Vec::new();
+        let mut recorded = Vec::new();
         for step in 0..10 {
             let before = world.puck().pose[1];
             world.control_step(|_| [0.0; 2]);
             for impact in world.impacts().iter() {
-                noted.push((step, *impact));
-                assert!(impact.puck[1] > before, "it still moves outwards");
+                recorded.push((step, *impact));
+                assert!(impact.puck[1] > before, "the puck moves outwards");
             }
         }
-        let [(step, impact)] = noted[..] else {
-            panic!("one bounce, not {noted:?}");
+        let [(step, impact)] = recorded[..] else {
+            panic!("one bounce, not {recorded:?}");
         };
-        assert_eq!(impact.met, Met::LongRim);
-        assert!(world.puck().velocity[1] < 0.0, "it came back");
+        assert_eq!(impact.body, ContactBody::LongRim);
+        assert!(world.puck().velocity[1] < 0.0, "the puck moves back");
         let free_m = crate::table::geometry::TABLE.half_width_m()
             - crate::table::geometry::PUCK.radius_m
             - 0.44;
@@ -145,16 +144,16 @@ mod tests {
         let expected_s = free_m / 1.4;
         assert!(
             (time_s - expected_s).abs() < 0.003,
-            "met after {time_s} s, a free way of {expected_s} s"
+            "impact after {time_s} s, expected {expected_s} s"
         );
     }
 
     #[test]
-    fn more_than_there_is_room_for_is_not_noted() {
+    fn impacts_beyond_the_capacity_are_dropped() {
         let mut impacts = Impacts::default();
         for substep in 0..20 {
-            impacts.touch(Met::Mallet(0).bit(), substep, &Puck::default());
-            impacts.part();
+            impacts.record_touching(ContactBody::Mallet(0).bit(), substep, &Puck::default());
+            impacts.clear_touching();
         }
         assert_eq!(impacts.len(), CAPACITY);
         impacts.begin_step();

@@ -1,10 +1,9 @@
 //! Dry friction and stops of the joints: soft constraints, one unknown force each.
 //!
 //! A constraint's force is `stiffness · (target − acceleration)`, held within its bounds. Which
-//! constraints are at a bound hardly changes between substeps, so the set is remembered; given the
-//! set, all forces follow from one linear solve, and the set is corrected until it agrees with them.
-//! Here is the set of one arm, with all that may be in it; `friction.rs` has the ordinary case, dry
-//! friction alone, in lanes.
+//! constraints are at a bound rarely changes between substeps, so the set is stored. Given the set, all forces
+//! follow from one linear solve; the set is corrected until it agrees with them. This module handles one arm with
+//! friction and stops; `friction.rs` handles the ordinary case, friction only, in lanes.
 
 use crate::{
     model::{DOFS, JOINTS, LINKS},
@@ -13,11 +12,11 @@ use crate::{
 };
 use std::f64::consts::FRAC_PI_2;
 
-/// Rounds of the line search, and the relative change at which it ends.
+/// Largest number of iterations of the line search, and the relative change that ends it.
 const LINE_SEARCH_ROUNDS: usize = 60;
 const LINE_SEARCH_TOLERANCE: f64 = 1e-14;
 
-/// Where a dry friction's force is.
+/// Position of a dry friction's force relative to its bounds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Friction {
     Inside,
@@ -97,8 +96,8 @@ impl JointConstraints {
         }
     }
 
-    /// What the constraints inside their bounds add to the inertia's diagonal, and all constraints
-    /// to the load: `(M + diag) a = load`.
+    /// Contributions of the constraints within their bounds to the inertia's diagonal, and of all constraints to the
+    /// load: `(M + diag) a = load`.
     pub fn assemble(&self) -> ([f64; DOFS], [f64; DOFS]) {
         let (mut diagonal, mut load) = ([0.0; DOFS], [0.0; DOFS]);
         for i in 0..JOINTS {
@@ -120,7 +119,7 @@ impl JointConstraints {
         (diagonal, load)
     }
 
-    /// Sets which constraints are at their bounds from accelerations. Returns whether the set changed.
+    /// Updates the set of constraints at their bounds from accelerations. Returns whether the set changed.
     pub fn classify(&mut self, acceleration: &[f64; DOFS]) -> bool {
         let mut changed = false;
         for i in 0..JOINTS {
@@ -162,7 +161,7 @@ impl JointConstraints {
         stiffness
     }
 
-    /// How far to go from accelerations `from` along `direction` to the least of the convex function
+    /// Step length from accelerations `from` along `direction` to the minimum of the convex function
     /// whose gradient is `M a − load − torques(a)`: the point where its slope along the direction
     /// vanishes. `residual` is `M from − load`, `curvature` the direction's own `dᵀ M d`.
     pub fn line_search(

@@ -1,6 +1,6 @@
-//! The physical world: a puck, and one or two arms around it.
+//! The physical world: a puck and up to two arms.
 
-mod apart;
+mod scalar_arms;
 mod arm;
 mod arm_lanes;
 mod bounds;
@@ -10,12 +10,12 @@ mod divergence;
 mod friction;
 mod impacts;
 mod joints;
-mod lone_puck;
-mod seats;
+mod puck_substep;
+mod lane_worlds;
 mod solver;
 mod substep;
-mod together;
-mod touching;
+mod time_step;
+mod contact_detection;
 
 use crate::{
     dynamics::arm::Kinematics,
@@ -30,7 +30,7 @@ use crate::{
 use arm::Arm;
 pub use bounds::{Bounds, Divergence, Runaway};
 use faceoff_types::{Interpolation, Ruleset};
-pub use impacts::{Impact, Impacts, Met};
+pub use impacts::{Impact, Impacts, ContactBody};
 
 /// A mallet's striking cylinder: centre x, y, z (m) and velocity vx, vy (m/s), table frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -47,16 +47,16 @@ pub struct World {
     arms: Vec<Arm>,
     puck: Puck,
     puck_damping: Damping,
-    /// Robot 1's mallet, when it is imposed in place of being moved by an arm.
+    /// Robot 1's mallet, if its motion is imposed.
     imposed: Option<MalletState>,
     /// Force of the air on the puck, N.
     air_n: [f64; 2],
     /// Index of the next substep within the control step.
     substep: usize,
     bounds: Bounds,
-    /// The robots that were first to command or to move as no robot does.
+    /// The robots that first commanded or moved beyond what a robot can do.
     runaway: Option<[bool; 2]>,
-    /// The robots that a contact pushed last.
+    /// The robots in the latest contact with an arm.
     pushed: [bool; 2],
     divergence: Option<Divergence>,
     impacts: Impacts,
@@ -68,7 +68,7 @@ impl World {
     #[must_use]
     pub fn new(plant: &Plant, joints: &[[f64; JOINTS]], puck: [f64; 6]) -> Self {
         debug_assert!(joints.len() <= 2);
-        contact_finder::make_ready();
+        contact_finder::build_colliders();
         Self {
             plant: plant.clone(),
             arms: joints.iter().take(2).map(|q| Arm::new(plant, q)).collect(),
@@ -90,8 +90,8 @@ impl World {
         self.bounds = bounds;
     }
 
-    /// Set once the world would have left its bounds. It stands still since, in its last state inside:
-    /// all its numbers are finite.
+    /// Set once the world would have left its bounds. It then stays in its last state within them: all its numbers
+    /// are finite.
     #[must_use]
     pub fn divergence(&self) -> Option<Divergence> {
         self.divergence
@@ -108,12 +108,12 @@ impl World {
     pub fn command(&mut self, robot: usize, interpolation: Interpolation, action: &[f64]) {
         self.arms[robot].command(interpolation, action);
         if !self.arms[robot].is_commanded_finitely() {
-            self.note_runaway(|a, _| a == robot);
+            self.record_runaway(|a, _| a == robot);
         }
     }
 
-    /// Remembers the robots that a test finds, unless others came first.
-    fn note_runaway(&mut self, is_runaway: impl Fn(usize, &Arm) -> bool) {
+    /// Records the robots for which a test is true, unless others were recorded earlier.
+    fn record_runaway(&mut self, is_runaway: impl Fn(usize, &Arm) -> bool) {
         let mut found = [false; 2];
         for (a, arm) in self.arms.iter().enumerate() {
             found[a] = is_runaway(a, arm);
@@ -146,7 +146,7 @@ impl World {
         &self.puck
     }
 
-    /// The contacts of the puck that began in the last control step, or in the one under way.
+    /// The contacts of the puck that began in the last or current control step.
     #[must_use]
     pub fn impacts(&self) -> &Impacts {
         &self.impacts
@@ -222,8 +222,8 @@ impl World {
         self.arms[robot].hold(interpolation);
     }
 
-    /// Lets a robot's last trajectory run on for the coming control step: at constant velocity for 80 ms
-    /// in all, then at rest.
+    /// Continues a robot's last trajectory for the coming control step: at constant velocity for 80 ms in total,
+    /// then at rest.
     pub fn coast(&mut self, robot: usize) {
         self.arms[robot].coast();
     }

@@ -1,10 +1,9 @@
-//! Finds one arm's accelerations and joint constraint torques, and contact forces, that agree with each
-//! other.
+//! Solves for one arm's accelerations, joint constraint torques and contact forces.
 //!
 //! Without contacts, the joint constraints minimise a convex, piecewise quadratic function (as in the
-//! reference engine). Newton's method with the remembered set of bounds is exact when the set is
-//! right, which it nearly always is, and which is seen in lanes; what is here is for the other times, an
-//! exact line search that leads to the right set.
+//! reference engine). Newton's method with the stored set of bounds is exact if the set is right. It almost always
+//! is, and the check is done in lanes. This module handles the other cases by an exact line search for the right
+//! set.
 
 use super::{
     arm::Arm,
@@ -13,26 +12,25 @@ use super::{
 };
 use crate::{dynamics::ldlt::Ldlt, model::DOFS};
 
-/// Newton steps before the last one is taken as it is; two or three are usual where one is not
-/// enough.
+/// Largest number of Newton steps. If one is not enough, two or three usually are.
 const NEWTON_ROUNDS: usize = 50;
 
-/// Rounds between joint constraints and contacts.
+/// Largest number of iterations between joint constraints and contacts.
 const CONTACT_ROUNDS: usize = 20;
 
 /// A matrix, lower triangle.
 pub type Mass<T> = [[T; DOFS]; DOFS];
 
-/// What is solved for one arm.
+/// Equations of one arm, `mass · acceleration = load`.
 #[derive(Debug, Clone, Copy)]
 pub struct Problem {
     /// The plant's inertia, kg m².
     pub mass: Mass<f64>,
-    /// Torques but for the constraints and contacts, N m.
+    /// Torques without constraints and contacts, N m.
     pub load: [f64; DOFS],
 }
 
-/// Accelerations where nothing touches. The constraints remember which of them are at their bounds.
+/// Accelerations without contacts. The constraints store which of them are at their bounds.
 #[cold]
 pub fn accelerations(constraints: &mut JointConstraints, problem: &Problem) -> [f64; DOFS] {
     let (_, mut acceleration) = newton_step(constraints, problem);
@@ -42,7 +40,7 @@ pub fn accelerations(constraints: &mut JointConstraints, problem: &Problem) -> [
     acceleration
 }
 
-/// The accelerations that the present set of bounds leads to.
+/// The accelerations for the current set of bounds.
 fn newton_step(constraints: &JointConstraints, problem: &Problem) -> (Ldlt<f64>, [f64; DOFS]) {
     let mut matrix = problem.mass;
     let mut rhs = problem.load;
@@ -55,7 +53,7 @@ fn newton_step(constraints: &JointConstraints, problem: &Problem) -> (Ldlt<f64>,
     (factor, factor.solve(&rhs))
 }
 
-/// Newton's method with line search from accelerations whose set of bounds is set.
+/// Newton's method with line search, from accelerations that match the current set of bounds.
 #[cold]
 pub fn search(
     constraints: &mut JointConstraints,
@@ -82,8 +80,8 @@ pub fn search(
     }
 }
 
-/// Accelerations of one or two arms and contact forces together: with the set of joint constraints at
-/// their bounds, the contacts see arms whose inertia includes the other ones.
+/// Accelerations of one or two arms together with contact forces. In the contact equations the arms' inertia
+/// includes the joint constraints that are within their bounds.
 #[cold]
 pub fn accelerations_in_contact(
     arms: &mut [Arm],

@@ -1,17 +1,17 @@
 //! One millisecond of the arms of one world, or of several worlds in lanes.
 //!
-//! What every arm goes through in every substep is computed in lanes, with masks for what only some of them
-//! do. What is rare is done arm by arm or world by world: contacts, joints at their stops, frictions whose
-//! set of bounds has changed, states that are no ordinary ones.
+//! The common computations are done in lanes, with masks for conditions. Rare cases are computed per arm or per
+//! world: contacts, joints at their stops, frictions whose set of bounds has changed, and states outside the
+//! ordinary range.
 
 use super::{
-    apart::{Apart, Prepared, stop_apart, touch_apart},
+    scalar_arms::{ScalarSolutions, ArmDynamics, solve_stops, solve_contacts},
     arm::Arm,
     arm_lanes::{ArmLanes, MotionLanes},
     bounds::{is_ordinary, is_ordinary_puck},
-    seats::{Seat, seat_of},
+    lane_worlds::{LaneWorld, world_in_lane},
     solver::search,
-    touching::may_touch,
+    contact_detection::may_touch,
 };
 use crate::{
     dynamics::{
@@ -30,25 +30,25 @@ use std::f64::consts::FRAC_PI_2;
 
 /// One substep of all arms in the lanes, and of their pucks.
 #[inline(always)]
-pub fn substep<T: Lanes, A>(arms: &mut ArmLanes<T>, seats: &mut [Seat<'_, A>], apart: &mut Apart) {
+pub fn substep<T: Lanes, A>(arms: &mut ArmLanes<T>, lane_worlds: &mut [LaneWorld<'_, A>], scalar: &mut ScalarSolutions) {
     let before = arms.motion;
-    let prepared = prepare(arms, seats);
-    apart.clear();
-    meet(arms, seats, &prepared, apart);
+    let dynamics = arm_dynamics(arms, lane_worlds);
+    scalar.clear();
+    solve_contacts_and_stops(arms, lane_worlds, &dynamics, scalar);
 
-    let mut acceleration = ordinary_accelerations(arms, seats, &prepared, apart);
+    let mut acceleration = ordinary_accelerations(arms, lane_worlds, &dynamics, scalar);
     let mut constraint = [T::splat(0.0); DOFS];
     constraint[..JOINTS].copy_from_slice(&arms.friction.torques(&acceleration));
-    let mut load = prepared.load;
-    if apart.lanes != 0 {
-        apart.insert(&mut acceleration, &mut constraint, &mut load);
+    let mut load = dynamics.load;
+    if scalar.lanes != 0 {
+        scalar.insert(&mut acceleration, &mut constraint, &mut load);
     }
     for i in 0..DOFS {
         load[i] += constraint[i];
     }
 
     // Semi-implicit Euler, joint damping implicit.
-    let acceleration = Ldlt::new(&damped(&prepared.mass, &arms.plant.damping)).solve(&load);
+    let acceleration = Ldlt::new(&damped(&dynamics.mass, &arms.plant.damping)).solve(&load);
     let motion = &mut arms.motion;
     let step = T::splat(SUBSTEP_S);
     for i in 0..DOFS {
@@ -57,25 +57,25 @@ pub fn substep<T: Lanes, A>(arms: &mut ArmLanes<T>, seats: &mut [Seat<'_, A>], a
     }
     filter_velocity(&mut motion.dq_filtered, &motion.dq);
     let ordinary = T::bits(is_ordinary(motion));
-    for seat in seats.iter_mut().filter(|seat| seat.moves) {
-        let puck = seat.world.puck;
-        seat.world.advance_puck(seat.puck_force.take());
-        if ordinary & seat.lanes() != seat.lanes() || !is_ordinary_puck(&seat.world.puck) {
-            look_closer(arms, seat, &before, puck);
+    for lane_world in lane_worlds.iter_mut().filter(|lane_world| lane_world.is_moving) {
+        let puck = lane_world.world.puck;
+        lane_world.world.advance_puck(lane_world.puck_force.take());
+        if ordinary & lane_world.lanes() != lane_world.lanes() || !is_ordinary_puck(&lane_world.world.puck) {
+            check_world(arms, lane_world, &before, puck);
         }
     }
 }
 
 #[inline(always)]
-fn prepare<T: Lanes, A>(arms: &mut ArmLanes<T>, seats: &[Seat<'_, A>]) -> Prepared<T> {
+fn arm_dynamics<T: Lanes, A>(arms: &mut ArmLanes<T>, lane_worlds: &[LaneWorld<'_, A>]) -> ArmDynamics<T> {
     let desired = Setpoint::gather(|lane| {
-        let (seat, arm) = seat_of(seats, lane);
-        &seat.world.arms[arm].trajectory[seat.world.substep]
+        let (lane_world, arm) = world_in_lane(lane_worlds, lane);
+        &lane_world.world.arms[arm].trajectory[lane_world.world.substep]
     });
     let MotionLanes { q, dq, dq_filtered } = &arms.motion;
     let plant = &arms.plant;
 
-    // One forward pass serves controller and plant.
+    // Controller and plant share one forward pass.
     let kinematics = Kinematics::new(q);
     let bodies = Bodies::new(&kinematics);
     let feed_forward = controller_torques(
@@ -103,64 +103,64 @@ fn prepare<T: Lanes, A>(arms: &mut ArmLanes<T>, seats: &[Seat<'_, A>]) -> Prepar
     }
     arms.friction.prepare(dq);
     arms.ee_before = ee.origin;
-    Prepared {
+    ArmDynamics {
         kinematics,
         mass,
         load,
     }
 }
 
-/// Solves contacts and joints at their stops, apart from the ordinary arms.
+/// Solves contacts and joints at their stops, arm by arm.
 #[inline(always)]
-fn meet<T: Lanes, A>(
+fn solve_contacts_and_stops<T: Lanes, A>(
     arms: &ArmLanes<T>,
-    seats: &mut [Seat<'_, A>],
-    prepared: &Prepared<T>,
-    apart: &mut Apart,
+    lane_worlds: &mut [LaneWorld<'_, A>],
+    dynamics: &ArmDynamics<T>,
+    scalar: &mut ScalarSolutions,
 ) {
-    let centre = prepared.kinematics.cylinder_centre();
-    let beyond = T::bits(is_beyond(&arms.motion.q));
-    for seat in seats.iter_mut().filter(|seat| seat.moves) {
-        let lanes = [seat.first, (seat.first + 1).min(T::COUNT - 1)];
+    let centre = dynamics.kinematics.cylinder_centre();
+    let beyond = T::bits(is_beyond_stop(&arms.motion.q));
+    for lane_world in lane_worlds.iter_mut().filter(|lane_world| lane_world.is_moving) {
+        let lanes = [lane_world.first_lane, (lane_world.first_lane + 1).min(T::COUNT - 1)];
         let centres = lanes.map(|lane| centre.lane(lane));
-        let robots = seat.world.arms.len();
-        if may_touch(&centres[..robots], &seat.world.puck) {
-            touch_apart(arms, seat, prepared, &centres, apart);
+        let robots = lane_world.world.arms.len();
+        if may_touch(&centres[..robots], &lane_world.world.puck) {
+            solve_contacts(arms, lane_world, dynamics, &centres, scalar);
         } else {
-            seat.world.impacts.part();
+            lane_world.world.impacts.clear_touching();
         }
-        let stopped = |arm: &Arm| arm.constraints.any_stop();
-        if beyond & seat.lanes() != 0 || seat.world.arms.iter().any(stopped) {
-            stop_apart(arms, seat, prepared, beyond, apart);
+        let at_stop = |arm: &Arm| arm.constraints.any_stop();
+        if beyond & lane_world.lanes() != 0 || lane_world.world.arms.iter().any(at_stop) {
+            solve_stops(arms, lane_world, dynamics, beyond, scalar);
         }
     }
 }
 
-/// Is a joint beyond its stop?
+/// Mask of the arms with a joint beyond its stop.
 #[inline(always)]
-fn is_beyond<T: Lanes>(q: &[T; DOFS]) -> T::Mask {
+fn is_beyond_stop<T: Lanes>(q: &[T; DOFS]) -> T::Mask {
     let joint = |i: usize| {
         let range = LINKS.get(i).map_or(FRAC_PI_2, |link| link.range_rad);
-        T::splat(range).below(q[i].abs())
+        T::splat(range).less_than(q[i].abs())
     };
     let mut beyond = joint(0);
     for i in 1..DOFS {
-        beyond = T::either(beyond, joint(i));
+        beyond = T::mask_or(beyond, joint(i));
     }
     beyond
 }
 
-/// Accelerations under the load and dry friction: by the remembered set of bounds, and where that has
-/// changed by a search for the right one. Lanes that were solved apart are left as they are.
+/// Accelerations under load and dry friction: with the stored set of bounds, or a search for the right set if it
+/// has changed. Lanes of arms that were solved one by one are not searched.
 #[inline(always)]
 fn ordinary_accelerations<T: Lanes, A>(
     arms: &mut ArmLanes<T>,
-    seats: &mut [Seat<'_, A>],
-    prepared: &Prepared<T>,
-    apart: &Apart,
+    lane_worlds: &mut [LaneWorld<'_, A>],
+    dynamics: &ArmDynamics<T>,
+    scalar: &ScalarSolutions,
 ) -> [T; DOFS] {
-    let mut matrix = prepared.mass;
-    let mut rhs = prepared.load;
+    let mut matrix = dynamics.mass;
+    let mut rhs = dynamics.load;
     let (diagonal, torque) = arms.friction.assemble();
     for i in 0..DOFS {
         rhs[i] += torque.get(i).copied().unwrap_or(T::splat(0.0));
@@ -170,71 +170,71 @@ fn ordinary_accelerations<T: Lanes, A>(
     }
     let mut acceleration = Ldlt::new(&matrix).solve(&rhs);
     let set = arms.friction.classify(&acceleration);
-    if set.changed | apart.lanes != 0 {
+    if set.changed | scalar.lanes != 0 {
         arms.friction.accept(&set);
-        let changed = set.changed & !apart.lanes;
-        correct(
+        let changed = set.changed & !scalar.lanes;
+        update_bound_sets(
             arms,
-            seats,
-            prepared,
+            lane_worlds,
+            dynamics,
             changed,
-            apart.lanes,
+            scalar.lanes,
             &mut acceleration,
         );
     }
     acceleration
 }
 
-/// Searches for the sets of bounds of some arms, and takes over those of arms that were solved apart.
+/// Searches for the sets of bounds of the `changed` arms, and loads those of the arms that were solved one by one.
 #[cold]
 #[inline(never)]
-fn correct<T: Lanes, A>(
+fn update_bound_sets<T: Lanes, A>(
     arms: &mut ArmLanes<T>,
-    seats: &mut [Seat<'_, A>],
-    prepared: &Prepared<T>,
+    lane_worlds: &mut [LaneWorld<'_, A>],
+    dynamics: &ArmDynamics<T>,
     changed: u32,
-    apart: u32,
+    scalar_lanes: u32,
     acceleration: &mut [T; DOFS],
 ) {
-    for seat in seats.iter_mut().filter(|seat| seat.moves) {
-        for (a, arm) in seat.world.arms.iter_mut().enumerate() {
-            let lane = seat.first + a;
+    for lane_world in lane_worlds.iter_mut().filter(|lane_world| lane_world.is_moving) {
+        for (a, arm) in lane_world.world.arms.iter_mut().enumerate() {
+            let lane = lane_world.first_lane + a;
             let constraints = &mut arm.constraints;
             if changed >> lane & 1 == 1 {
                 arms.friction.store(lane, constraints);
                 let mut found = row(acceleration, lane);
-                search(constraints, &prepared.problem(lane), &mut found);
+                search(constraints, &dynamics.problem(lane), &mut found);
                 set_row(acceleration, lane, &found);
                 arms.friction.load(lane, constraints);
-            } else if apart >> lane & 1 == 1 {
+            } else if scalar_lanes >> lane & 1 == 1 {
                 arms.friction.load(lane, constraints);
             }
         }
     }
 }
 
-/// Looks closer at a world whose state is not an ordinary one; it goes back to where all was inside of its
-/// bounds, and stands still, if it has left them.
+/// Checks a world whose state is outside the ordinary range. If it has left its bounds, it returns to its previous
+/// state and stops.
 #[cold]
 #[inline(never)]
-fn look_closer<T: Lanes, A>(
+fn check_world<T: Lanes, A>(
     arms: &mut ArmLanes<T>,
-    seat: &mut Seat<'_, A>,
+    lane_world: &mut LaneWorld<'_, A>,
     before: &MotionLanes<T>,
     puck: Puck,
 ) {
-    let world = &mut *seat.world;
+    let world = &mut *lane_world.world;
     for (a, arm) in world.arms.iter_mut().enumerate() {
-        arms.store(seat.first + a, arm);
+        arms.store(lane_world.first_lane + a, arm);
     }
-    let Some(what) = world.extraordinary() else {
+    let Some(cause) = world.find_runaway() else {
         return;
     };
     world.puck = puck;
     for (a, arm) in world.arms.iter_mut().enumerate() {
-        let lane = seat.first + a;
+        let lane = lane_world.first_lane + a;
         arms.motion.replace(lane, before);
         before.store(lane, arm);
     }
-    world.diverge(what);
+    world.diverge(cause);
 }

@@ -1,4 +1,4 @@
-//! A substep allocates nothing: memory is set aside when a world is made.
+//! Steps do not allocate: memory is allocated when a world is created.
 
 use faceoff_sim::{
     Command, Episode, Game, GameSetup, Interpolation, PerturbationSettings, Plant, golden::strike,
@@ -21,26 +21,26 @@ fn control_steps_allocate_nothing() {
             seed.episode(task, 0),
         );
         let before = *episode.world().puck();
-        let mut met = false;
-        let count = |episode: &mut Episode, met: &mut bool| {
+        let mut touched = false;
+        let count = |episode: &mut Episode, touched: &mut bool| {
             allocation_counter::measure(|| {
                 let action = strike(episode.observation(), episode.steps());
                 episode.step(&action);
-                *met |= episode.world().puck().velocity != before.velocity;
+                *touched |= episode.world().puck().velocity != before.velocity;
             })
             .count_total
         };
         let mut total = 0;
         while episode.steps() < 150 {
-            total += count(&mut episode, &mut met);
+            total += count(&mut episode, &mut touched);
         }
         assert_eq!(total, 0, "{task}");
-        assert!(met, "{task}: the puck was never touched");
+        assert!(touched, "{task}: the puck was never touched");
     }
 }
 
 #[test]
-fn a_game_allocates_only_when_a_rally_starts() {
+fn game_allocates_only_at_the_start_of_a_rally() {
     let mut game = Game::new(GameSetup {
         interpolation: [Interpolation::Cubic; 2],
         factors: Factors::ALL,

@@ -1,4 +1,4 @@
-//! How much arithmetic a substep is: the dynamics run on numbers that count their operations.
+//! Counts the arithmetic operations of a substep: the dynamics run on numbers that count their operations.
 
 use faceoff_sim::{
     dynamics::{
@@ -91,7 +91,7 @@ impl Lanes for Counted {
     }
 
     fn nearest(self) -> Self {
-        // An addition and a subtraction in the simulator's own numbers.
+        // An addition and a subtraction in the simulator's implementation.
         count(count(self.0.round_ties_even()).0)
     }
 
@@ -99,31 +99,31 @@ impl Lanes for Counted {
         Self(self.0.abs())
     }
 
-    fn with_sign_of(self, other: Self) -> Self {
+    fn copysign(self, other: Self) -> Self {
         Self(self.0.copysign(other.0))
     }
 
-    fn below(self, other: Self) -> bool {
+    fn less_than(self, other: Self) -> bool {
         self.0 < other.0
     }
 
-    fn within(self, other: Self) -> bool {
+    fn less_or_equal(self, other: Self) -> bool {
         self.0 <= other.0
     }
 
-    fn both(a: bool, b: bool) -> bool {
+    fn mask_and(a: bool, b: bool) -> bool {
         a && b
     }
 
-    fn either(a: bool, b: bool) -> bool {
+    fn mask_or(a: bool, b: bool) -> bool {
         a || b
     }
 
-    fn unequal(a: bool, b: bool) -> bool {
+    fn mask_xor(a: bool, b: bool) -> bool {
         a != b
     }
 
-    fn choose(mask: bool, yes: Self, no: Self) -> Self {
+    fn select(mask: bool, yes: Self, no: Self) -> Self {
         if mask { yes } else { no }
     }
 
@@ -132,7 +132,7 @@ impl Lanes for Counted {
     }
 }
 
-/// The result of a computation, its operations printed and added up.
+/// Runs a computation, prints its number of operations and adds it to `total`.
 fn counted<R>(name: &str, total: &mut u32, compute: impl FnOnce() -> R) -> R {
     OPERATIONS.set(0);
     let result = compute();
@@ -142,11 +142,11 @@ fn counted<R>(name: &str, total: &mut u32, compute: impl FnOnce() -> R) -> R {
     result
 }
 
-/// What `docs/simulator.md` says of the arithmetic of one arm's substep.
+/// The number of operations of one arm's substep in `docs/simulator.md`.
 const DOCUMENTED: u32 = 6346;
 
 #[test]
-fn a_substep_is_as_much_arithmetic_as_documented() {
+fn substep_takes_the_documented_number_of_operations() {
     let zero = [Counted(0.0); DOFS];
     let q: [Counted; DOFS] =
         std::array::from_fn(|i| Counted(INITIAL_Q.get(i).copied().unwrap_or_default()));
@@ -181,6 +181,6 @@ fn a_substep_is_as_much_arithmetic_as_documented() {
     counted("integration: implicit damping", &mut total, || {
         Ldlt::new(&damped(&mass, &[Counted(0.1); JOINTS])).solve(&zero)
     });
-    println!("{total:5} in all");
+    println!("{total:5} in total");
     assert_eq!(total, DOCUMENTED);
 }

@@ -53,19 +53,19 @@ fn motions_match_recordings() {
                 .universal
                 .max(max_difference(&row("universal_joint"), &world.universal(0)));
             d.ee = d.ee.max(max_difference(&row("ee_pos_robot_frame"), &ee));
-            let ours =
+            let actual =
                 ConstraintValues::new(&world.joints(0), world.filtered_velocities(0), &kinematics);
-            let theirs = &case["max_constraint"][step];
-            let theirs = [
+            let expected = &case["max_constraint"][step];
+            let expected = [
                 "joint_pos_constr",
                 "joint_vel_constr",
                 "ee_constr",
                 "link_constr",
             ]
-            .map(|key| theirs[key].as_f64().unwrap());
+            .map(|key| expected[key].as_f64().unwrap());
             d.constraints = d.constraints.max(max_difference(
-                &theirs,
-                &[ours.joint_pos, ours.joint_vel, ours.ee, ours.link],
+                &expected,
+                &[actual.joint_pos, actual.joint_vel, actual.ee, actual.link],
             ));
         }
         println!("{name}: {d:?}");

@@ -1,4 +1,4 @@
-//! Many worlds stepped together.
+//! Many worlds stepped at once.
 
 use faceoff_sim::{
     Batch, BatchSetup, Episode, Interpolation, PerturbationSettings, Plant, golden::strike,
@@ -44,7 +44,7 @@ fn play(setup: BatchSetup, threads: usize, steps: u32) -> Vec<String> {
 }
 
 #[test]
-fn worlds_play_the_evaluations_episodes_one_after_the_other() {
+fn worlds_run_the_episodes_of_the_evaluation_in_order() {
     for task in Task::ALL {
         let setup = setup(task);
         let mut batch = Batch::new(setup.clone());
@@ -87,7 +87,7 @@ fn worlds_play_the_evaluations_episodes_one_after_the_other() {
 }
 
 #[test]
-fn a_batch_is_the_same_on_any_number_of_threads() {
+fn batch_is_the_same_on_any_number_of_threads() {
     let alone = play(setup(Task::Hit), 1, 120);
     for threads in [2, 5] {
         assert!(
@@ -99,6 +99,6 @@ fn a_batch_is_the_same_on_any_number_of_threads() {
 
 #[test]
 #[should_panic(expected = "expected an action of 14 numbers for each of 10 worlds")]
-fn a_missing_action_is_refused() {
+fn missing_action_panics() {
     Batch::new(setup(Task::Defend)).step(&[0.0; 13]);
 }

@@ -24,7 +24,7 @@ fn hold() -> [f64; 14] {
 }
 
 #[test]
-fn the_puck_is_seen_one_control_step_late_or_two() {
+fn puck_is_observed_one_or_two_control_steps_late() {
     let (mut late, mut total) = ([0; 3], 0);
     for seed in 0..40 {
         let mut episode = episode(Task::Hit, Factors::only(Factor::Delay), seed);
@@ -32,9 +32,9 @@ fn the_puck_is_seen_one_control_step_late_or_two() {
         for _ in 0..60 {
             let end = episode.step(&hold()).end;
             pucks.push(episode.state().puck);
-            let seen = episode.observation()[0] - 1.51;
+            let observed_x = episode.observation()[0] - 1.51;
             let lag = (0..3.min(pucks.len()))
-                .find(|lag| (pucks[pucks.len() - 1 - lag][0] - seen).abs() < 1e-15);
+                .find(|lag| (pucks[pucks.len() - 1 - lag][0] - observed_x).abs() < 1e-15);
             // Nothing is older than the episode; a puck at rest shows no lag.
             if pucks.len() > 3 && pucks[pucks.len() - 1][0] != pucks[pucks.len() - 3][0] {
                 late[lag.expect("the puck of one of the last steps")] += 1;
@@ -51,7 +51,7 @@ fn the_puck_is_seen_one_control_step_late_or_two() {
 }
 
 #[test]
-fn joints_are_seen_at_once() {
+fn joints_are_observed_without_delay() {
     let mut episode = episode(Task::Defend, Factors::only(Factor::Delay), 1);
     let mut moving = hold();
     moving[0] = 0.02;
@@ -81,7 +81,7 @@ fn actions_are_applied_one_control_step_late() {
 }
 
 #[test]
-fn a_late_action_lets_the_arm_run_on_for_80_ms_and_stop() {
+fn arm_coasts_80_ms_after_a_late_action_and_stops() {
     let mut world = World::with_robots(&Plant::nominal(), 1, [0.5, 0.3, 0.0, 0.0, 0.0, 0.0]);
     let mut action = hold();
     for step in 1..=10 {
@@ -108,7 +108,7 @@ fn a_late_action_lets_the_arm_run_on_for_80_ms_and_stop() {
     let total: f64 = travelled.iter().sum();
     assert!((total - 0.04).abs() < 0.004, "{total}");
 
-    // A new action ends the coasting, and the next late one may run on again.
+    // A new action ends the coasting; after the next late action the arm coasts again.
     action[0] = world.joints(0)[0] + 0.01;
     world.command(0, Interpolation::Cubic, &action);
     world.control_step(|_| [0.0; 2]);
@@ -121,7 +121,7 @@ fn a_late_action_lets_the_arm_run_on_for_80_ms_and_stop() {
 }
 
 #[test]
-fn the_laboratorys_table_has_the_statistics_of_the_rules() {
+fn rehearsal_table_has_the_statistics_of_the_rules() {
     let settings = PerturbationSettings::default().delay;
     let tables: Vec<RehearsalTable> = (0..4000)
         .map(|k| {
@@ -156,7 +156,7 @@ fn tilt_and_air_cushion_act_on_the_puck() {
     let seed = Seed::from_number(7);
     let table = RehearsalTable::draw(&settings.delay, Stream::new(&seed, "delay, table"));
     let start = [0.0, 0.3, 0.0, 0.0, 0.0, 0.0];
-    let mut episode = Episode::starting_with(
+    let mut episode = Episode::with_initial_puck(
         Task::Hit,
         Interpolation::Cubic,
         Factors::only(Factor::Delay),
@@ -178,7 +178,7 @@ fn tilt_and_air_cushion_act_on_the_puck() {
 }
 
 #[test]
-fn the_delay_leaves_the_other_factors_draws_alone() {
+fn delay_does_not_change_draws_of_other_factors() {
     let alone = episode(Task::Defend, Factors::only(Factor::ObservationNoise), 3);
     let both = episode(
         Task::Defend,

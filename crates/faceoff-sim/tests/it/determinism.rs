@@ -1,4 +1,4 @@
-//! The same seed, the same bits: on every machine, in every build, after every restore.
+//! The same seed gives the same bits on every machine, in every build and after every restore.
 
 use faceoff_sim::{
     Interpolation, Plant, World,
@@ -8,7 +8,7 @@ use faceoff_sim::{
 use faceoff_types::{Profile, Task};
 
 #[test]
-fn threads_do_not_matter() {
+fn episode_is_the_same_on_any_thread() {
     let alone = play_episode(Task::Hit, Profile::Evaluation);
     std::thread::scope(|scope| {
         let runs: Vec<_> = (0..4)
@@ -21,7 +21,7 @@ fn threads_do_not_matter() {
 }
 
 #[test]
-fn a_saved_episode_continues_as_if_never_stopped() {
+fn saved_episode_continues_with_the_same_bits() {
     for task in Task::ALL {
         let mut original = start_episode(task, Profile::Evaluation);
         for _ in 0..20 {
@@ -33,7 +33,7 @@ fn a_saved_episode_continues_as_if_never_stopped() {
 }
 
 #[test]
-fn an_arm_moves_the_same_alone_and_beside_another() {
+fn arm_moves_the_same_alone_and_with_a_second_arm() {
     let plant = Plant::nominal();
     let far = [0.0, 0.4, 0.0, 0.0, 0.0, 0.0];
     let mut alone = World::with_robots(&plant, 1, far);

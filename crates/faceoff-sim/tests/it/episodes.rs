@@ -2,11 +2,11 @@
 
 use crate::replay::episodes;
 
-/// Control steps after the first impact in which the replay has not yet become chaotic.
+/// Control steps after the first impact before most replays become chaotic.
 const WINDOW: usize = 8;
 
 #[test]
-fn recorded_actions_lead_to_recorded_episodes() {
+fn recorded_actions_reproduce_recorded_episodes() {
     let replays = episodes();
     let (mut close, mut mild, mut mild_throughout) = (0, 0, 0);
     for replay in &replays {
@@ -42,8 +42,8 @@ fn recorded_actions_lead_to_recorded_episodes() {
         replays.len()
     );
     assert_eq!(replays.len(), 90);
-    // The reference is held to 70 pucks. An arm feels where the puck went: a few replays become chaotic
-    // within the window, a few more later.
+    // The requirement is 70 pucks. The puck's path affects the arm: a few replays become chaotic within the
+    // window, a few more later.
     assert!(
         close >= 85,
         "{close} pucks within 5 mm after the first impact"

@@ -16,7 +16,7 @@ fn setup(factors: Factors, seed: u64) -> GameSetup {
     GameSetup {
         interpolation: [Interpolation::Cubic; 2],
         factors,
-        plant: Plant::under(factors, &settings, seed.model_mismatch()),
+        plant: Plant::for_factors(factors, &settings, seed.model_mismatch()),
         settings,
         seed,
     }
@@ -40,7 +40,7 @@ fn half_of_start(value: &Value) -> usize {
 }
 
 #[test]
-fn goals_fouls_and_stuck_pucks_are_judged_as_recorded() {
+fn goals_fouls_and_stuck_pucks_match_the_recording() {
     let recording = recording("game_rules");
     for case in recording["cases"].as_array().unwrap() {
         let name = case["name"].as_str().unwrap();
@@ -49,7 +49,7 @@ fn goals_fouls_and_stuck_pucks_are_judged_as_recorded() {
         let score_before = referee.score();
         if let Some(seconds) = case["timer_set"].as_f64() {
             let half = usize::from(case["prev_side_set"].as_i64() == Some(1));
-            referee.watched = Some((half, (seconds / 0.02).round() as u32));
+            referee.puck_side = Some((half, (seconds / 0.02).round() as u32));
         }
         let plant = Plant::nominal();
         let mut world = World::with_robots(&plant, 2, array(&case["puck_before"]));
@@ -72,9 +72,9 @@ fn goals_fouls_and_stuck_pucks_are_judged_as_recorded() {
         let serves = half_of_start(&case["start_side_after"]);
         assert_eq!(referee.serves, serves, "{name}");
         if end.is_none() {
-            let steps = referee.watched.unwrap().1;
+            let steps = referee.puck_side.unwrap().1;
             let timer = case["timer_after"].as_f64().unwrap();
-            // A rally's first step starts our clock at 0; the recording's has been running for one.
+            // The simulator's clock is 0 after a rally's first step, the recording's clock is one step ahead.
             let first = u32::from(case["timer_set"].is_null());
             assert_eq!(steps + first, (timer / 0.02).round() as u32, "{name}");
         }
@@ -82,7 +82,7 @@ fn goals_fouls_and_stuck_pucks_are_judged_as_recorded() {
 }
 
 #[test]
-fn robots_that_hold_still_foul_in_turns_every_fifteen_seconds() {
+fn robots_that_hold_still_foul_in_turn_every_15_s() {
     let mut game = Game::new(setup(Factors::NONE, 3));
     let hold = hold();
     let first = game.referee().serves;
@@ -105,7 +105,7 @@ fn robots_that_hold_still_foul_in_turns_every_fifteen_seconds() {
 }
 
 #[test]
-fn a_rally_starts_at_rest_on_the_side_that_serves() {
+fn rally_starts_at_rest_on_the_serving_side() {
     let hold = hold();
     let mut starts = vec![];
     for seed in 0..40 {
@@ -129,19 +129,19 @@ fn a_rally_starts_at_rest_on_the_side_that_serves() {
 }
 
 #[test]
-fn a_saved_game_continues_as_if_never_stopped() {
+fn saved_game_continues_with_the_same_bits() {
     let mut game = Game::new(setup(Factors::ALL, 2));
     game_hash(&mut game, 700);
     assert_eq!(game_hash(&mut game.clone(), 900), game_hash(&mut game, 900));
 }
 
 #[test]
-fn both_robots_see_the_same_picture() {
-    // A world and its image under half a turn: what one robot sees here, the other sees there.
+fn observations_are_symmetric_for_both_robots() {
+    // A world and its image under half a turn: the robots' observations are swapped.
     let plant = Plant::nominal();
-    let here = [-0.4, 0.2, 0.3, 1.0, -0.5, 2.0];
-    let there = [0.4, -0.2, 0.3 + std::f64::consts::PI, -1.0, 0.5, 2.0];
-    let mut worlds = [here, there].map(|puck| World::with_robots(&plant, 2, puck));
+    let world = [-0.4, 0.2, 0.3, 1.0, -0.5, 2.0];
+    let image = [0.4, -0.2, 0.3 + std::f64::consts::PI, -1.0, 0.5, 2.0];
+    let mut worlds = [world, image].map(|puck| World::with_robots(&plant, 2, puck));
     for step in 0..60 {
         for (k, world) in worlds.iter_mut().enumerate() {
             let actions = [0.3, -0.2].map(|turn| {
@@ -164,9 +164,9 @@ fn both_robots_see_the_same_picture() {
 }
 
 #[test]
-fn a_window_counts_a_violation_once() {
+fn window_counts_a_violation_once() {
     let mut game = Game::new(setup(Factors::NONE, 5));
-    // Robot 2 lifts its mallet for good; robot 1 holds still.
+    // Robot 2 lifts its mallet and keeps it lifted; robot 1 holds still.
     let hold = hold();
     let mut lift = hold;
     let mut windows = vec![];
@@ -190,7 +190,7 @@ fn a_window_counts_a_violation_once() {
 }
 
 #[test]
-fn a_late_answer_commands_the_previous_position_at_rest() {
+fn late_answer_commands_the_previous_position_at_rest() {
     let mut late = Game::new(setup(Factors::NONE, 6));
     let mut held = late.clone();
     let hold = hold();
@@ -210,7 +210,7 @@ fn a_late_answer_commands_the_previous_position_at_rest() {
 }
 
 #[test]
-fn mallets_push_each_other_and_never_pass_through() {
+fn mallets_do_not_pass_through_each_other() {
     let plant = Plant::nominal();
     // The puck lies out of the way.
     let mut world = World::with_robots(&plant, 2, [0.0, -0.45, 0.0, 0.0, 0.0, 0.0]);
@@ -230,27 +230,27 @@ fn mallets_push_each_other_and_never_pass_through() {
         let [a, b] = [0, 1].map(|robot| world.mallet(robot).position);
         least = least.min((a[0] - b[0]).hypot(a[1] - b[1]));
     }
-    // Both are told to reach 5 cm beyond the middle, where the mallets would overlap entirely.
+    // Both are commanded 5 cm beyond the middle, where the mallets would overlap entirely.
     assert!((0.08..0.0963).contains(&least), "{least} m");
 }
 
 #[test]
-fn an_agent_that_is_started_anew_may_command_otherwise() {
+fn restarted_agent_may_change_its_interpolation() {
     let mut game = Game::new(setup(Factors::NONE, 3));
     let hold = hold();
     while game.rally() == 0 {
         game.step([Command::Act(&hold); 2]);
     }
     let mut other = game.clone();
-    other.interpolate(1, Interpolation::Linear);
-    // A position alone leads where the same position at rest leads, for it is at rest there already.
+    other.set_interpolation(1, Interpolation::Linear);
+    // Position alone and position at rest give the same motion, since the arm is at rest already.
     for _ in 0..20 {
         let cubic = game.step([Command::Act(&hold); 2]);
         let linear = other.step([Command::Act(&hold), Command::Act(&hold[..7])]);
         assert_eq!(cubic.state.q, linear.state.q);
         assert_eq!(linear.state, other.state());
     }
-    // And in the rallies that follow.
+    // The interpolation also holds in later rallies.
     while other.rally() == 1 {
         other.step([Command::Act(&hold), Command::Act(&hold[..7])]);
     }

@@ -1,4 +1,4 @@
-//! The golden episodes and games, held to their file.
+//! The golden episodes and games match their file.
 
 use faceoff_sim::golden;
 use faceoff_types::Profile;
@@ -9,7 +9,7 @@ const FILE: &str = include_str!(concat!(
 ));
 
 #[test]
-fn golden_hashes_are_those_of_the_file() {
+fn golden_hashes_match_the_file() {
     let computed: String = golden::all().map(|golden| format!("{golden}\n")).collect();
     assert_eq!(computed, FILE);
 }

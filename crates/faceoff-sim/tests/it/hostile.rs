@@ -1,5 +1,5 @@
-//! Agents that want the world to break: whatever they command within the protocol's bounds, all numbers
-//! stay finite, and if the world diverges it is their fault.
+//! Hostile agents: for all commands within the protocol's bounds, all numbers stay finite, and a divergence is
+//! attributed to the hostile agent.
 
 use faceoff_sim::{
     Bounds, Command, Episode, Game, GameSetup, Interpolation, JOINTS, PerturbationSettings, Plant,
@@ -7,7 +7,7 @@ use faceoff_sim::{
 };
 use faceoff_types::{ACTION_LIMIT, EpisodeEnd, Factors, Seed, Task};
 
-/// How an agent chooses its numbers.
+/// Pattern of an agent's numbers.
 #[derive(Debug, Clone, Copy)]
 enum Habit {
     Constant,
@@ -18,11 +18,11 @@ enum Habit {
     /// Only one kind of row (position, velocity, acceleration) is large, its sign changing each step;
     /// the others hold.
     OneRow(usize),
-    /// Any sign and any power of ten, down to what is too small for a number.
+    /// Any sign and any power of ten, including underflow.
     Drawn,
-    /// Twenty steps of rest, then one blow, and so on.
+    /// Twenty steps of rest and one blow, repeatedly.
     Blows,
-    /// Always the way that the joint turns already.
+    /// Always in the joint's current direction of motion.
     Pumping,
 }
 
@@ -38,7 +38,7 @@ const HABITS: [Habit; 9] = [
     Habit::Pumping,
 ];
 
-/// All that `ready` may say.
+/// All interpolations that `ready` may contain.
 fn interpolations() -> impl Iterator<Item = Interpolation> {
     let codes = [1, 2, 3, 4, 5, -1].map(Some).into_iter().chain([None]);
     codes.map(|code| Interpolation::from_code(code).unwrap())
@@ -79,11 +79,11 @@ fn action(
         .collect()
 }
 
-fn assert_finite(what: &str, numbers: &[f64]) {
-    assert!(numbers.iter().all(|x| x.is_finite()), "{what}: {numbers:?}");
+fn assert_finite(label: &str, numbers: &[f64]) {
+    assert!(numbers.iter().all(|x| x.is_finite()), "{label}: {numbers:?}");
 }
 
-/// Plays an episode; did its world diverge?
+/// Runs an episode; returns whether its world diverged.
 fn diverges(
     bounds: Bounds,
     plant: &Plant,
@@ -102,30 +102,30 @@ fn diverges(
         plant,
         seed.episode(task, 0),
     )
-    .within(bounds);
-    let what = format!("{task}, interpolation {interpolation}, {habit:?}, {size}");
-    let mut stream = Stream::new(&seed, &what);
+    .with_bounds(bounds);
+    let label = format!("{task}, interpolation {interpolation}, {habit:?}, {size}");
+    let mut stream = Stream::new(&seed, &label);
     loop {
-        assert_finite(&what, episode.observation());
+        assert_finite(&label, episode.observation());
         let step = episode.steps();
-        let seen = episode.observation();
-        let action = action(habit, size, interpolation, step, seen, &mut stream);
+        let observation = episode.observation();
+        let action = action(habit, size, interpolation, step, observation, &mut stream);
         let outcome = episode.step(&action);
         let state = episode.state();
-        assert_finite(&what, episode.observation());
-        assert_finite(&what, &state.puck);
-        assert_finite(&what, &state.q);
-        assert_finite(&what, &state.dq);
+        assert_finite(&label, episode.observation());
+        assert_finite(&label, &state.puck);
+        assert_finite(&label, &state.q);
+        assert_finite(&label, &state.dq);
         let c = outcome.constraints;
-        assert_finite(&what, &[c.joint_pos, c.joint_vel, c.ee, c.link]);
+        assert_finite(&label, &[c.joint_pos, c.joint_vel, c.ee, c.link]);
         let diverged = episode.divergence();
         assert_eq!(
             diverged.is_some(),
             outcome.end == Some(EpisodeEnd::AgentFault),
-            "{what}"
+            "{label}"
         );
         if let Some(divergence) = diverged {
-            assert_eq!(divergence.by, [true, false], "{what}: {divergence:?}");
+            assert_eq!(divergence.by, [true, false], "{label}: {divergence:?}");
         }
         if outcome.end.is_some() || step >= 120 {
             return diverged.is_some();
@@ -133,18 +133,18 @@ fn diverges(
     }
 }
 
-/// What many commands bring about, so that the tests see what a diverging world does. The ruleset's own
-/// bounds are ten times as wide.
+/// Bounds that many commands exceed, so that the tests cover divergence. The ruleset's bounds are ten times as
+/// wide.
 const NARROW: Bounds = Bounds {
     joint_rad_s: 100.0,
     ..Bounds::WIDE
 };
 
 #[test]
-fn no_episode_breaks_whatever_is_commanded() {
+fn episodes_stay_finite_for_hostile_commands() {
     let settings = PerturbationSettings::default();
     let mismatch_seed = Seed::from_number(11).model_mismatch();
-    let plant = Plant::under(Factors::ALL, &settings, mismatch_seed);
+    let plant = Plant::for_factors(Factors::ALL, &settings, mismatch_seed);
     let count = |bounds: Bounds| {
         let (mut diverged, mut played) = (0, 0);
         for task in Task::ALL {
@@ -164,16 +164,16 @@ fn no_episode_breaks_whatever_is_commanded() {
         (diverged, played)
     };
     let (diverged, played) = count(NARROW);
-    // Both happen, or the test says nothing.
+    // Both cases must occur, or the test is void.
     assert!(diverged > 0 && played > 0);
     assert!(count(Bounds::WIDE).1 > played);
 }
 
 #[test]
-fn in_a_game_the_robot_that_first_left_its_bounds_is_to_blame() {
+fn divergence_in_a_game_names_the_hostile_robot() {
     let settings = PerturbationSettings::default();
     let seed = Seed::from_number(12);
-    let plant = Plant::under(Factors::ALL, &settings, seed.model_mismatch());
+    let plant = Plant::for_factors(Factors::ALL, &settings, seed.model_mismatch());
     let mut rallies = 0;
     for interpolation in interpolations() {
         for habit in HABITS {
@@ -185,25 +185,25 @@ fn in_a_game_the_robot_that_first_left_its_bounds_is_to_blame() {
                     settings: settings.clone(),
                     seed,
                 })
-                .within(NARROW);
-                let what = format!("interpolation {interpolation}, {habit:?}, robot {hostile}");
-                let mut stream = Stream::new(&seed, &what);
+                .with_bounds(NARROW);
+                let label = format!("interpolation {interpolation}, {habit:?}, robot {hostile}");
+                let mut stream = Stream::new(&seed, &label);
                 for step in 0..60 {
                     let actions = [0, 1].map(|robot| {
-                        let seen = game.observation(robot);
+                        let observation = game.observation(robot);
                         if robot == hostile {
-                            action(habit, ACTION_LIMIT, interpolation, step, seen, &mut stream)
+                            action(habit, ACTION_LIMIT, interpolation, step, observation, &mut stream)
                         } else {
                             interpolation.hold_position(&INITIAL_Q)[..interpolation.len()].to_vec()
                         }
                     });
                     let outcome = game.step(actions.each_ref().map(|a| Command::Act(a)));
                     for robot in 0..2 {
-                        assert_finite(&what, game.observation(robot));
+                        assert_finite(&label, game.observation(robot));
                     }
                     if let Some(RallyEnd::Diverged { by }) = outcome.rally_end {
-                        assert_eq!(by, [0, 1].map(|robot| robot == hostile), "{what}");
-                        assert_eq!(game.referee().score(), [0, 0], "{what}");
+                        assert_eq!(by, [0, 1].map(|robot| robot == hostile), "{label}");
+                        assert_eq!(game.referee().score(), [0, 0], "{label}");
                         rallies += 1;
                         break;
                     }
@@ -215,7 +215,7 @@ fn in_a_game_the_robot_that_first_left_its_bounds_is_to_blame() {
 }
 
 #[test]
-fn a_diverged_world_stands_still() {
+fn diverged_world_stops() {
     let settings = PerturbationSettings::default();
     let seed = Seed::from_number(13);
     let interpolation = Interpolation::Trajectory;
@@ -227,16 +227,16 @@ fn a_diverged_world_stands_still() {
         &Plant::nominal(),
         seed,
     )
-    .within(NARROW);
+    .with_bounds(NARROW);
     let mut stream = Stream::new(&seed, "unused");
     let mut push = |episode: &mut Episode| {
-        let seen = episode.observation();
+        let observation = episode.observation();
         let action = action(
             Habit::Pumping,
             ACTION_LIMIT,
             interpolation,
             0,
-            seen,
+            observation,
             &mut stream,
         );
         episode.step(&action)
@@ -251,9 +251,9 @@ fn a_diverged_world_stands_still() {
     assert_eq!((episode.state(), episode.divergence()), (state, divergence));
 }
 
-/// Commands that are no numbers cannot come through the protocol; the controller holds all the same.
+/// The protocol refuses NaN and infinities, but the controller must handle them too.
 #[test]
-fn commands_that_are_no_numbers_leave_a_world_of_numbers() {
+fn non_finite_commands_leave_a_finite_state() {
     let settings = PerturbationSettings::default();
     for interpolation in interpolations() {
         for number in [

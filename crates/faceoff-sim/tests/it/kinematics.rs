@@ -4,13 +4,13 @@ use crate::reference::{array, flat, max_difference, recording};
 use faceoff_sim::{
     JOINTS,
     dynamics::arm::{Bodies, Kinematics, controller_torques},
-    robot::inverse_kinematics::full,
+    robot::inverse_kinematics::with_zero_universal,
 };
 
 #[test]
 fn positions_rotations_and_jacobian_match() {
     for case in recording("kinematics")["fk"].as_array().unwrap() {
-        let kinematics = Kinematics::new(&full(&array(&case["q"])));
+        let kinematics = Kinematics::new(&with_zero_universal(&array(&case["q"])));
         let (link_4, link_7, ee) = (
             &kinematics.links[3],
             &kinematics.links[6],
@@ -38,7 +38,7 @@ fn positions_rotations_and_jacobian_match() {
 #[test]
 fn mass_matrix_bias_and_gravity_match() {
     for case in recording("kinematics")["dyn"].as_array().unwrap() {
-        let kinematics = Kinematics::new(&full(&array(&case["q"])));
+        let kinematics = Kinematics::new(&with_zero_universal(&array(&case["q"])));
         let bodies = Bodies::new(&kinematics).controller();
         let dq: [f64; JOINTS] = array(&case["dq"]);
         let zero = [0.0; JOINTS];

@@ -1,8 +1,8 @@
-//! The simulator against the reference's recordings, its own promises, and itself.
+//! Tests of the simulator against the reference's recordings and its own guarantees.
 
 #![expect(
     clippy::print_stdout,
-    reason = "`--nocapture` shows how far from each recording the simulator is"
+    reason = "`--nocapture` shows the difference to each recording"
 )]
 #![expect(
     clippy::unwrap_used,
@@ -15,6 +15,7 @@ mod arm_tracking;
 mod batch;
 mod delay;
 mod determinism;
+mod episode_step;
 mod episodes;
 mod game;
 mod golden;
@@ -27,4 +28,3 @@ mod puck;
 mod reference;
 mod replay;
 mod robot_document;
-mod together;

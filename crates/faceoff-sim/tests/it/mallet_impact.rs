@@ -1,4 +1,4 @@
-//! Mallet against puck (REFERENCE, `mallet_impact`).
+//! Impacts of the mallet on the puck (REFERENCE, `mallet_impact`).
 
 use crate::{reference::quantile, replay::impacts};
 
@@ -15,7 +15,8 @@ fn impacts_match_recordings() {
     println!("velocity median {median:.2e}, p90 {p90:.2e}; position median {position:.2e} m");
     assert!(median <= 0.015 && p90 <= 0.04);
     assert!(position <= 0.003);
-    // An imposed mallet leans in the reference, but the recordings do not say how; an arm's own does.
+    // In the reference an imposed mallet leans, but the recordings do not contain its lean; those of an arm's mallet
+    // do.
     let by_arm: Vec<f64> = impacts
         .iter()
         .filter(|impact| impact.by_arm())

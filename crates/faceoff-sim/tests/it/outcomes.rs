@@ -1,9 +1,9 @@
-//! How often an agent that holds still succeeds, beside the reference's own statistics (REFERENCE).
+//! Success rate of an agent that holds still, compared with the reference's statistics (REFERENCE).
 
 use faceoff_sim::{Episode, Interpolation, PerturbationSettings, Plant, model::INITIAL_Q};
 use faceoff_types::{Factors, Seed, Task, Violations};
 
-/// Successes and episodes with a violation.
+/// Numbers of successes and of episodes with a violation.
 fn hold(task: Task, episodes: u32) -> (u32, u32) {
     let action = Interpolation::Cubic.hold_position(&INITIAL_Q);
     let (mut successes, mut violations) = (0, 0);
@@ -24,8 +24,8 @@ fn hold(task: Task, episodes: u32) -> (u32, u32) {
 }
 
 #[test]
-fn an_agent_that_holds_still_succeeds_as_often_as_in_the_reference() {
-    // Defend: 26.4 % of 500 there; both standard errors are 2 %.
+fn holding_agent_has_the_success_rate_of_the_reference() {
+    // Defend: 26.4 % of 500 in the reference; both standard errors are 2 %.
     let (successes, violations) = hold(Task::Defend, 500);
     println!("defend: {successes} of 500");
     assert!((102..=162).contains(&successes), "{successes}");

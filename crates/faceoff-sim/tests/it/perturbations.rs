@@ -1,4 +1,4 @@
-//! Each factor's statistics, and that no factor changes another one's draws (RULES).
+//! Statistics of the factors, and their independence: no factor changes another factor's draws (RULES).
 
 use faceoff_sim::{
     Episode, Interpolation, PerturbationSettings, Plant,
@@ -93,7 +93,7 @@ fn air_flow_is_stationary_with_its_correlation_time() {
     assert!((deviation / 0.004 - 1.0).abs() < 0.12, "{deviation}");
     let deviation = (squares / (400.0 * 1_800.0)).sqrt();
     assert!((deviation / 0.004 - 1.0).abs() < 0.06, "{deviation}");
-    // After one correlation time a share of 1/e is left.
+    // After one correlation time the correlation is 1/e.
     let correlation = products / squares;
     assert!(
         (correlation - (-1.0f64).exp()).abs() < 0.06,
@@ -105,7 +105,7 @@ fn air_flow_is_stationary_with_its_correlation_time() {
 }
 
 #[test]
-fn tracking_is_lost_as_often_and_as_long_as_the_rules_say() {
+fn tracking_loss_has_the_rate_and_length_of_the_rules() {
     let settings = PerturbationSettings::default().tracking_loss;
     let mut tracking = TrackingLoss::new(&settings, stream("tracking_loss"));
     let (mut tracked, mut losses, mut runs) = (0u32, 0u32, vec![]);
@@ -122,10 +122,10 @@ fn tracking_is_lost_as_often_and_as_long_as_the_rules_say() {
             tracked += 1;
         }
     }
-    // While tracked: the steps that were tracked and those at which a loss began.
+    // Per tracked step; a step at which a loss begins was tracked until then.
     let rate = f64::from(losses) / f64::from(tracked + losses);
     assert!((rate - 0.03).abs() < 0.002, "{rate}");
-    // Losses that follow each other at once are one run here, hence a few longer than 20.
+    // Consecutive losses count as one run here, so a few are longer than 20.
     assert_eq!(runs.iter().min(), Some(&5));
     let single: Vec<f64> = runs
         .iter()
@@ -137,7 +137,7 @@ fn tracking_is_lost_as_often_and_as_long_as_the_rules_say() {
 }
 
 #[test]
-fn a_lost_puck_is_frozen_bit_for_bit_and_reported_at_rest() {
+fn lost_puck_is_reported_frozen_and_at_rest() {
     let factors = Factors::only(Factor::TrackingLoss).with(Factor::ObservationNoise);
     let mut frozen = 0;
     for seed in 0..8 {
@@ -160,9 +160,8 @@ fn a_lost_puck_is_frozen_bit_for_bit_and_reported_at_rest() {
 }
 
 #[test]
-fn switching_a_factor_leaves_the_others_draws_alone() {
-    // Noise and loss do not act on the world, so that the noise of an observation can be compared
-    // where the puck is seen.
+fn factor_does_not_change_draws_of_other_factors() {
+    // Noise and tracking loss do not act on the world, so that noise can be compared while the puck is tracked.
     let noise = Factors::only(Factor::ObservationNoise);
     let both = noise.with(Factor::TrackingLoss);
     let mut ideal = episode(Task::Prepare, Factors::NONE, 5);
@@ -176,8 +175,8 @@ fn switching_a_factor_leaves_the_others_draws_alone() {
         assert_eq!(ideal.state(), together.state());
         // Joints are observed with noise whether or not the puck is lost.
         assert_eq!(alone.observation()[6..], together.observation()[6..]);
-        let seen = together.observation()[3..6] != [0.0; 3];
-        if seen {
+        let tracked = together.observation()[3..6] != [0.0; 3];
+        if tracked {
             assert_eq!(alone.observation(), together.observation());
         }
     }
@@ -190,7 +189,7 @@ fn switching_a_factor_leaves_the_others_draws_alone() {
         together.step(&hold());
         assert_eq!(alone.state(), together.state());
     }
-    // And the initial state depends on none of them.
+    // The initial state depends on no factor.
     assert_eq!(
         episode(Task::Hit, Factors::NONE, 9).state(),
         episode(Task::Hit, Factors::ALL, 9).state()

@@ -12,17 +12,17 @@ fn near_rim(state: &[f64; 6]) -> bool {
 }
 
 #[test]
-fn slides_match_until_a_rim_is_met() {
+fn slides_match_until_the_first_rim_contact() {
     for case in recording("puck_slide")["cases"].as_array().unwrap() {
         let recorded: Vec<[f64; 6]> = rows(&case["state"]);
-        let ours = slide(array(&case["init"]), recorded.len());
-        for (ours, recorded) in ours.iter().zip(&recorded) {
+        let simulated = slide(array(&case["init"]), recorded.len());
+        for (simulated, recorded) in simulated.iter().zip(&recorded) {
             if near_rim(recorded) {
                 break;
             }
             assert!(
-                max_difference(ours, recorded) <= 1e-6,
-                "{ours:?} {recorded:?}"
+                max_difference(simulated, recorded) <= 1e-6,
+                "{simulated:?} {recorded:?}"
             );
         }
     }
@@ -41,13 +41,13 @@ fn summary(name: &str, mut values: Vec<f64>) -> (f64, f64) {
 #[test]
 fn bounces_match_recordings() {
     let bounces = bounces();
-    let of = |kinds: &[&str]| -> Vec<&Bounce> {
+    let of_kind = |kinds: &[&str]| -> Vec<&Bounce> {
         bounces
             .iter()
             .filter(|bounce| kinds.contains(&bounce.kind.as_str()))
             .collect()
     };
-    let walls = of(&["wall", "wall_spin"]);
+    let walls = of_kind(&["wall", "wall_spin"]);
     let (median, p90) = summary(
         "wall, velocity",
         walls.iter().map(|bounce| bounce.errors().0).collect(),
@@ -58,36 +58,36 @@ fn bounces_match_recordings() {
         walls.iter().map(|bounce| bounce.errors().1).collect(),
     );
     assert!(median <= 0.002 && p90 <= 0.006);
-    let corners = of(&["corner"]);
+    let corners = of_kind(&["corner"]);
     let (_, p90) = summary(
         "corner, velocity",
         corners.iter().map(|bounce| bounce.errors().0).collect(),
     );
     assert!(p90 <= 0.01);
 
-    // At −x robot 1's mallet stands where some cases start.
-    let mut entries = of(&["goal_entry"]);
+    // At −x some cases start at robot 1's mallet.
+    let mut entries = of_kind(&["goal_entry"]);
     entries.retain(|bounce| bounce.recorded[0][0] > 0.0);
     for entry in &entries {
-        for (ours, recorded) in entry.ours.iter().zip(&entry.recorded) {
-            assert!(max_difference(ours, recorded) <= 1e-6);
+        for (simulated, recorded) in entry.simulated.iter().zip(&entry.recorded) {
+            assert!(max_difference(simulated, recorded) <= 1e-6);
         }
     }
 
-    // The reference meets the rounding's chords up to 0.3 mm off: no case-by-case match is to be had.
-    let posts = of(&["goal_post"]);
+    // The reference approximates the rounding by chords, up to 0.3 mm off, so cases do not match one by one.
+    let posts = of_kind(&["goal_post"]);
     for post in &posts {
-        let touched = first_touch(&post.recorded).expect("a post case touches");
-        let ours_touched = first_touch(&post.ours).expect("ours touches too");
+        let recorded_touch = first_touch(&post.recorded).expect("the recorded puck touches the post");
+        let simulated_touch = first_touch(&post.simulated).expect("the simulated puck touches the post");
         assert!(
-            touched.abs_diff(ours_touched) <= 1,
-            "touched at {ours_touched} ms, recorded {touched} ms"
+            recorded_touch.abs_diff(simulated_touch) <= 1,
+            "recorded_touch at {simulated_touch} ms, recorded {recorded_touch} ms"
         );
-        assert_leaves_the_post(&post.ours[touched - 1], &post.ours[post.judged_at()]);
+        assert_leaves_the_post(&post.simulated[recorded_touch - 1], &post.simulated[post.judged_row()]);
     }
     let ratio = |post: &&Bounce| {
-        let end = post.judged_at();
-        speed(&post.ours[end]) / speed(&post.recorded[end])
+        let end = post.judged_row();
+        speed(&post.simulated[end]) / speed(&post.recorded[end])
     };
     let ratios: Vec<f64> = posts.iter().map(ratio).collect();
     assert!(ratios.iter().all(|ratio| (0.4..=2.0).contains(ratio)));
@@ -96,8 +96,8 @@ fn bounces_match_recordings() {
     assert_eq!(counts, [108, 12, 4, 28]);
 }
 
-/// Hardly faster than before (the law's restitution reaches 1.03), and away from the nearest post's
-/// centre of rounding.
+/// Asserts that the puck is hardly faster than before (the contact law's restitution reaches 1.03) and moves away
+/// from the centre of the nearest post's rounding.
 fn assert_leaves_the_post(before: &[f64; 6], after: &[f64; 6]) {
     assert!(speed(after) <= 1.05 * speed(before), "{before:?} {after:?}");
     let post = [0.979 * after[0].signum(), 0.130 * after[1].signum()];

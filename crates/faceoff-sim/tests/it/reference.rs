@@ -3,7 +3,7 @@
 use serde_json::Value;
 use std::{fs::File, io::Read, path::Path};
 
-/// A recording by its name without extension.
+/// Reads a recording by its name without extension.
 pub fn recording(name: &str) -> Value {
     let path = Path::new(env!("CARGO_MANIFEST_DIR"))
         .join("../../tests/reference")

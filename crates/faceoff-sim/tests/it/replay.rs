@@ -1,4 +1,4 @@
-//! Recordings replayed: what the tests judge and what the page's plots show.
+//! Replays of the recordings, for the tests and for the plots in the documentation.
 
 use crate::reference::{array, flat, max_difference, recording, rows};
 use faceoff_sim::{
@@ -40,12 +40,12 @@ pub fn speed(state: &[f64; 6]) -> f64 {
 pub struct Bounce {
     pub kind: String,
     pub recorded: Vec<[f64; 6]>,
-    pub ours: Vec<[f64; 6]>,
+    pub simulated: Vec<[f64; 6]>,
 }
 
 impl Bounce {
-    /// The row by which the bounce is judged: after 30 ms at a wall, 8 ms after the first touch elsewhere.
-    pub fn judged_at(&self) -> usize {
+    /// The row at which the bounce is judged: after 30 ms at a wall, otherwise 8 ms after the first touch.
+    pub fn judged_row(&self) -> usize {
         match self.kind.as_str() {
             "wall" | "wall_spin" => 30,
             _ => first_touch(&self.recorded).map_or(0, |k| (k + 8).min(self.recorded.len() - 1)),
@@ -58,9 +58,9 @@ impl Bounce {
         if self.kind.starts_with("wall") {
             before = before.max(PUCK_RADIUS * self.recorded[0][5].abs());
         }
-        let (ours, recorded) = (self.ours[self.judged_at()], self.recorded[self.judged_at()]);
-        let velocity = (ours[3] - recorded[3]).hypot(ours[4] - recorded[4]);
-        let spin = PUCK_RADIUS * (ours[5] - recorded[5]).abs();
+        let (simulated, recorded) = (self.simulated[self.judged_row()], self.recorded[self.judged_row()]);
+        let velocity = (simulated[3] - recorded[3]).hypot(simulated[4] - recorded[4]);
+        let spin = PUCK_RADIUS * (simulated[5] - recorded[5]).abs();
         (velocity / before, spin / before)
     }
 }
@@ -70,7 +70,7 @@ pub fn bounces() -> Vec<Bounce> {
         let recorded: Vec<[f64; 6]> = rows(&case["state"]);
         Bounce {
             kind: case["kind"].as_str().unwrap().to_owned(),
-            ours: slide(array(&case["init"]), recorded.len()),
+            simulated: slide(array(&case["init"]), recorded.len()),
             recorded,
         }
     };
@@ -92,7 +92,7 @@ pub struct Impact {
 }
 
 impl Impact {
-    /// Moved by the simulated arm; otherwise the mallet's motion is imposed.
+    /// Is the mallet moved by the simulated arm? Otherwise its motion is imposed.
     pub fn by_arm(&self) -> bool {
         self.kind.starts_with("realarm")
     }
@@ -103,7 +103,7 @@ pub fn impacts() -> Vec<Impact> {
         let recorded: Vec<[f64; 11]> = rows(&case["rows"]);
         let kind = case["kind"].as_str().unwrap();
         let mut world = World::with_robots(&Plant::nominal(), 1, array(&case["puck_init"]));
-        let mut ours = world.puck().state();
+        let mut simulated = world.puck().state();
         for (k, row) in recorded.iter().enumerate() {
             if kind.starts_with("override") {
                 world.impose_mallet(Some(MalletState {
@@ -116,7 +116,7 @@ pub fn impacts() -> Vec<Impact> {
                     None => world.hold(0, Interpolation::Cubic),
                 }
             }
-            ours = world.puck().state();
+            simulated = world.puck().state();
             world.substep();
         }
         let puck = |k: usize| -> [f64; 6] { std::array::from_fn(|i| recorded[k][5 + i]) };
@@ -126,8 +126,8 @@ pub fn impacts() -> Vec<Impact> {
         let last = puck(recorded.len() - 1);
         Impact {
             kind: kind.to_owned(),
-            velocity: (ours[3] - last[3]).hypot(ours[4] - last[4]) / peak,
-            position_m: (ours[0] - last[0]).hypot(ours[1] - last[1]),
+            velocity: (simulated[3] - last[3]).hypot(simulated[4] - last[4]) / peak,
+            position_m: (simulated[0] - last[0]).hypot(simulated[1] - last[1]),
         }
     };
     let recording = recording("mallet_impact");
@@ -150,11 +150,11 @@ pub struct Replay {
     pub steps: Vec<StepDifferences>,
     /// The puck after each control step, as recorded.
     pub recorded_puck: Vec<[f64; 6]>,
-    /// The puck after each control step, ours.
+    /// The puck after each control step, as simulated.
     pub puck: Vec<[f64; 6]>,
 }
 
-/// Largest differences after a control step; of the observation, before it.
+/// Largest differences after a control step; for the observation, before it.
 pub struct StepDifferences {
     pub observation: f64,
     /// rad.
@@ -197,7 +197,7 @@ fn episode(task: Task, index: usize, case: &serde_json::Value) -> Replay {
     let puck: Vec<[f64; 6]> = rows(&case["puck"]);
     let q_dq: Vec<[f64; 14]> = rows(&case["q_dq"]);
     let constraints: Vec<[f64; 4]> = rows(&case["max_constraint"]);
-    let mut episode = Episode::starting_with(
+    let mut episode = Episode::with_initial_puck(
         task,
         Interpolation::Cubic,
         Factors::NONE,
@@ -221,14 +221,14 @@ fn episode(task: Task, index: usize, case: &serde_json::Value) -> Replay {
         let observation = max_difference(&flat(&case["obs"][step]), episode.observation());
         let outcome = episode.step(&flat(&case["action"][step]));
         let state = episode.state();
-        let ours = &outcome.constraints;
-        let ours = [ours.joint_pos, ours.joint_vel, ours.ee, ours.link];
+        let values = &outcome.constraints;
+        let values = [values.joint_pos, values.joint_vel, values.ee, values.link];
         let [dx, dy] = [0, 1].map(|i| state.puck[i] - puck[step][i]);
         replay.puck.push(state.puck);
         replay.steps.push(StepDifferences {
             observation,
             joints_rad: max_difference(&q_dq[step][..7], &state.q),
-            constraints: max_difference(&ours, &constraints[step]),
+            constraints: max_difference(&values, &constraints[step]),
             puck_m: dx.hypot(dy),
         });
         if outcome.end.is_some() {

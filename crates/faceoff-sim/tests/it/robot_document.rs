@@ -1,4 +1,4 @@
-//! `docs/robot.md` quotes the model's numbers: each table's rows and each sentence's figures, as they are now.
+//! Checks the numbers that `docs/robot.md` quotes from the model, in tables and sentences.
 
 use faceoff_sim::{
     Interpolation, JOINTS, Plant, SUBSTEPS, World, env_info,
@@ -11,8 +11,8 @@ use faceoff_types::Task;
 
 const DOCUMENT: &str = include_str!("../../../../docs/robot.md");
 
-/// The document's words without its line breaks.
-fn tells(expected: &str) {
+/// Asserts that the document contains a text, ignoring line breaks.
+fn assert_documented(expected: &str) {
     let words = |text: &str| text.split_whitespace().collect::<Vec<_>>().join(" ");
     assert!(
         words(DOCUMENT).contains(&words(expected)),
@@ -34,7 +34,7 @@ fn numbers(xs: &[f64]) -> String {
 }
 
 #[test]
-fn the_table_of_links_is_the_models() {
+fn link_table_matches_the_model() {
     for (i, link) in LINKS.iter().enumerate() {
         let at = match link.offset {
             Offset::Y(y) => [0.0, y, 0.0],
@@ -45,7 +45,7 @@ fn the_table_of_links_is_the_models() {
             Mount::HalfTurnYz => "half, about y + z",
             Mount::QuarterTurnX => "quarter, about x",
         };
-        tells(&format!(
+        assert_documented(&format!(
             "| {} | {} | {turn} | {} | {} | {} |",
             i + 1,
             numbers(&at),
@@ -57,11 +57,11 @@ fn the_table_of_links_is_the_models() {
 }
 
 #[test]
-fn the_tables_of_joints_are_the_models() {
+fn joint_tables_match_the_model() {
     let acceleration = env_info(Task::Defend).joint_acc_limit[1];
     for (i, link) in LINKS.iter().enumerate() {
         let (range, speed) = (link.range_rad, link.velocity_limit_rad_s);
-        tells(&format!(
+        assert_documented(&format!(
             "| {} | {} | {:.4} | {:.4} | {:.4} | {:.4} | {} |",
             i + 1,
             number(range),
@@ -71,7 +71,7 @@ fn the_tables_of_joints_are_the_models() {
             acceleration[i],
             number(link.torque_limit_n_m),
         ));
-        tells(&format!(
+        assert_documented(&format!(
             "| {} | {} | {} | {} | {} | {} |",
             i + 1,
             numbers(&[link.damping]),
@@ -84,46 +84,46 @@ fn the_tables_of_joints_are_the_models() {
 }
 
 #[test]
-fn tool_start_and_table_are_the_models() {
+fn tool_start_pose_and_table_match_the_model() {
     for (value, name) in [
         (TOOL.end_effector_mass_kg, "kg, the end effector"),
         (TOOL.mallet_mass_kg, "kg, the mallet"),
     ] {
-        tells(&format!("{} {name}", number(value)));
+        assert_documented(&format!("{} {name}", number(value)));
     }
-    tells(&format!(
+    assert_documented(&format!(
         "{} m beyond link 7's origin",
         number(TOOL.end_effector_z_m)
     ));
-    tells(&format!(
+    assert_documented(&format!(
         "its centre of mass {} m and the middle of the striking cylinder {} m below",
         number(TOOL.mallet_centre_z_m),
         number(TOOL.cylinder_centre_z_m)
     ));
-    tells(&format!(
+    assert_documented(&format!(
         "radius {} m, half height {} m",
         number(TOOL.cylinder_radius_m),
         number(TOOL.cylinder_half_height_m)
     ));
-    tells(&format!("q = ({})", numbers(&INITIAL_Q)));
-    tells(&format!(
+    assert_documented(&format!("q = ({})", numbers(&INITIAL_Q)));
+    assert_documented(&format!(
         "base at ({}, 0, {})",
         number(-TABLE.base_x_m),
         number(TABLE.base_z_m)
     ));
-    tells(&format!(
+    assert_documented(&format!(
         "x > {:.5} m and |y| < {:.5} m",
         TABLE.base_x_m - (TABLE.half_length_m() - TOOL.cylinder_radius_m),
         TABLE.half_width_m() - TOOL.cylinder_radius_m
     ));
-    tells(&format!("height of {} m", number(EE_DESIRED_HEIGHT_M)));
-    tells(&format!(
+    assert_documented(&format!("height of {} m", number(EE_DESIRED_HEIGHT_M)));
+    assert_documented(&format!(
         "{} × {} m, goals {} m wide",
         number(TABLE.length_m),
         number(TABLE.width_m),
         number(TABLE.goal_width_m)
     ));
-    tells(&format!(
+    assert_documented(&format!(
         "radius {} m, mass {} kg, yaw inertia {} kg m², {} m high",
         number(PUCK.radius_m),
         number(PUCK.mass_kg),
@@ -133,13 +133,13 @@ fn tool_start_and_table_are_the_models() {
 }
 
 #[test]
-fn what_was_measured_is_so_still() {
+fn quoted_measurements_match_the_simulator() {
     let quiet = [0.8, 0.4, 0.0, 0.0, 0.0, 0.0];
     let mut world = World::with_robots(&Plant::nominal(), 1, quiet);
     let [x, _, z] = world.kinematics(0).end_effector.origin.lane(0);
     run(&mut world, 2000);
     let [sagged_x, _, sagged_z] = world.kinematics(0).end_effector.origin.lane(0);
-    tells(&format!(
+    assert_documented(&format!(
         "{:.1} mm lower and {:.1} mm nearer",
         1e3 * (z - sagged_z),
         1e3 * (x - sagged_x)
@@ -148,7 +148,7 @@ fn what_was_measured_is_so_still() {
     let mut world = World::with_robots(&Plant::nominal(), 1, [-0.5, 0.4, 0.0, 1.0, 0.0, 10.0]);
     run(&mut world, 1000);
     let [vx, _, spin] = world.puck().velocity;
-    tells(&format!(
+    assert_documented(&format!(
         "{:.0} % of its speed and {:.0} % of its spin after a second",
         100.0 * vx,
         10.0 * spin
@@ -156,16 +156,16 @@ fn what_was_measured_is_so_still() {
 
     let (across, along) = rim_bounces();
     let mean = |ratios: &[f64]| ratios.iter().sum::<f64>() / ratios.len() as f64;
-    let [least, most] = [f64::min, f64::max].map(|of| across.iter().copied().reduce(of).unwrap());
-    tells(&format!(
+    let [least, most] = [f64::min, f64::max].map(|reduce| across.iter().copied().reduce(reduce).unwrap());
+    assert_documented(&format!(
         "{:.2} of its speed across the rim, {least:.2} to {most:.2}",
         mean(&across)
     ));
-    tells(&format!("{:.2} of its speed along the rim", mean(&along)));
+    assert_documented(&format!("{:.2} of its speed along the rim", mean(&along)));
 
     let shares: Vec<f64> = [0.5, 1.0, 2.0, 3.0].map(mallet_bounce).to_vec();
-    let [least, most] = [f64::min, f64::max].map(|of| shares.iter().copied().reduce(of).unwrap());
-    tells(&format!("{least:.2} to {most:.2} of the puck's speed"));
+    let [least, most] = [f64::min, f64::max].map(|reduce| shares.iter().copied().reduce(reduce).unwrap());
+    assert_documented(&format!("{least:.2} to {most:.2} of the puck's speed"));
 }
 
 fn run(world: &mut World, duration_ms: usize) {
@@ -177,8 +177,8 @@ fn run(world: &mut World, duration_ms: usize) {
     }
 }
 
-/// Shares of the puck's velocity across and along a long rim after a bounce without spin, of 120 that differ in
-/// speed and phase.
+/// Ratios of the puck's velocity across and along a long rim after a bounce without spin, for 120 bounces that differ
+/// in speed and phase.
 fn rim_bounces() -> (Vec<f64>, Vec<f64>) {
     (0..120)
         .map(|k| {
@@ -205,7 +205,7 @@ fn rim_bounces() -> (Vec<f64>, Vec<f64>) {
         .unzip()
 }
 
-/// Share of the puck's speed after it meets the mallet of the held arm head-on.
+/// Ratio of the puck's speed after a head-on impact with the mallet of the held arm.
 fn mallet_bounce(speed: f64) -> f64 {
     let mut world = World::with_robots(&Plant::nominal(), 1, [-0.6, 0.0, 0.0, -speed, 0.0, 0.0]);
     let touch = |world: &World| {
@@ -226,9 +226,9 @@ fn mallet_bounce(speed: f64) -> f64 {
 }
 
 #[test]
-fn steps_and_joints_are_as_told() {
+fn step_lengths_and_joint_count_match_the_model() {
     assert_eq!((JOINTS, SUBSTEPS), (7, 20));
     assert_eq!(SUBSTEP_S, 0.001);
-    tells("1 kHz");
-    tells("50 Hz");
+    assert_documented("1 kHz");
+    assert_documented("50 Hz");
 }

@@ -108,7 +108,7 @@ async fn check(connection: &mut SqliteConnection, now: Timestamp) -> Result<Arch
         .execute(&mut *tx)
         .await?;
     sqlx::query!(
-        "UPDATE units SET state = 'dropped', nonce = NULL WHERE state IN ('queued', 'leased')"
+        "UPDATE jobs SET state = 'dropped', nonce = NULL WHERE state IN ('queued', 'leased')"
     )
     .execute(&mut *tx)
     .await?;

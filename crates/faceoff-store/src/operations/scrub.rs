@@ -65,12 +65,15 @@ const STEPS: &[(Scope, &str)] = &[
         (SELECT 1 FROM frozen_boards f WHERE f.stage_id = evaluations.stage_id
            AND f.frozen_at < evaluations.finished_at)"),
     (Scope::Both, "UPDATE evaluations SET rerun_of = NULL WHERE rerun_of NOT IN (SELECT id FROM evaluations)"),
-    (Scope::Both, "DELETE FROM finalisations WHERE evaluation_id NOT IN (SELECT id FROM evaluations)"),
-    (Scope::Both, "DELETE FROM proposals WHERE id IN (SELECT proposal_id FROM drafts WHERE state = 'open')"),
+    (Scope::Both, "DELETE FROM scorings WHERE evaluation_id NOT IN (SELECT id FROM evaluations)"),
+    (Scope::Both, "DELETE FROM proposals WHERE id IN
+        (SELECT proposal_id FROM proposed_evaluations WHERE state = 'open')"),
     (Scope::Public, "DELETE FROM proposals"),
-    (Scope::Both, "DELETE FROM drafts WHERE proposal_id NOT IN (SELECT id FROM proposals)"),
-    (Scope::Both, "UPDATE drafts SET replaces = NULL WHERE replaces NOT IN (SELECT id FROM evaluations)"),
-    (Scope::Both, "DELETE FROM draft_finalisations WHERE draft_id NOT IN (SELECT id FROM drafts)"),
+    (Scope::Both, "DELETE FROM proposed_evaluations WHERE proposal_id NOT IN (SELECT id FROM proposals)"),
+    (Scope::Both, "UPDATE proposed_evaluations SET replaces = NULL
+        WHERE replaces NOT IN (SELECT id FROM evaluations)"),
+    (Scope::Both, "DELETE FROM proposed_evaluation_scorings
+        WHERE proposed_evaluation_id NOT IN (SELECT id FROM proposed_evaluations)"),
     (Scope::Both, "DELETE FROM ablations WHERE finished_at IS NULL"),
     (Scope::Both, "DELETE FROM ablation_runs WHERE ablation_id NOT IN (SELECT id FROM ablations)"),
     // Open games have no result; test and friendly games are visible to their teams only.
@@ -91,7 +94,7 @@ const STEPS: &[(Scope, &str)] = &[
                     WHEN 'at_close' THEN t.closed_at IS NOT NULL ELSE 0 END)"),
     (Scope::Public, "UPDATE tournaments SET baseline_id = NULL"),
     (Scope::Both, "DELETE FROM runs WHERE id NOT IN (SELECT run_id FROM evaluations)
-        AND id NOT IN (SELECT run_id FROM drafts) AND id NOT IN (SELECT run_id FROM ablation_runs)"),
+        AND id NOT IN (SELECT run_id FROM proposed_evaluations) AND id NOT IN (SELECT run_id FROM ablation_runs)"),
     (Scope::Both, "DELETE FROM contestants WHERE run_id NOT IN (SELECT id FROM runs)"),
     (Scope::Both, "DELETE FROM episode_summaries WHERE run_id NOT IN (SELECT id FROM runs)"),
     (Scope::Both, "DELETE FROM shards WHERE run_id NOT IN (SELECT id FROM runs)"),
@@ -112,10 +115,10 @@ const STEPS: &[(Scope, &str)] = &[
         label = NULL, note = NULL, timing = NULL, runtime = NULL, withdrawn_at = NULL, deleted_at = NULL, deleted_by = NULL,
         bundle_removed_at = NULL, bundle_removed_for = NULL, bundle_gone = 0, log = CASE WHEN log IS NOT NULL THEN '' END,
         reason = CASE WHEN reason IS NOT NULL THEN '' END"),
-    (Scope::Both, "DELETE FROM smoke_runs WHERE submission_id NOT IN (SELECT id FROM submissions)"),
-    (Scope::Public, "DELETE FROM smoke_runs"),
-    (Scope::Public, "DELETE FROM finalisations"),
-    (Scope::Public, "UPDATE games SET unit_id = NULL"),
+    (Scope::Both, "DELETE FROM validation_runs WHERE submission_id NOT IN (SELECT id FROM submissions)"),
+    (Scope::Public, "DELETE FROM validation_runs"),
+    (Scope::Public, "DELETE FROM scorings"),
+    (Scope::Public, "UPDATE games SET job_id = NULL"),
     (Scope::Public, "DELETE FROM questions WHERE public = 0"),
     (Scope::Public, "UPDATE questions SET team_id = NULL"),
     // Only teams that took part are public.
@@ -124,11 +127,12 @@ const STEPS: &[(Scope, &str)] = &[
         AND id NOT IN (SELECT e.value FROM stages s JOIN json_each(s.finalised_without) e)"),
     (Scope::Public, "UPDATE teams SET retired_by_organiser = 0"),
     // Jobs are never run in an archive, and the workers that ran them are private.
-    (Scope::Both, "DELETE FROM units WHERE id NOT IN (SELECT unit_id FROM shards)
-        AND id NOT IN (SELECT unit_id FROM smoke_runs) AND id NOT IN (SELECT unit_id FROM finalisations)
-        AND id NOT IN (SELECT unit_id FROM draft_finalisations) AND id NOT IN (SELECT unit_id FROM games WHERE unit_id IS NOT NULL)"),
-    (Scope::Both, "UPDATE units SET state = 'dropped', nonce = NULL WHERE state IN ('queued', 'leased')"),
-    (Scope::Both, "UPDATE units SET nonce = '' WHERE nonce IS NOT NULL"),
+    (Scope::Both, "DELETE FROM jobs WHERE id NOT IN (SELECT job_id FROM shards)
+        AND id NOT IN (SELECT job_id FROM validation_runs) AND id NOT IN (SELECT job_id FROM scorings)
+        AND id NOT IN (SELECT job_id FROM proposed_evaluation_scorings)
+        AND id NOT IN (SELECT job_id FROM games WHERE job_id IS NOT NULL)"),
+    (Scope::Both, "UPDATE jobs SET state = 'dropped', nonce = NULL WHERE state IN ('queued', 'leased')"),
+    (Scope::Both, "UPDATE jobs SET nonce = '' WHERE nonce IS NOT NULL"),
     // The public log: events of removed subjects go (private kinds are removed before), and users are anonymised.
     (Scope::Public, "DELETE FROM events WHERE subject_kind = 'evaluation'
         AND subject_id NOT IN (SELECT id FROM evaluations)"),

@@ -144,9 +144,9 @@ impl Store {
                 ));
             }
             check_closed(&stage, now, "its final day comes after that")?;
-            if let Some(cut_at) = sign_offs::final_cutoff(tx, id).await? {
+            if let Some(cutoff_at) = sign_offs::final_cutoff(tx, id).await? {
                 return conflict(format!(
-                    "the final day of the stage {:?} had its cutoff at {cut_at}; a stage has only one",
+                    "the final day of the stage {:?} had its cutoff at {cutoff_at}; a stage has only one",
                     stage.name.as_str()
                 ));
             }

@@ -15,8 +15,8 @@ pub(crate) async fn of_runs(
     }
     let runs = Json(runs);
     let rows = sqlx::query!(
-        r#"SELECT s.run_id AS "run: Text<RunId>", SUM(u.progress) AS "episodes_done!: u32"
-           FROM shards s JOIN units u ON u.id = s.unit_id
+        r#"SELECT s.run_id AS "run: Text<RunId>", SUM(j.progress) AS "episodes_done!: u32"
+           FROM shards s JOIN jobs j ON j.id = s.job_id
            WHERE s.run_id IN (SELECT value FROM json_each(?)) GROUP BY s.run_id"#,
         runs,
     )

@@ -82,8 +82,8 @@ struct OpenJob {
     episodes: Option<u32>,
     holder: String,
     run: Option<Text<RunId>>,
-    smoke_of: Option<Text<SubmissionId>>,
-    score_of: Option<Text<EvaluationId>>,
+    validation_of: Option<Text<SubmissionId>>,
+    scoring_of: Option<Text<EvaluationId>>,
     game: Option<Text<GameId>>,
     game_steps: Option<u32>,
     is_paused: bool,
@@ -92,18 +92,18 @@ struct OpenJob {
 async fn open_jobs(connection: &mut SqliteConnection) -> Result<Vec<OpenJob>> {
     Ok(sqlx::query_as!(
         OpenJob,
-        r#"SELECT u.account_no AS "account!: i64", u.batch, u.queue_no, u.state = 'leased' AS "is_leased!: bool",
-                  u.claimable_at AS "claimable_at: Instant", u.charged_ms, u.progress AS "progress: u32",
+        r#"SELECT j.account_no AS "account!: i64", j.batch, j.queue_no, j.state = 'leased' AS "is_leased!: bool",
+                  j.claimable_at AS "claimable_at: Instant", j.charged_ms, j.progress AS "progress: u32",
                   l.urgency AS "urgency: u32", s.end_episode - s.first_episode AS "episodes?: u32",
                   a.holder, s.run_id AS "run?: Text<RunId>",
-                  m.submission_id AS "smoke_of?: Text<SubmissionId>",
-                  f.evaluation_id AS "score_of?: Text<EvaluationId>", g.id AS "game?: Text<GameId>",
+                  v.submission_id AS "validation_of?: Text<SubmissionId>",
+                  c.evaluation_id AS "scoring_of?: Text<EvaluationId>", g.id AS "game?: Text<GameId>",
                   json_extract(t.rules, '$.steps') AS "game_steps?: u32", t.paused_at IS NOT NULL AS "is_paused!: bool"
-           FROM units u JOIN accounts a ON a.account_no = u.account_no JOIN lanes l ON l.lane = a.lane
-           LEFT JOIN shards s ON s.unit_id = u.id LEFT JOIN smoke_runs m ON m.unit_id = u.id
-           LEFT JOIN finalisations f ON f.unit_id = u.id
-           LEFT JOIN games g ON g.unit_id = u.id LEFT JOIN tournaments t ON t.id = g.tournament_id
-           WHERE u.state IN ('queued', 'leased') ORDER BY u.batch, u.queue_no"#
+           FROM jobs j JOIN accounts a ON a.account_no = j.account_no JOIN lanes l ON l.lane = a.lane
+           LEFT JOIN shards s ON s.job_id = j.id LEFT JOIN validation_runs v ON v.job_id = j.id
+           LEFT JOIN scorings c ON c.job_id = j.id
+           LEFT JOIN games g ON g.job_id = j.id LEFT JOIN tournaments t ON t.id = g.tournament_id
+           WHERE j.state IN ('queued', 'leased') ORDER BY j.batch, j.queue_no"#
     )
     .fetch_all(connection)
     .await?)
@@ -153,7 +153,7 @@ enum GroupTarget {
 /// Greatest urgency value of the lanes that the forecast covers: validation runs, scoring, shards and games that count.
 const MAX_URGENCY: u32 = 1;
 
-/// Urgency of the lane of finalisations.
+/// Urgency of the lane of scoring jobs.
 const SCORING_URGENCY: u32 = 0;
 
 /// Duration of an episode of an open evaluation: the mean of its committed shards, else of its team's recent episodes.
@@ -194,11 +194,11 @@ impl<'a> JobGroups<'a> {
             let duration = job.episodes.zip(each_ms);
             return (group, duration.map(|(episodes, ms)| f64::from(episodes) * ms));
         }
-        if let Some(id) = &job.score_of {
+        if let Some(id) = &job.scoring_of {
             let is_target =
                 |(target, _): &(GroupTarget, JobGroup)| *target == GroupTarget::Evaluation(id.0);
             if let Some(group) = self.groups.iter().position(is_target) {
-                // The finalisation is queued already.
+                // The scoring job is queued already.
                 self.groups[group].1.follow_up = None;
                 return (group, self.durations.scoring_ms);
             }
@@ -208,7 +208,7 @@ impl<'a> JobGroups<'a> {
             let duration = duration.map(|(steps, ms)| f64::from(steps) * ms);
             return (self.push(GroupTarget::Game(id.0)), duration);
         }
-        let (target, duration) = match &job.smoke_of {
+        let (target, duration) = match &job.validation_of {
             Some(id) => (GroupTarget::Submission(id.0), self.durations.validation_ms),
             None if job.urgency == SCORING_URGENCY => {
                 (GroupTarget::Uncounted, self.durations.scoring_ms)

@@ -41,7 +41,7 @@ struct Row {
     datasets: u32,
     dataset_bytes: i64,
     unmeasured: u32,
-    draft_bytes: i64,
+    proposal_bytes: i64,
 }
 
 impl TryFrom<Row> for TeamStorage {
@@ -58,7 +58,7 @@ impl TryFrom<Row> for TeamStorage {
             datasets: row.datasets,
             dataset_bytes: bytes(row.dataset_bytes)?,
             unmeasured: row.unmeasured,
-            proposal_bytes: bytes(row.draft_bytes)?,
+            proposal_bytes: bytes(row.proposal_bytes)?,
         })
     }
 }
@@ -81,9 +81,9 @@ impl Store {
                        WHERE s.team_id = t.id AND s.bundle_removed_at IS NULL) AS "archive_bytes!: i64",
                       COUNT(e.id) AS "datasets!: u32", COALESCE(SUM(e.dataset_bytes), 0) AS "dataset_bytes!: i64",
                       COUNT(e.id) - COUNT(e.dataset_bytes) AS "unmeasured!: u32",
-                      (SELECT COALESCE(SUM(f.dataset_bytes), 0) FROM drafts f
-                       WHERE f.team_id = t.id AND f.dataset_removed_at IS NULL
-                         AND NOT EXISTS (SELECT 1 FROM evaluations x WHERE x.id = f.id)) AS "draft_bytes!: i64"
+                      (SELECT COALESCE(SUM(p.dataset_bytes), 0) FROM proposed_evaluations p
+                       WHERE p.team_id = t.id AND p.dataset_removed_at IS NULL
+                         AND NOT EXISTS (SELECT 1 FROM evaluations x WHERE x.id = p.id)) AS "proposal_bytes!: i64"
                FROM teams t
                LEFT JOIN evaluations e
                    ON e.team_id = t.id AND e.state = 'finished' AND e.dataset_removed_at IS NULL

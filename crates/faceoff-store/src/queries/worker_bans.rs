@@ -33,9 +33,9 @@ impl Store {
         let mut connection = self.database.read.acquire().await?;
         let evaluations = sqlx::query_scalar!(
             r#"SELECT e.id AS "id!: Text<EvaluationId>"
-               FROM units u JOIN shards s ON s.unit_id = u.id JOIN evaluations e ON e.run_id = s.run_id
-               WHERE u.state = 'done' AND u.worker >= 'remote/' AND u.worker < 'remote0'
-                 AND u.worker >= ?1 || '/' AND u.worker < ?1 || '0'
+               FROM jobs j JOIN shards s ON s.job_id = j.id JOIN evaluations e ON e.run_id = s.run_id
+               WHERE j.state = 'done' AND j.worker >= 'remote/' AND j.worker < 'remote0'
+                 AND j.worker >= ?1 || '/' AND j.worker < ?1 || '0'
                  AND e.state = 'finished' AND e.voided_at IS NULL
                GROUP BY e.id ORDER BY MAX(e.finished_at) DESC LIMIT ?2"#,
             holder,

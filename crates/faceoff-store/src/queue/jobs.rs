@@ -28,7 +28,7 @@ pub(crate) async fn insert(tx: &mut Tx, job: NewJob, account: Account) -> Result
     let id = Uuid::now_v7();
     let (id_text, from) = (Text(id), Instant(seconds_later(tx.now, job.rest_s)));
     sqlx::query!(
-        "INSERT INTO units (id, kind, account_no, batch, state, claimable_at) VALUES (?, ?, ?, ?, 'queued', ?)",
+        "INSERT INTO jobs (id, kind, account_no, batch, state, claimable_at) VALUES (?, ?, ?, ?, 'queued', ?)",
         id_text,
         job.kind,
         account.0,
@@ -68,17 +68,17 @@ pub(crate) async fn claim_next(
     let lease_ms = milliseconds(lease_s);
     Ok(sqlx::query_as!(
         LeasedJob,
-        r#"UPDATE units
+        r#"UPDATE jobs
            SET state = 'leased', worker = ?1, nonce = ?2, claimable_at = ?3, attempts = attempts + 1,
                progress = 0, charged_ms = ?4
            WHERE queue_no = (
                SELECT f.queue_no
                FROM accounts a JOIN lanes l ON l.lane = a.lane
-               JOIN units f ON f.queue_no =
-                   (SELECT u.queue_no FROM units u
-                    WHERE u.account_no = a.account_no AND u.state IN ('queued', 'leased')
-                      AND u.claimable_at <= ?5
-                    ORDER BY u.batch, u.queue_no LIMIT 1)
+               JOIN jobs f ON f.queue_no =
+                   (SELECT j.queue_no FROM jobs j
+                    WHERE j.account_no = a.account_no AND j.state IN ('queued', 'leased')
+                      AND j.claimable_at <= ?5
+                    ORDER BY j.batch, j.queue_no LIMIT 1)
                WHERE l.lane IN (SELECT value FROM json_each(?6))
                ORDER BY l.urgency, l.served_ms, l.rank, f.batch, a.served_ms, f.queue_no LIMIT 1)
            RETURNING id AS "id!: Text<Uuid>", kind AS "kind!", attempts AS "attempts!: u32""#,
@@ -99,7 +99,7 @@ pub(crate) async fn drop_jobs(tx: &mut Tx, jobs: &[Uuid]) -> Result<()> {
     for job in jobs {
         let job = Text(*job);
         sqlx::query!(
-            "UPDATE units SET state = 'dropped', nonce = NULL,
+            "UPDATE jobs SET state = 'dropped', nonce = NULL,
                               charged_ms = CASE state WHEN 'leased'
                                            THEN MAX(0, charged_ms + ?2 - claimable_at) ELSE 0 END
              WHERE id = ?1 AND state IN ('queued', 'leased')",
@@ -117,7 +117,7 @@ pub(crate) async fn drop_jobs(tx: &mut Tx, jobs: &[Uuid]) -> Result<()> {
 pub(crate) async fn end_leases(tx: &mut Tx, worker: &str) -> Result<u64> {
     let now = Instant(tx.now);
     let ended = sqlx::query!(
-        "UPDATE units SET claimable_at = ?1, charged_ms = 0
+        "UPDATE jobs SET claimable_at = ?1, charged_ms = 0
          WHERE state = 'leased' AND claimable_at > ?1
            AND (worker = ?2 OR substr(worker, 1, length(?2) + 1) = ?2 || '/')",
         now,
@@ -136,7 +136,7 @@ pub(crate) async fn end_leases(tx: &mut Tx, worker: &str) -> Result<u64> {
 pub(crate) async fn requeue(tx: &mut Tx, job: Uuid) -> Result<()> {
     let (job, now) = (Text(job), Instant(tx.now));
     sqlx::query!(
-        "UPDATE units SET state = 'queued', worker = NULL, nonce = NULL, progress = 0, charged_ms = 0, claimable_at = ?
+        "UPDATE jobs SET state = 'queued', worker = NULL, nonce = NULL, progress = 0, charged_ms = 0, claimable_at = ?
          WHERE id = ? AND state = 'done'",
         now,
         job,
@@ -174,7 +174,7 @@ pub(crate) async fn gauges(
                   COUNT(*) FILTER (WHERE claimable_at <= ?1) AS "waiting!: u32",
                   MIN(claimable_at) FILTER (WHERE claimable_at <= ?1) AS "since?: Instant",
                   COUNT(*) FILTER (WHERE without_room >= ?2) AS "without_room!: u32"
-           FROM units WHERE state IN ('queued', 'leased')"#,
+           FROM jobs WHERE state IN ('queued', 'leased')"#,
         now,
         OUT_OF_SPACE_TIMES,
     )

@@ -34,7 +34,7 @@ pub(crate) enum ClaimState {
 pub(crate) async fn claim_state(connection: &mut SqliteConnection, claim: &JobClaim) -> Result<ClaimState> {
     let (id, nonce) = (Text(claim.job), Text(claim.nonce));
     let row = sqlx::query!(
-        "SELECT kind, state = 'leased' AS held FROM units WHERE id = ? AND nonce = ?",
+        "SELECT kind, state = 'leased' AS held FROM jobs WHERE id = ? AND nonce = ?",
         id,
         nonce,
     )
@@ -62,7 +62,7 @@ pub(crate) async fn renew(
         Instant(seconds_later(now, lease_s)),
     );
     Ok(sqlx::query_scalar!(
-        r#"UPDATE units SET charged_ms = MAX(0, charged_ms + ?1 - claimable_at), claimable_at = ?1,
+        r#"UPDATE jobs SET charged_ms = MAX(0, charged_ms + ?1 - claimable_at), claimable_at = ?1,
                             progress = ?2
            WHERE id = ?3 AND nonce = ?4 AND state = 'leased' RETURNING kind AS "kind!""#,
         until,
@@ -82,7 +82,7 @@ pub(crate) async fn is_leased(
 ) -> Result<bool> {
     let (job, nonce) = (Text(job), Text(nonce));
     let held = sqlx::query_scalar!(
-        r#"SELECT state = 'leased' AS "held!: bool" FROM units WHERE id = ? AND nonce = ?"#,
+        r#"SELECT state = 'leased' AS "held!: bool" FROM jobs WHERE id = ? AND nonce = ?"#,
         job,
         nonce,
     )
@@ -95,7 +95,7 @@ pub(crate) async fn is_leased(
 pub(crate) async fn is_holder(connection: &mut SqliteConnection, claim: &JobClaim) -> Result<bool> {
     let (id, nonce) = (Text(claim.job), Text(claim.nonce));
     let found = sqlx::query_scalar!(
-        r#"SELECT worker = ? AS "is_holder!: bool" FROM units WHERE id = ? AND nonce = ? AND state = 'leased'"#,
+        r#"SELECT worker = ? AS "is_holder!: bool" FROM jobs WHERE id = ? AND nonce = ? AND state = 'leased'"#,
         claim.worker,
         id,
         nonce,
@@ -113,7 +113,7 @@ pub(crate) async fn lease_holder(
 ) -> Result<Option<String>> {
     let (job, nonce) = (Text(job), Text(nonce));
     Ok(sqlx::query_scalar!(
-        r#"SELECT worker AS "worker!" FROM units WHERE id = ? AND nonce = ? AND state = 'leased'"#,
+        r#"SELECT worker AS "worker!" FROM jobs WHERE id = ? AND nonce = ? AND state = 'leased'"#,
         job,
         nonce,
     )
@@ -126,7 +126,7 @@ pub(crate) async fn leases(tx: &mut Tx, holder: &str) -> Result<Vec<(JobClaim, S
     let rows = sqlx::query!(
         r#"SELECT id AS "id!: Text<Uuid>", kind, worker AS "worker!", nonce AS "nonce!: Text<Uuid>",
                   claimable_at AS "lease_until: Instant"
-           FROM units
+           FROM jobs
            WHERE state IN ('queued', 'leased') AND state = 'leased'
              AND (worker = ?1 OR substr(worker, 1, length(?1) + 1) = ?1 || '/')"#,
         holder,
@@ -153,7 +153,7 @@ pub(crate) async fn transfer(
 ) -> Result<bool> {
     let (id, nonce) = (Text(claim.job), Text(claim.nonce));
     let transferred = sqlx::query!(
-        "UPDATE units SET worker = ?1
+        "UPDATE jobs SET worker = ?1
          WHERE id = ?2 AND nonce = ?3 AND worker IN (?4, ?1) AND state = 'leased'",
         to,
         id,
@@ -169,7 +169,7 @@ pub(crate) async fn transfer(
 pub(crate) async fn renew_leases(tx: &mut Tx, holder: &str, lease_s: u32) -> Result<u64> {
     let until = Instant(seconds_later(tx.now, lease_s));
     let renewed = sqlx::query!(
-        "UPDATE units SET claimable_at = ?1
+        "UPDATE jobs SET claimable_at = ?1
          WHERE state IN ('queued', 'leased') AND state = 'leased' AND claimable_at < ?1
            AND (worker = ?2 OR substr(worker, 1, length(?2) + 1) = ?2 || '/')",
         until,
@@ -185,7 +185,7 @@ pub(crate) async fn renew_leases(tx: &mut Tx, holder: &str, lease_s: u32) -> Res
 pub(crate) async fn mark_done(tx: &mut Tx, claim: &JobClaim, progress: u32) -> Result<()> {
     let (id, now) = (Text(claim.job), Instant(tx.now));
     sqlx::query!(
-        "UPDATE units SET state = 'done', progress = ?,
+        "UPDATE jobs SET state = 'done', progress = ?,
                           charged_ms = MAX(0, charged_ms + ? - claimable_at)
          WHERE id = ?",
         progress,
@@ -207,7 +207,7 @@ pub(crate) async fn requeue_failed(
 ) -> Result<u32> {
     let id = Text(claim.job);
     let failures = sqlx::query_scalar!(
-        r#"UPDATE units SET state = 'queued', worker = NULL, nonce = NULL, progress = 0,
+        r#"UPDATE jobs SET state = 'queued', worker = NULL, nonce = NULL, progress = 0,
                             charged_ms = 0, failures = failures + 1
            WHERE id = ? RETURNING failures AS "failures!: u32""#,
         id,
@@ -216,7 +216,7 @@ pub(crate) async fn requeue_failed(
     .await?;
     let again_at = Instant(seconds_later(now, backoff_s(failures)));
     sqlx::query!(
-        "UPDATE units SET claimable_at = ? WHERE id = ?",
+        "UPDATE jobs SET claimable_at = ? WHERE id = ?",
         again_at,
         id
     )
@@ -234,7 +234,7 @@ pub(crate) async fn renew_all_leases(
     let until = Instant(seconds_later(now, lease_s));
     sqlx::query!(
         // two conditions on the state: the first one lets SQLite use the index of open jobs
-        "UPDATE units SET claimable_at = ?1
+        "UPDATE jobs SET claimable_at = ?1
          WHERE state IN ('queued', 'leased') AND state = 'leased' AND claimable_at < ?1",
         until,
     )
@@ -253,7 +253,7 @@ pub(crate) async fn release(
 ) -> Result<()> {
     let (id, from) = (Text(claim.job), Instant(seconds_later(tx.now, rest_s)));
     sqlx::query!(
-        "UPDATE units SET state = 'queued', worker = NULL, nonce = NULL, progress = 0,
+        "UPDATE jobs SET state = 'queued', worker = NULL, nonce = NULL, progress = 0,
                           charged_ms = 0, attempts = attempts - 1, claimable_at = ?,
                           without_room = without_room + ?
          WHERE id = ?",
@@ -272,7 +272,7 @@ pub(crate) async fn release(
 pub(crate) async fn park(tx: &mut Tx, job: Uuid) -> Result<()> {
     let id = Text(job);
     sqlx::query!(
-        "UPDATE units SET state = 'queued', worker = NULL, nonce = NULL, progress = 0, charged_ms = 0,
+        "UPDATE jobs SET state = 'queued', worker = NULL, nonce = NULL, progress = 0, charged_ms = 0,
                           attempts = attempts - 1, claimable_at = ?
          WHERE id = ?",
         PARKED,
@@ -287,7 +287,7 @@ pub(crate) async fn park(tx: &mut Tx, job: Uuid) -> Result<()> {
 pub(crate) async fn unpark(tx: &mut Tx, job: Uuid) -> Result<()> {
     let (id, now) = (Text(job), Instant(tx.now));
     sqlx::query!(
-        "UPDATE units SET claimable_at = ? WHERE id = ? AND state = 'queued' AND claimable_at = ?",
+        "UPDATE jobs SET claimable_at = ? WHERE id = ? AND state = 'queued' AND claimable_at = ?",
         now,
         id,
         PARKED,

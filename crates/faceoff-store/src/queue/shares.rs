@@ -28,14 +28,14 @@ pub(crate) async fn account(tx: &mut Tx, lane: Lane, holder: &str) -> Result<Acc
         "INSERT INTO lanes (lane, urgency, rank, served_ms)
          VALUES (?1, ?2, ?3, MAX(0, COALESCE(
              (SELECT MIN(l.served_ms -
-                         (SELECT COALESCE(SUM(MAX(0, u.claimable_at - ?4)), 0)
-                          FROM accounts a CROSS JOIN units u ON u.account_no = a.account_no
-                          WHERE a.lane = l.lane AND u.nonce IS NOT NULL
-                            AND u.state IN ('queued', 'leased')))
+                         (SELECT COALESCE(SUM(MAX(0, j.claimable_at - ?4)), 0)
+                          FROM accounts a CROSS JOIN jobs j ON j.account_no = a.account_no
+                          WHERE a.lane = l.lane AND j.nonce IS NOT NULL
+                            AND j.state IN ('queued', 'leased')))
               FROM lanes l WHERE l.urgency = ?2 AND EXISTS (
-                 SELECT 1 FROM accounts a CROSS JOIN units u ON u.account_no = a.account_no
-                 WHERE a.lane = l.lane AND u.state IN ('queued', 'leased')
-                   AND (u.state = 'leased' OR u.claimable_at <= ?4))),
+                 SELECT 1 FROM accounts a CROSS JOIN jobs j ON j.account_no = a.account_no
+                 WHERE a.lane = l.lane AND j.state IN ('queued', 'leased')
+                   AND (j.state = 'leased' OR j.claimable_at <= ?4))),
              (SELECT MAX(served_ms) FROM lanes WHERE urgency = ?2),
              0)))
          ON CONFLICT (lane) DO UPDATE SET urgency = excluded.urgency, rank = excluded.rank,
@@ -51,13 +51,13 @@ pub(crate) async fn account(tx: &mut Tx, lane: Lane, holder: &str) -> Result<Acc
         r#"INSERT INTO accounts (lane, holder, served_ms)
            VALUES (?1, ?2, MAX(0, COALESCE(
                (SELECT MIN(a.served_ms -
-                           (SELECT COALESCE(SUM(MAX(0, u.claimable_at - ?3)), 0) FROM units u
-                            WHERE u.account_no = a.account_no AND u.nonce IS NOT NULL
-                              AND u.state IN ('queued', 'leased')))
+                           (SELECT COALESCE(SUM(MAX(0, j.claimable_at - ?3)), 0) FROM jobs j
+                            WHERE j.account_no = a.account_no AND j.nonce IS NOT NULL
+                              AND j.state IN ('queued', 'leased')))
                 FROM accounts a WHERE a.lane = ?1 AND EXISTS (
-                   SELECT 1 FROM units u
-                   WHERE u.account_no = a.account_no AND u.state IN ('queued', 'leased')
-                     AND (u.state = 'leased' OR u.claimable_at <= ?3))),
+                   SELECT 1 FROM jobs j
+                   WHERE j.account_no = a.account_no AND j.state IN ('queued', 'leased')
+                     AND (j.state = 'leased' OR j.claimable_at <= ?3))),
                (SELECT MAX(served_ms) FROM accounts WHERE lane = ?1),
                0)))
            ON CONFLICT (lane, holder) DO UPDATE SET served_ms = MAX(served_ms, excluded.served_ms)

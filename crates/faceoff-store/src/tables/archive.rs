@@ -162,7 +162,7 @@ pub(crate) async fn artifacts(connection: &mut SqliteConnection) -> Result<Vec<A
     .await?;
     let proposed = sqlx::query!(
         r#"SELECT id AS "id: Text<EvaluationId>", dataset AS "dataset!", dataset_blake3 AS "dataset_blake3!"
-           FROM drafts WHERE dataset IS NOT NULL AND dataset_removed_at IS NULL
+           FROM proposed_evaluations WHERE dataset IS NOT NULL AND dataset_removed_at IS NULL
              AND id NOT IN (SELECT id FROM evaluations)
              AND proposal_id NOT IN (SELECT id FROM proposals WHERE outcome = 'dropped') ORDER BY created_at, id"#
     )

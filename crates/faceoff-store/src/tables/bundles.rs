@@ -267,7 +267,7 @@ pub(crate) async fn uses(connection: &mut SqliteConnection, id: SubmissionId) ->
                   AS "open!: u32",
                   (SELECT COUNT(*) FROM evaluations e JOIN days d ON d.stage_id = e.stage_id AND d.day = e.day
                    WHERE e.submission_id = ?1 AND d.released_at IS NULL) AS "unreleased!: u32",
-                  (SELECT COUNT(DISTINCT p.id) FROM drafts d JOIN proposals p ON p.id = d.proposal_id
+                  (SELECT COUNT(DISTINCT p.id) FROM proposed_evaluations d JOIN proposals p ON p.id = d.proposal_id
                    WHERE d.submission_id = ?1 AND p.outcome IS NULL) AS "proposed!: u32""#,
         id
     )

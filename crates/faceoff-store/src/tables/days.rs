@@ -41,12 +41,12 @@ pub(crate) async fn missed(connection: &mut SqliteConnection) -> Result<Vec<(Sta
 /// All days, the newest cutoff first, each with the number of its finished evaluations.
 pub(crate) async fn all(connection: &mut SqliteConnection) -> Result<Vec<(Day, u32)>> {
     let rows = sqlx::query!(
-        r#"SELECT d.stage_id AS "stage: Text<StageId>", d.day AS "day: Text<Date>", d.cut_at AS "cut_at: Instant",
+        r#"SELECT d.stage_id AS "stage: Text<StageId>", d.day AS "day: Text<Date>", d.cutoff_at AS "cutoff_at: Instant",
                   d.deadline_at AS "deadline_at: Instant", d.released_at AS "released_at: Instant",
                   (SELECT COUNT(*) FROM evaluations e
                    WHERE e.stage_id = d.stage_id AND e.day = d.day AND e.state = 'finished'
                      AND e.voided_at IS NULL) AS "finished!: u32"
-           FROM days d ORDER BY d.cut_at DESC, d.day DESC, d.stage_id"#
+           FROM days d ORDER BY d.cutoff_at DESC, d.day DESC, d.stage_id"#
     )
     .fetch_all(connection)
     .await?;
@@ -58,7 +58,7 @@ pub(crate) async fn all(connection: &mut SqliteConnection) -> Result<Vec<(Day, u
                     stage: row.stage.0,
                     date: row.day.0,
                 },
-                cutoff_at: row.cut_at.0,
+                cutoff_at: row.cutoff_at.0,
                 deadline_at: row.deadline_at.map(|at| at.0),
                 released_at: row.released_at.map(|at| at.0),
             };
@@ -74,7 +74,7 @@ pub(crate) async fn newest(
 ) -> Result<Option<Day>> {
     let id = Text(stage);
     let row = sqlx::query!(
-        r#"SELECT day AS "day: Text<Date>", cut_at AS "cut_at: Instant",
+        r#"SELECT day AS "day: Text<Date>", cutoff_at AS "cutoff_at: Instant",
                   deadline_at AS "deadline_at: Instant", released_at AS "released_at: Instant"
            FROM days WHERE stage_id = ? ORDER BY day DESC LIMIT 1"#,
         id
@@ -86,7 +86,7 @@ pub(crate) async fn newest(
             stage,
             date: row.day.0,
         },
-        cutoff_at: row.cut_at.0,
+        cutoff_at: row.cutoff_at.0,
         deadline_at: row.deadline_at.map(|at| at.0),
         released_at: row.released_at.map(|at| at.0),
     }))
@@ -96,7 +96,7 @@ pub(crate) async fn newest(
 pub(crate) async fn find(connection: &mut SqliteConnection, stage_day: StageDay) -> Result<Day> {
     let (stage, day) = (Text(stage_day.stage), Text(stage_day.date));
     let row = sqlx::query!(
-        r#"SELECT cut_at AS "cut_at: Instant", deadline_at AS "deadline_at: Instant",
+        r#"SELECT cutoff_at AS "cutoff_at: Instant", deadline_at AS "deadline_at: Instant",
                   released_at AS "released_at: Instant"
            FROM days WHERE stage_id = ? AND day = ?"#,
         stage,
@@ -107,7 +107,7 @@ pub(crate) async fn find(connection: &mut SqliteConnection, stage_day: StageDay)
     .ok_or(StoreError::NotFound("day"))?;
     Ok(Day {
         stage_day,
-        cutoff_at: row.cut_at.0,
+        cutoff_at: row.cutoff_at.0,
         deadline_at: row.deadline_at.map(|at| at.0),
         released_at: row.released_at.map(|at| at.0),
     })
@@ -120,9 +120,9 @@ pub(crate) async fn unreleased(
 ) -> Result<Vec<Day>> {
     let id = Text(stage);
     let rows = sqlx::query!(
-        r#"SELECT day AS "day: Text<Date>", cut_at AS "cut_at: Instant",
+        r#"SELECT day AS "day: Text<Date>", cutoff_at AS "cutoff_at: Instant",
                   deadline_at AS "deadline_at: Instant"
-           FROM days WHERE stage_id = ? AND released_at IS NULL ORDER BY cut_at, day"#,
+           FROM days WHERE stage_id = ? AND released_at IS NULL ORDER BY cutoff_at, day"#,
         id
     )
     .fetch_all(connection)
@@ -134,7 +134,7 @@ pub(crate) async fn unreleased(
                 stage,
                 date: row.day.0,
             },
-            cutoff_at: row.cut_at.0,
+            cutoff_at: row.cutoff_at.0,
             deadline_at: row.deadline_at.map(|at| at.0),
             released_at: None,
         })
@@ -153,7 +153,7 @@ pub(crate) async fn overdue(
              AND EXISTS (SELECT 1 FROM evaluations e JOIN runs r ON r.id = e.run_id
                          WHERE e.stage_id = d.stage_id AND e.day = d.day AND e.state = 'open'
                            AND r.state <> 'played')
-           ORDER BY d.cut_at"#,
+           ORDER BY d.cutoff_at"#,
         now
     )
     .fetch_all(connection)
@@ -216,7 +216,7 @@ pub(crate) async fn insert(
     let (stage, day, now) = (Text(stage_day.stage), Text(stage_day.date), Instant(now));
     let deadline_at = deadline_at.map(Instant);
     sqlx::query!(
-        "INSERT INTO days (stage_id, day, cut_at, deadline_at) VALUES (?, ?, ?, ?)",
+        "INSERT INTO days (stage_id, day, cutoff_at, deadline_at) VALUES (?, ?, ?, ?)",
         stage,
         day,
         now,
@@ -248,7 +248,7 @@ pub(crate) async fn insert_missed(
     let (stage, day, now) = (Text(stage_day.stage), Text(stage_day.date), Instant(now));
     let deadline_at = deadline_at.map(Instant);
     sqlx::query!(
-        "INSERT INTO days (stage_id, day, cut_at, deadline_at, missed_for) VALUES (?, ?, ?, ?, ?)",
+        "INSERT INTO days (stage_id, day, cutoff_at, deadline_at, missed_for) VALUES (?, ?, ?, ?, ?)",
         stage,
         day,
         now,

@@ -411,7 +411,7 @@ pub(crate) async fn set_finished(
     // An old proposal's run may have been cleared before it was applied: then its slot time is unknown.
     sqlx::query!(
         "UPDATE evaluations SET state = 'finished', finished_at = ?, result = ?, dataset = ?, dataset_blake3 = ?,
-                                slot_ms = (SELECT SUM(u.charged_ms) FROM shards s JOIN units u ON u.id = s.unit_id
+                                slot_ms = (SELECT SUM(j.charged_ms) FROM shards s JOIN jobs j ON j.id = s.job_id
                                            JOIN runs r ON r.id = s.run_id
                                            WHERE s.run_id = evaluations.run_id AND r.cleared_at IS NULL)
          WHERE id = ?",

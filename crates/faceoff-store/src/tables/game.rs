@@ -142,7 +142,7 @@ impl GamePurpose {
     #[must_use]
     pub const fn schedule_entry(self) -> Option<ScheduleEntry> {
         match self {
-            Self::Round(meeting) | Self::Replay { original: meeting, .. } => Some(meeting),
+            Self::Round(entry) | Self::Replay { original: entry, .. } => Some(entry),
             Self::Test { .. } | Self::Friendly { .. } => None,
         }
     }

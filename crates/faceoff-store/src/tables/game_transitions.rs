@@ -14,7 +14,7 @@ pub(crate) async fn requeue(
 ) -> Result<()> {
     let (id, job) = (Text(id), Text(job));
     sqlx::query!(
-        "UPDATE games SET state = 'queued', unit_id = ?, attempt = NULL, ended_at = NULL, reason = NULL WHERE id = ?",
+        "UPDATE games SET state = 'queued', job_id = ?, attempt = NULL, ended_at = NULL, reason = NULL WHERE id = ?",
         job,
         id,
     )

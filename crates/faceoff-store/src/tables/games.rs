@@ -19,7 +19,7 @@ struct Row {
     purpose: String,
     round: Option<u32>,
     matchday: Option<u32>,
-    meeting: Option<u32>,
+    pairing: Option<u32>,
     second_half: Option<bool>,
     replay: Option<u32>,
     asked_by: Option<Text<TeamId>>,
@@ -44,23 +44,23 @@ struct Row {
 impl Row {
     fn purpose(&self) -> Option<GamePurpose> {
         let asked_by = self.asked_by.as_ref().map(|team| team.0);
-        let meeting = || {
+        let entry = || {
             Some(ScheduleEntry {
                 round: RoundNumber::try_from(self.round?).ok()?,
                 matchday: self.matchday?,
-                pairing: self.meeting?,
+                pairing: self.pairing?,
                 second_half: self.second_half?,
             })
         };
         Some(match self.purpose.as_str() {
-            "round" => GamePurpose::Round(meeting()?),
+            "round" => GamePurpose::Round(entry()?),
             "test" => GamePurpose::Test { asked_by },
             "friendly" => GamePurpose::Friendly {
                 asked_by: asked_by?,
             },
             "replay" => GamePurpose::Replay {
                 replay: self.replay?,
-                original: meeting()?,
+                original: entry()?,
             },
             _ => return None,
         })
@@ -134,7 +134,7 @@ macro_rules! select_games {
         sqlx::query_as!(
             Row,
             r#"SELECT g.id AS "id: Text<GameId>", g.tournament_id AS "tournament: Text<TournamentId>", g.purpose,
-                      g.round AS "round: u32", g.matchday AS "matchday: u32", g.meeting AS "meeting: u32",
+                      g.round AS "round: u32", g.matchday AS "matchday: u32", g.pairing AS "pairing: u32",
                       g.second_half AS "second_half: bool", g.replay AS "replay: u32",
                       g.asked_by AS "asked_by: Text<TeamId>",
                       g.home_team_id AS "home_team: Text<TeamId>", g.away_team_id AS "away_team: Text<TeamId>",
@@ -170,7 +170,7 @@ pub(crate) async fn of_rounds(
 ) -> Result<Vec<Game>> {
     let id = Text(tournament);
     let rows = select_games!(
-        "WHERE g.tournament_id = ? AND g.purpose = 'round' ORDER BY g.round, g.meeting, g.second_half",
+        "WHERE g.tournament_id = ? AND g.purpose = 'round' ORDER BY g.round, g.pairing, g.second_half",
         id
     );
     games(rows.fetch_all(connection).await?)
@@ -196,7 +196,7 @@ pub(crate) async fn pending(
            JOIN entrants away ON away.tournament_id = g.tournament_id AND away.team_id = g.away_team_id
            WHERE g.tournament_id = ? AND g.purpose = 'round' AND g.state <> 'played'
              AND home.left_as IS NULL AND away.left_as IS NULL
-           ORDER BY g.round, g.meeting, g.second_half"#,
+           ORDER BY g.round, g.pairing, g.second_half"#,
         id
     );
     let pending = rows.fetch_all(connection).await?.into_iter().map(|row| {
@@ -218,7 +218,7 @@ pub(crate) async fn of_replays(
     let id = Text(tournament);
     let rows = select_games!(
         "WHERE g.tournament_id = ? AND g.purpose = 'replay'
-         ORDER BY g.replay, g.round, g.meeting, g.second_half",
+         ORDER BY g.replay, g.round, g.pairing, g.second_half",
         id
     );
     games(rows.fetch_all(connection).await?)
@@ -261,7 +261,7 @@ pub(crate) async fn of_job(
 ) -> Result<Option<GameId>> {
     let job = Text(job);
     let found = sqlx::query_scalar!(
-        r#"SELECT id AS "id: Text<GameId>" FROM games WHERE unit_id = ?"#,
+        r#"SELECT id AS "id: Text<GameId>" FROM games WHERE job_id = ?"#,
         job
     )
     .fetch_optional(connection)
@@ -273,7 +273,7 @@ pub(crate) async fn of_job(
 pub(crate) async fn job_of(connection: &mut SqliteConnection, id: GameId) -> Result<Uuid> {
     let id = Text(id);
     let found = sqlx::query_scalar!(
-        r#"SELECT unit_id AS "unit: Text<Uuid>" FROM games WHERE id = ?"#,
+        r#"SELECT job_id AS "job: Text<Uuid>" FROM games WHERE id = ?"#,
         id
     )
     .fetch_optional(connection)
@@ -291,7 +291,7 @@ pub(crate) async fn insert(
     job: Uuid,
 ) -> Result<()> {
     let (id, tournament, purpose) = (Text(game.id), Text(game.tournament), game.purpose.label());
-    let (round, matchday, meeting, second_half) = match game.purpose.schedule_entry() {
+    let (round, matchday, pairing, second_half) = match game.purpose.schedule_entry() {
         None => (None, None, None, None),
         Some(place) => (
             Some(place.round.get()),
@@ -310,16 +310,16 @@ pub(crate) async fn insert(
     let [home_submission, away_submission] = game.submissions.map(Text);
     let (seed, created_at, job) = (Text(game.seed), Instant(game.created_at), Text(job));
     sqlx::query!(
-        "INSERT INTO games (id, tournament_id, purpose, round, matchday, meeting, second_half, replay, asked_by,
+        "INSERT INTO games (id, tournament_id, purpose, round, matchday, pairing, second_half, replay, asked_by,
                             home_team_id, away_team_id, home_submission_id, away_submission_id, seed, created_at,
-                            unit_id, state)
+                            job_id, state)
          VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, 'queued')",
         id,
         tournament,
         purpose,
         round,
         matchday,
-        meeting,
+        pairing,
         second_half,
         replay,
         asked_by,

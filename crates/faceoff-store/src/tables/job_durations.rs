@@ -18,7 +18,7 @@ pub struct JobDurations {
     pub mean_episode_ms: Option<f64>,
     /// A validation run.
     pub validation_ms: Option<f64>,
-    /// A finalisation: computing a score.
+    /// A scoring job.
     pub scoring_ms: Option<f64>,
     /// A control step of a game of any teams.
     pub game_step_ms: Option<f64>,
@@ -55,14 +55,14 @@ pub(crate) async fn open_evaluations(connection: &mut SqliteConnection) -> Resul
         r#"SELECT e.id AS "id!: Text<EvaluationId>", e.team_id AS "team!: Text<TeamId>",
                   e.stage_id AS "stage!: Text<StageId>", e.day AS "day!: Text<Date>", e.run_id AS "run!: Text<RunId>",
                   r.max_faults AS "max_faults!: u32",
-                  SUM(CASE WHEN u.state = 'done' AND u.charged_ms > 0 THEN s.end_episode - s.first_episode ELSE 0 END)
+                  SUM(CASE WHEN j.state = 'done' AND j.charged_ms > 0 THEN s.end_episode - s.first_episode ELSE 0 END)
                       AS "done_episodes!: u32",
-                  SUM(CASE WHEN u.state = 'done' THEN u.charged_ms ELSE 0 END) AS "done_ms!: i64",
-                  SUM(CASE WHEN u.state <> 'done' THEN s.end_episode - s.first_episode ELSE 0 END)
+                  SUM(CASE WHEN j.state = 'done' THEN j.charged_ms ELSE 0 END) AS "done_ms!: i64",
+                  SUM(CASE WHEN j.state <> 'done' THEN s.end_episode - s.first_episode ELSE 0 END)
                       AS "episodes_left!: u32",
-                  SUM(u.state <> 'done') AS "shards_left!: u32"
+                  SUM(j.state <> 'done') AS "shards_left!: u32"
            FROM evaluations e JOIN runs r ON r.id = e.run_id JOIN shards s ON s.run_id = e.run_id
-           JOIN units u ON u.id = s.unit_id
+           JOIN jobs j ON j.id = s.job_id
            WHERE e.state = 'open' GROUP BY +e.id ORDER BY e.created_at, e.id"#
     )
     .fetch_all(connection)
@@ -120,26 +120,26 @@ pub(crate) async fn recent(
         .values()
         .fold((0, 0), |all, team| (all.0 + team.0, all.1 + team.1));
     let validation_ms = sqlx::query_scalar!(
-        r#"SELECT AVG(u.charged_ms) AS "ms: f64"
-           FROM submissions s JOIN smoke_runs r ON r.submission_id = s.id JOIN units u ON u.id = r.unit_id
-           WHERE s.created_at >= ? AND u.state = 'done' AND u.charged_ms > 0"#,
+        r#"SELECT AVG(j.charged_ms) AS "ms: f64"
+           FROM submissions s JOIN validation_runs r ON r.submission_id = s.id JOIN jobs j ON j.id = r.job_id
+           WHERE s.created_at >= ? AND j.state = 'done' AND j.charged_ms > 0"#,
         since
     )
     .fetch_one(&mut *connection)
     .await?;
-    let finalisation_ms = sqlx::query_scalar!(
-        r#"SELECT AVG(u.charged_ms) AS "ms: f64"
-           FROM evaluations e JOIN finalisations f ON f.evaluation_id = e.id JOIN units u ON u.id = f.unit_id
-           WHERE e.day >= ? AND e.finished_at >= ? AND u.state = 'done' AND u.charged_ms > 0"#,
+    let scoring_ms = sqlx::query_scalar!(
+        r#"SELECT AVG(j.charged_ms) AS "ms: f64"
+           FROM evaluations e JOIN scorings s ON s.evaluation_id = e.id JOIN jobs j ON j.id = s.job_id
+           WHERE e.day >= ? AND e.finished_at >= ? AND j.state = 'done' AND j.charged_ms > 0"#,
         first,
         since
     )
     .fetch_one(&mut *connection)
     .await?;
     let game_step_ms = sqlx::query_scalar!(
-        r#"SELECT AVG(CAST(u.charged_ms AS REAL) / json_extract(t.rules, '$.steps')) AS "ms: f64"
-           FROM games g JOIN tournaments t ON t.id = g.tournament_id JOIN units u ON u.id = g.unit_id
-           WHERE g.ended_at >= ? AND g.state = 'played' AND u.state = 'done' AND u.charged_ms > 0"#,
+        r#"SELECT AVG(CAST(j.charged_ms AS REAL) / json_extract(t.rules, '$.steps')) AS "ms: f64"
+           FROM games g JOIN tournaments t ON t.id = g.tournament_id JOIN jobs j ON j.id = g.job_id
+           WHERE g.ended_at >= ? AND g.state = 'played' AND j.state = 'done' AND j.charged_ms > 0"#,
         since
     )
     .fetch_one(connection)
@@ -152,7 +152,7 @@ pub(crate) async fn recent(
             .filter_map(|(team, sum)| Some((team, mean(sum)?)))
             .collect(),
         validation_ms,
-        scoring_ms: finalisation_ms,
+        scoring_ms,
     })
 }
 

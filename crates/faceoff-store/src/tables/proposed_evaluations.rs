@@ -1,5 +1,4 @@
-//! Evaluations of trials and proposals, in the table `drafts`. If a proposal is applied, they become regular
-//! evaluations with the same ids.
+//! Evaluations of trials and proposals. If a proposal is applied, they become regular evaluations with the same ids.
 
 use crate::{
     column::{Instant, Json},
@@ -108,7 +107,7 @@ macro_rules! select_proposed_evaluations {
                       r.episodes_per_task * json_array_length(r.tasks) AS "episodes_total!: u32",
                       d.created_at AS "created_at: Instant", d.state, d.finished_at AS "finished_at: Instant",
                       d.reason, d.dataset, d.dataset_blake3, d.result AS "result: Json<EvaluationResult>"
-               FROM drafts d JOIN runs r ON r.id = d.run_id "# + $tail,
+               FROM proposed_evaluations d JOIN runs r ON r.id = d.run_id "# + $tail,
             $argument
         )
     };
@@ -142,7 +141,7 @@ pub(crate) async fn of_run(
     let run = Text(run);
     let found = sqlx::query!(
         r#"SELECT id AS "id: Text<EvaluationId>", proposal_id AS "proposal: Text<ProposalId>"
-           FROM drafts WHERE run_id = ?"#,
+           FROM proposed_evaluations WHERE run_id = ?"#,
         run
     )
     .fetch_optional(connection)
@@ -159,7 +158,8 @@ pub(crate) async fn of_job(
     let found = sqlx::query!(
         r#"SELECT d.id AS "id: Text<EvaluationId>", d.run_id AS "run: Text<RunId>",
                   d.proposal_id AS "proposal: Text<ProposalId>"
-           FROM draft_finalisations f JOIN drafts d ON d.id = f.draft_id WHERE f.unit_id = ?"#,
+           FROM proposed_evaluation_scorings s JOIN proposed_evaluations d ON d.id = s.proposed_evaluation_id
+           WHERE s.job_id = ?"#,
         job
     )
     .fetch_optional(connection)
@@ -172,7 +172,8 @@ pub(crate) async fn insert(connection: &mut SqliteConnection, new: &ProposedEval
     let (team, replaces, run) = (Text(new.team), new.replaces.map(Text), Text(new.run));
     let created_at = Instant(new.created_at);
     sqlx::query!(
-        "INSERT INTO drafts (id, proposal_id, submission_id, team_id, replaces, run_id, created_at, state)
+        "INSERT INTO proposed_evaluations
+             (id, proposal_id, submission_id, team_id, replaces, run_id, created_at, state)
          VALUES (?, ?, ?, ?, ?, ?, ?, 'open')",
         id,
         proposal,
@@ -195,7 +196,7 @@ pub(crate) async fn insert_scoring(
 ) -> Result<()> {
     let (id, job) = (Text(id), Text(job));
     sqlx::query!(
-        "INSERT INTO draft_finalisations (draft_id, unit_id) VALUES (?, ?)",
+        "INSERT INTO proposed_evaluation_scorings (proposed_evaluation_id, job_id) VALUES (?, ?)",
         id,
         job
     )
@@ -211,7 +212,7 @@ pub(crate) async fn job_of(
 ) -> Result<Option<Uuid>> {
     let id = Text(id);
     let job = sqlx::query_scalar!(
-        r#"SELECT unit_id AS "id: Text<Uuid>" FROM draft_finalisations WHERE draft_id = ?"#,
+        r#"SELECT job_id AS "id: Text<Uuid>" FROM proposed_evaluation_scorings WHERE proposed_evaluation_id = ?"#,
         id
     )
     .fetch_optional(connection)
@@ -229,7 +230,8 @@ pub(crate) async fn set_finished(
 ) -> Result<()> {
     let (id, result, now) = (Text(id), Json(result), Instant(now));
     sqlx::query!(
-        "UPDATE drafts SET state = 'finished', finished_at = ?, result = ?, dataset = ?, dataset_blake3 = ?
+        "UPDATE proposed_evaluations SET state = 'finished', finished_at = ?, result = ?, dataset = ?,
+                                         dataset_blake3 = ?
          WHERE id = ?",
         now,
         result,
@@ -255,7 +257,7 @@ pub(crate) async fn set_failed(
         Failure::Cancelled(reason) | Failure::NotPlayed(reason) => ("cancelled", Some(reason)),
     };
     sqlx::query!(
-        "UPDATE drafts SET state = ?, finished_at = ?, reason = ? WHERE id = ?",
+        "UPDATE proposed_evaluations SET state = ?, finished_at = ?, reason = ? WHERE id = ?",
         state,
         now,
         reason,
@@ -273,7 +275,7 @@ pub(crate) async fn count_open(
 ) -> Result<u32> {
     let proposal = proposal.map(Text);
     Ok(sqlx::query_scalar!(
-        r#"SELECT COUNT(*) AS "count!: u32" FROM drafts
+        r#"SELECT COUNT(*) AS "count!: u32" FROM proposed_evaluations
            WHERE state = 'open' AND (?1 IS NULL OR proposal_id = ?1)"#,
         proposal
     )
@@ -289,7 +291,7 @@ pub(crate) async fn dropped_with_datasets(
     let before = Instant(before);
     let rows = sqlx::query!(
         r#"SELECT d.id AS "id: Text<EvaluationId>", d.dataset AS "dataset!"
-           FROM proposals p JOIN drafts d ON d.proposal_id = p.id
+           FROM proposals p JOIN proposed_evaluations d ON d.proposal_id = p.id
            WHERE p.outcome = 'dropped' AND p.settled_at <= ? AND d.dataset IS NOT NULL AND d.dataset_removed_at IS NULL"#,
         before
     )
@@ -308,7 +310,7 @@ pub(crate) async fn set_dataset_removed(
 ) -> Result<()> {
     let (id, now) = (Text(id), Instant(now));
     sqlx::query!(
-        "UPDATE drafts SET dataset_removed_at = ? WHERE id = ?",
+        "UPDATE proposed_evaluations SET dataset_removed_at = ? WHERE id = ?",
         now,
         id
     )

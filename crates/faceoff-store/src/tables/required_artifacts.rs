@@ -34,7 +34,7 @@ pub(crate) async fn all(connection: &mut SqliteConnection) -> Result<Vec<Require
         r#"/* backup */ SELECT dataset AS "dataset!", dataset_blake3 FROM evaluations
            WHERE dataset IS NOT NULL AND dataset_removed_at IS NULL
            UNION
-           SELECT dataset AS "dataset!", dataset_blake3 FROM drafts
+           SELECT dataset AS "dataset!", dataset_blake3 FROM proposed_evaluations
            WHERE dataset IS NOT NULL AND dataset_removed_at IS NULL
              AND proposal_id NOT IN (SELECT id FROM proposals WHERE outcome = 'dropped')
            ORDER BY 1"#
@@ -49,7 +49,7 @@ pub(crate) async fn all(connection: &mut SqliteConnection) -> Result<Vec<Require
         r#"/* backup */ SELECT s.recording AS "recording!" FROM shards s
            WHERE s.recording IS NOT NULL
              AND (s.run_id IN (SELECT run_id FROM evaluations WHERE state = 'open')
-                  OR s.run_id IN (SELECT run_id FROM drafts WHERE state = 'open'))
+                  OR s.run_id IN (SELECT run_id FROM proposed_evaluations WHERE state = 'open'))
            ORDER BY s.run_id, s.position"#
     )
     .fetch_all(&mut *connection)

@@ -163,7 +163,7 @@ pub(crate) async fn idle_bundles(
              AND ((SELECT closed_at FROM season) IS NOT NULL
                   OR NOT EXISTS (SELECT 1 FROM evaluations e JOIN stages st ON st.id = e.stage_id
                                  WHERE e.submission_id = s.id AND st.finalised_at IS NULL))
-             AND NOT EXISTS (SELECT 1 FROM drafts d JOIN proposals p ON p.id = d.proposal_id
+             AND NOT EXISTS (SELECT 1 FROM proposed_evaluations d JOIN proposals p ON p.id = d.proposal_id
                              WHERE d.submission_id = s.id AND p.outcome IS NULL)
              AND NOT EXISTS (SELECT 1 FROM ablations a WHERE a.submission_id = s.id AND a.finished_at IS NULL)
              AND NOT EXISTS (SELECT 1 FROM round_submissions r JOIN tournaments o ON o.id = r.tournament_id
@@ -196,7 +196,7 @@ pub(crate) async fn set_dataset_removed(
     .execute(&mut *connection)
     .await?;
     sqlx::query!(
-        "UPDATE drafts SET dataset_removed_at = ? WHERE id = ? AND dataset IS NOT NULL",
+        "UPDATE proposed_evaluations SET dataset_removed_at = ? WHERE id = ? AND dataset IS NOT NULL",
         now,
         id,
     )
@@ -248,7 +248,7 @@ pub(crate) async fn unmeasured(
         r#"SELECT id AS "id!: Text<EvaluationId>", dataset AS "dataset!: String" FROM evaluations
            WHERE state = 'finished' AND dataset_bytes IS NULL AND dataset_removed_at IS NULL
            UNION
-           SELECT id, dataset FROM drafts
+           SELECT id, dataset FROM proposed_evaluations
            WHERE state = 'finished' AND dataset_bytes IS NULL AND dataset_removed_at IS NULL"#
     )
     .fetch_all(connection)
@@ -276,7 +276,7 @@ pub(crate) async fn set_measured(
     .execute(&mut *connection)
     .await?;
     sqlx::query!(
-        "UPDATE drafts SET dataset_bytes = ? WHERE id = ? AND state = 'finished'",
+        "UPDATE proposed_evaluations SET dataset_bytes = ? WHERE id = ? AND state = 'finished'",
         bytes,
         id
     )
@@ -292,7 +292,8 @@ pub(crate) async fn copy_dataset_bytes(
 ) -> Result<()> {
     let id = Text(id);
     sqlx::query!(
-        "UPDATE evaluations SET dataset_bytes = (SELECT d.dataset_bytes FROM drafts d WHERE d.id = evaluations.id)
+        "UPDATE evaluations SET dataset_bytes =
+             (SELECT d.dataset_bytes FROM proposed_evaluations d WHERE d.id = evaluations.id)
          WHERE id = ?",
         id
     )

@@ -178,7 +178,7 @@ pub(crate) async fn with_old_recordings(
     let before = Instant(before);
     let runs = sqlx::query_scalar!(
         r#"SELECT r.id AS "id: Text<RunId>"
-           FROM runs r LEFT JOIN evaluations e ON e.run_id = r.id LEFT JOIN drafts d ON d.run_id = r.id
+           FROM runs r LEFT JOIN evaluations e ON e.run_id = r.id LEFT JOIN proposed_evaluations d ON d.run_id = r.id
            WHERE r.keeps_recordings = 1 AND r.recordings_removed_at IS NULL
              AND COALESCE(e.finished_at, d.finished_at) <= ?"#,
         before,
@@ -216,7 +216,7 @@ pub(crate) async fn clearable(
                   r.state = 'played'
                       AND NOT EXISTS (SELECT 1 FROM episode_summaries s WHERE s.run_id = r.id AND s.version = ?)
                       AS "wants_summary!: bool"
-           FROM runs r LEFT JOIN evaluations e ON e.run_id = r.id LEFT JOIN drafts d ON d.run_id = r.id
+           FROM runs r LEFT JOIN evaluations e ON e.run_id = r.id LEFT JOIN proposed_evaluations d ON d.run_id = r.id
            LEFT JOIN ablation_runs p ON p.run_id = r.id LEFT JOIN ablations a ON a.id = p.ablation_id
            WHERE r.cleared_at IS NULL AND COALESCE(e.finished_at, d.finished_at, a.finished_at) <= ?
            ORDER BY COALESCE(e.finished_at, d.finished_at, a.finished_at), r.id"#,

@@ -1,4 +1,4 @@
-//! Finalisations: jobs that score evaluations whose shards are all committed.
+//! Scoring jobs: they score evaluations whose shards are all committed.
 
 use crate::error::Result;
 use faceoff_types::EvaluationId;
@@ -12,7 +12,7 @@ pub(crate) async fn insert(
 ) -> Result<()> {
     let (evaluation, job) = (Text(evaluation), Text(job));
     sqlx::query!(
-        "INSERT INTO finalisations (evaluation_id, unit_id) VALUES (?, ?)",
+        "INSERT INTO scorings (evaluation_id, job_id) VALUES (?, ?)",
         evaluation,
         job,
     )
@@ -28,7 +28,7 @@ pub(crate) async fn of_job(
 ) -> Result<Option<EvaluationId>> {
     let job = Text(job);
     let found = sqlx::query_scalar!(
-        r#"SELECT evaluation_id AS "id: Text<EvaluationId>" FROM finalisations WHERE unit_id = ?"#,
+        r#"SELECT evaluation_id AS "id: Text<EvaluationId>" FROM scorings WHERE job_id = ?"#,
         job
     )
     .fetch_optional(connection)
@@ -43,7 +43,7 @@ pub(crate) async fn job_of(
 ) -> Result<Option<Uuid>> {
     let evaluation = Text(evaluation);
     let found = sqlx::query_scalar!(
-        r#"SELECT unit_id AS "id: Text<Uuid>" FROM finalisations WHERE evaluation_id = ?"#,
+        r#"SELECT job_id AS "id: Text<Uuid>" FROM scorings WHERE evaluation_id = ?"#,
         evaluation
     )
     .fetch_optional(connection)

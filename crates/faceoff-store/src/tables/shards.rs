@@ -123,7 +123,7 @@ pub(crate) async fn of_job(
     job: Uuid,
 ) -> Result<Option<(RunId, Shard)>> {
     let job = Text(job);
-    Ok(select_shards!("WHERE unit_id = ?", job)
+    Ok(select_shards!("WHERE job_id = ?", job)
         .fetch_optional(connection)
         .await?
         .map(|row| (row.run.0, row.into())))
@@ -143,11 +143,11 @@ pub(crate) async fn committed_by(
     holder: &str,
 ) -> Result<Vec<CommittedShard>> {
     let rows = sqlx::query!(
-        r#"SELECT s.id AS "id: Text<ShardId>", s.unit_id AS "unit: Text<Uuid>", s.recording
-           FROM units u JOIN shards s ON s.unit_id = u.id JOIN runs r ON r.id = s.run_id
+        r#"SELECT s.id AS "id: Text<ShardId>", s.job_id AS "job: Text<Uuid>", s.recording
+           FROM jobs j JOIN shards s ON s.job_id = j.id JOIN runs r ON r.id = s.run_id
            -- 0 is what follows / among characters
-           WHERE u.state = 'done' AND u.worker >= 'remote/' AND u.worker < 'remote0'
-             AND u.worker >= ?1 || '/' AND u.worker < ?1 || '0'
+           WHERE j.state = 'done' AND j.worker >= 'remote/' AND j.worker < 'remote0'
+             AND j.worker >= ?1 || '/' AND j.worker < ?1 || '0'
              AND r.state = 'running' AND s.committed_at IS NOT NULL"#,
         holder,
     )
@@ -155,7 +155,7 @@ pub(crate) async fn committed_by(
     .await?;
     let committed = rows.into_iter().map(|row| CommittedShard {
         id: row.id.0,
-        job: row.unit.0,
+        job: row.job.0,
         recording: row.recording,
     });
     Ok(committed.collect())
@@ -187,7 +187,7 @@ pub(crate) async fn of_run(connection: &mut SqliteConnection, run: RunId) -> Res
 pub(crate) async fn open_jobs(connection: &mut SqliteConnection, run: RunId) -> Result<Vec<Uuid>> {
     let run = Text(run);
     let jobs = sqlx::query_scalar!(
-        r#"SELECT unit_id AS "id: Text<Uuid>" FROM shards WHERE run_id = ? AND committed_at IS NULL"#,
+        r#"SELECT job_id AS "id: Text<Uuid>" FROM shards WHERE run_id = ? AND committed_at IS NULL"#,
         run,
     )
     .fetch_all(connection)
@@ -205,7 +205,7 @@ pub(crate) async fn insert(
 ) -> Result<()> {
     let (id, run, job, task) = (Text(shard.id), Text(run), Text(job), Text(shard.task));
     sqlx::query!(
-        "INSERT INTO shards (id, run_id, unit_id, position, task, first_episode, end_episode)
+        "INSERT INTO shards (id, run_id, job_id, position, task, first_episode, end_episode)
          VALUES (?, ?, ?, ?, ?, ?, ?)",
         id,
         run,
@@ -312,14 +312,14 @@ pub(crate) async fn delete_without_faults(connection: &mut SqliteConnection, run
     let run = Text(run);
     let jobs = sqlx::query_scalar!(
         r#"DELETE FROM shards WHERE run_id = ? AND COALESCE(agent_faults, 0) = 0
-           RETURNING unit_id AS "unit: Text<Uuid>""#,
+           RETURNING job_id AS "job: Text<Uuid>""#,
         run,
     )
     .fetch_all(&mut *connection)
     .await?;
     let jobs = Json(jobs.iter().map(|job| job.0).collect::<Vec<_>>());
     sqlx::query!(
-        "DELETE FROM units WHERE id IN (SELECT value FROM json_each(?))",
+        "DELETE FROM jobs WHERE id IN (SELECT value FROM json_each(?))",
         jobs
     )
     .execute(connection)

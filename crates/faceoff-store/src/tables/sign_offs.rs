@@ -102,13 +102,13 @@ pub(crate) async fn final_cutoff(
     stage: StageId,
 ) -> Result<Option<Timestamp>> {
     let id = Text(stage);
-    let cut_at = sqlx::query_scalar!(
-        r#"SELECT cut_at AS "cut_at: Instant" FROM days WHERE stage_id = ? AND is_final = 1"#,
+    let cutoff_at = sqlx::query_scalar!(
+        r#"SELECT cutoff_at AS "cutoff_at: Instant" FROM days WHERE stage_id = ? AND is_final = 1"#,
         id
     )
     .fetch_optional(connection)
     .await?;
-    Ok(cut_at.map(|at| at.0))
+    Ok(cutoff_at.map(|at| at.0))
 }
 
 /// Marks a new day as its stage's final one.

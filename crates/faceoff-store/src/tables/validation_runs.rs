@@ -12,7 +12,7 @@ pub(crate) async fn insert(
 ) -> Result<()> {
     let (submission, job) = (Text(submission), Text(job));
     sqlx::query!(
-        "INSERT INTO smoke_runs (submission_id, unit_id) VALUES (?, ?)",
+        "INSERT INTO validation_runs (submission_id, job_id) VALUES (?, ?)",
         submission,
         job,
     )
@@ -28,7 +28,7 @@ pub(crate) async fn of_job(
 ) -> Result<Option<SubmissionId>> {
     let job = Text(job);
     let found = sqlx::query_scalar!(
-        r#"SELECT submission_id AS "id: Text<SubmissionId>" FROM smoke_runs WHERE unit_id = ?"#,
+        r#"SELECT submission_id AS "id: Text<SubmissionId>" FROM validation_runs WHERE job_id = ?"#,
         job
     )
     .fetch_optional(connection)

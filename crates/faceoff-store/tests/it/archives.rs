@@ -23,7 +23,7 @@ const PUBLIC_COLUMNS: &[(&str, &str)] = &[
     ("contestants", "run_id side submission_id"),
     (
         "days",
-        "cut_at day deadline_at is_final missed_for released_at stage_id",
+        "cutoff_at day deadline_at is_final missed_for released_at stage_id",
     ),
     ("divisions", "name position"),
     (
@@ -44,8 +44,8 @@ const PUBLIC_COLUMNS: &[(&str, &str)] = &[
     ),
     (
         "games",
-        "asked_by attempt away_submission_id away_team_id created_at ended_at game_no home_submission_id home_team_id id matchday \
-         meeting purpose reason replay round second_half seed state tournament_id unit_id",
+        "asked_by attempt away_submission_id away_team_id created_at ended_at game_no home_submission_id home_team_id id job_id matchday \
+         pairing purpose reason replay round second_half seed state tournament_id",
     ),
     ("lanes", "lane rank served_ms urgency"),
     ("programs", "id schema version"),
@@ -221,7 +221,7 @@ async fn archive_omits_open_evaluations_and_credentials() {
         }
         let mut connection = open(&file).await;
         let waiting: i64 =
-            sqlx::query_scalar("SELECT COUNT(*) FROM units WHERE state IN ('queued', 'leased')")
+            sqlx::query_scalar("SELECT COUNT(*) FROM jobs WHERE state IN ('queued', 'leased')")
                 .fetch_one(&mut connection)
                 .await
                 .unwrap();
@@ -273,7 +273,7 @@ async fn public_archive_has_results_without_episodes() {
     );
 
     let folder = export(&f, Edition::Public).await;
-    for table in ["shards", "units"] {
+    for table in ["shards", "jobs"] {
         assert_eq!(count(&database(&folder), table).await, 0, "{table}");
     }
     Store::import(folder.path(), f.now).await.unwrap();

@@ -32,7 +32,7 @@ async fn outcomes(f: &TestStore, evaluation: &Evaluation) -> Result<Vec<EpisodeO
 async fn cleared_run_keeps_summary_and_loses_shards() {
     let mut f = TestStore::new().await;
     let submission = f.ready_team("Alpha").await;
-    let jobs_before = rows(&f, "units").await;
+    let jobs_before = rows(&f, "jobs").await;
     let evaluation = f.evaluate(submission.id, &small()).await;
     f.run_all(50.0).await;
     let (board, outcomes_before) = (f.board().await, outcomes(&f, &evaluation).await.unwrap());
@@ -59,7 +59,7 @@ async fn cleared_run_keeps_summary_and_loses_shards() {
     assert_eq!(clearable(&f).await, []);
     assert_eq!(rows(&f, "shards").await, 0);
     // The evaluation's scoring job stays.
-    assert_eq!(rows(&f, "units").await, jobs_before + 1);
+    assert_eq!(rows(&f, "jobs").await, jobs_before + 1);
     assert!(!kinds(&f).await.contains(&"shard_committed".to_owned()));
     assert!(
         kinds(&f).await.contains(&"evaluation_finished".to_owned()),

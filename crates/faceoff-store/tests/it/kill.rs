@@ -437,7 +437,7 @@ async fn stored(folder: &Path) -> HashSet<String> {
          UNION SELECT 'finished ' || id FROM evaluations WHERE state = 'finished'
          UNION SELECT 'proposal ' || id FROM proposals
          UNION SELECT outcome || ' ' || id FROM proposals WHERE outcome IS NOT NULL
-         UNION SELECT 'finished ' || id FROM drafts WHERE state = 'finished'
+         UNION SELECT 'finished ' || id FROM proposed_evaluations WHERE state = 'finished'
          UNION SELECT 'finalised ' || id FROM stages WHERE finalised_at IS NOT NULL
          UNION SELECT 'voided ' || id FROM evaluations WHERE voided_at IS NOT NULL
          UNION SELECT 'joined ' || id FROM people
@@ -474,25 +474,25 @@ async fn check_consistency(folder: &Path, store: &Store) {
     let rules = [
         ("a submission without its validation run",
          "SELECT COUNT(*) FROM submissions s WHERE NOT EXISTS
-              (SELECT 1 FROM smoke_runs r JOIN units u ON u.id = r.unit_id WHERE r.submission_id = s.id)"),
+              (SELECT 1 FROM validation_runs r JOIN jobs j ON j.id = r.job_id WHERE r.submission_id = s.id)"),
         ("an evaluation without its contestant or all of its shards",
          "SELECT COUNT(*) FROM evaluations e
-              WHERE (SELECT COUNT(*) FROM shards s JOIN units u ON u.id = s.unit_id
+              WHERE (SELECT COUNT(*) FROM shards s JOIN jobs j ON j.id = s.job_id
                      WHERE s.run_id = e.run_id) <> 6
                  OR (SELECT COUNT(*) FROM contestants c WHERE c.run_id = e.run_id) <> 1"),
         ("a shard committed but not done, or done but not committed",
-         "SELECT COUNT(*) FROM shards s JOIN units u ON u.id = s.unit_id
-              WHERE (s.committed_at IS NOT NULL) <> (u.state = 'done')"),
+         "SELECT COUNT(*) FROM shards s JOIN jobs j ON j.id = s.job_id
+              WHERE (s.committed_at IS NOT NULL) <> (j.state = 'done')"),
         ("a complete run with an open shard, or an incomplete one without",
          "SELECT COUNT(*) FROM runs r WHERE (r.state = 'played')
                  = EXISTS (SELECT 1 FROM shards s WHERE s.run_id = r.id AND s.committed_at IS NULL)"),
         ("a scoring job too early or missing",
          "SELECT COUNT(*) FROM evaluations e
-              WHERE EXISTS (SELECT 1 FROM finalisations f WHERE f.evaluation_id = e.id)
+              WHERE EXISTS (SELECT 1 FROM scorings f WHERE f.evaluation_id = e.id)
                  = EXISTS (SELECT 1 FROM shards s WHERE s.run_id = e.run_id AND s.committed_at IS NULL)"),
         ("a finished evaluation whose scoring job is open",
-         "SELECT COUNT(*) FROM evaluations e JOIN finalisations f ON f.evaluation_id = e.id
-              JOIN units u ON u.id = f.unit_id WHERE (e.state = 'finished') <> (u.state = 'done')"),
+         "SELECT COUNT(*) FROM evaluations e JOIN scorings f ON f.evaluation_id = e.id
+              JOIN jobs j ON j.id = f.job_id WHERE (e.state = 'finished') <> (j.state = 'done')"),
         ("a day that is over and not released",
          "SELECT COUNT(*) FROM days d WHERE d.released_at IS NULL
               AND NOT EXISTS (SELECT 1 FROM evaluations e WHERE e.stage_id = d.stage_id AND e.day = d.day
@@ -521,11 +521,11 @@ async fn check_consistency(folder: &Path, store: &Store) {
                + (SELECT COUNT(*) FROM events WHERE kind = 'team_reinstated')"),
         ("a proposal without evaluations, or half applied",
          "SELECT COUNT(*) FROM proposals p
-              WHERE NOT EXISTS (SELECT 1 FROM drafts d WHERE d.proposal_id = p.id)
+              WHERE NOT EXISTS (SELECT 1 FROM proposed_evaluations d WHERE d.proposal_id = p.id)
                  OR (p.outcome IS NOT NULL AND EXISTS
-                     (SELECT 1 FROM drafts d WHERE d.proposal_id = p.id AND d.state = 'open'))
+                     (SELECT 1 FROM proposed_evaluations d WHERE d.proposal_id = p.id AND d.state = 'open'))
                  OR (p.outcome IS 'applied') <> EXISTS
-                     (SELECT 1 FROM drafts d JOIN evaluations e ON e.id = d.id WHERE d.proposal_id = p.id)"),
+                     (SELECT 1 FROM proposed_evaluations d JOIN evaluations e ON e.id = d.id WHERE d.proposal_id = p.id)"),
         ("an operation without its event",
          "SELECT (SELECT COUNT(*) FROM evaluations WHERE extra_for IS NOT NULL AND rerun_of IS NULL)
                + (SELECT COUNT(*) FROM days WHERE missed_for IS NOT NULL)

@@ -26,6 +26,7 @@ mod queue;
 mod queue_forecast;
 mod registrations;
 mod releases;
+mod renamed_tables;
 mod retention;
 mod retries;
 mod rulesets;

@@ -131,7 +131,7 @@ async fn incomplete_states_cannot_be_stored() {
         "UPDATE evaluations SET state = 'platform_failed', finished_at = 1",
         "UPDATE submissions SET state = 'invalid'",
         "UPDATE shards SET committed_at = 1, recording = 'r'",
-        "UPDATE units SET state = 'leased'",
+        "UPDATE jobs SET state = 'leased'",
         "UPDATE tokens SET hash = x'00'",
         "UPDATE tokens SET owner = 'person'",
         "UPDATE tokens SET kind = 'session'",

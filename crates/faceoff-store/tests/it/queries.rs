@@ -8,7 +8,7 @@ const LARGE: [&str; 8] = [
     "evaluations",
     "runs",
     "shards",
-    "units",
+    "jobs",
     "contestants",
     "events",
     "episode_summaries",
@@ -17,7 +17,7 @@ const LARGE: [&str; 8] = [
 
 /// Partial indexes of open or still stored rows: a scan of one reads only those.
 const SMALL_INDEXES: [&str; 7] = [
-    "units_open",
+    "jobs_open",
     "evaluations_open",
     "runs_with_recordings",
     "datasets_going",

@@ -218,7 +218,7 @@ impl TestStore {
             }
         }
         // Days are run one after the other; these represent parts of one day.
-        sqlx::query("UPDATE units SET batch = 0")
+        sqlx::query("UPDATE jobs SET batch = 0")
             .execute(&mut self.connection().await)
             .await
             .unwrap();
@@ -533,7 +533,7 @@ async fn claim_query_reads_open_jobs_only() {
     let claims: Vec<String> = query_data()
         .into_iter()
         .map(|(_, data)| data["query"].as_str().unwrap().to_owned())
-        .filter(|sql| sql.starts_with("UPDATE units") && sql.contains("FROM accounts a"))
+        .filter(|sql| sql.starts_with("UPDATE jobs") && sql.contains("FROM accounts a"))
         .collect();
     assert_eq!(claims.len(), 1, "a claim is one statement");
     let explain = sqlx::AssertSqlSafe(format!("EXPLAIN QUERY PLAN {}", claims[0])).into_sql_str();
@@ -544,11 +544,11 @@ async fn claim_query_reads_open_jobs_only() {
     let steps: Vec<String> = plan.iter().map(|step| step.get("detail")).collect();
     let of_units: Vec<_> = steps
         .iter()
-        .filter(|step| [" u ", " f ", " units "].iter().any(|of| step.contains(of)))
+        .filter(|step| [" j ", " f ", " jobs "].iter().any(|of| step.contains(of)))
         .collect();
     assert!(of_units.len() >= 2, "{steps:#?}");
     for step in of_units {
-        let by_index = step.contains("units_open (account_no=?")
+        let by_index = step.contains("jobs_open (account_no=?")
             || step.contains("INTEGER PRIMARY KEY (rowid=?)");
         assert!(by_index, "{step} in {steps:#?}");
     }

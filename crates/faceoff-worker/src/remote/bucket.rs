@@ -2,7 +2,7 @@
 //! expire, but no credentials.
 
 use anyhow::Context as _;
-use faceoff_dataset::files_of;
+use faceoff_dataset::writable_files;
 use faceoff_store::Artifacts;
 use faceoff_types::BundleRef;
 use faceoff_wire::{grant::Grant, remote::ObjectLinks};
@@ -120,7 +120,7 @@ impl Bucket {
             bundles.insert(bundle.blake3.clone(), link.to_string());
         }
         let mut files = BTreeMap::new();
-        for name in files_of(grant) {
+        for name in writable_files(grant) {
             let key = self.file(grant.nonce, name);
             let link = self
                 .objects
@@ -169,7 +169,7 @@ impl Bucket {
 
     /// Copies the files that were stored under a grant into the artifacts.
     pub(super) async fn fetch_files(&self, grant: &Grant, artifacts: &Artifacts) -> anyhow::Result<()> {
-        for name in files_of(grant) {
+        for name in writable_files(grant) {
             let Some(to) = grant.storage_key(name) else {
                 continue;
             };
@@ -201,7 +201,7 @@ impl Bucket {
 
     /// Deletes the files that were stored under a grant, after they were copied or refused.
     pub(super) async fn delete_files(&self, grant: &Grant) {
-        let keys = files_of(grant)
+        let keys = writable_files(grant)
             .iter()
             .map(|name| Ok(self.file(grant.nonce, name)));
         let keys = futures::stream::iter(keys.collect::<Vec<_>>()).boxed();

@@ -13,7 +13,7 @@ use crate::{
 use faceoff_metrics::Metrics;
 use faceoff_replay::{EpisodeLine, Key, PackWriter, ClipIndex};
 use faceoff_runner::{
-    AgentEnvironment, Assembled, CLIPS_FILE, EvaluationMeta, LiveFeedSink, GameReport, GameSpec,
+    AgentEnvironment, AssembledDataset, CLIPS_FILE, EvaluationMeta, LiveFeedSink, GameReport, GameSpec,
     Observer, PlatformFault, ShardReport, ShardSpec, ValidationReport, ValidationSpec, TimeLimits,
     bundle::{Bundle, BundleError, BundleLimits},
 };
@@ -226,7 +226,7 @@ impl Evaluator for Scripted {
         recordings: &[PathBuf],
         archive: &Path,
         clips: &Path,
-    ) -> Result<Assembled, PlatformFault> {
+    ) -> Result<AssembledDataset, PlatformFault> {
         let parts = recordings
             .iter()
             .map(|folder| std::fs::read_to_string(folder.join("steps.parquet")).unwrap())
@@ -235,7 +235,7 @@ impl Evaluator for Scripted {
         std::fs::write(archive, &bytes).unwrap();
         std::fs::write(clips, "clips").unwrap();
         *self.assembled.lock().unwrap() = parts;
-        Ok(Assembled {
+        Ok(AssembledDataset {
             result: result(meta),
             archive: FileDigest {
                 bytes: bytes.len() as u64,

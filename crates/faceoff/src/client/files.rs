@@ -33,7 +33,7 @@ impl Client {
         published: &str,
         bar: &ProgressBar,
     ) -> anyhow::Result<DownloadedFile> {
-        let path = format!("/submissions/{id}/archive");
+        let path = format!("/submissions/{id}/bundle");
         self.download(&path, file, Some(published), bar).await
     }
 

@@ -23,7 +23,7 @@ impl Client {
     pub async fn link(&self, target: LinkTarget, new: NewLink) -> anyhow::Result<LinkView> {
         let path = match target {
             LinkTarget::Dataset(id) => format!("/evaluations/{id}/dataset/link"),
-            LinkTarget::Submission(id) => format!("/submissions/{id}/archive/link"),
+            LinkTarget::Submission(id) => format!("/submissions/{id}/bundle/link"),
             LinkTarget::Side(id, side) => format!("/games/{id}/sides/{}/link", side.number()),
             LinkTarget::Recording(id) => format!("/games/{id}/recording/link"),
         };

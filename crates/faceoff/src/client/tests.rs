@@ -155,7 +155,7 @@ async fn submission_passes_from_upload_to_evaluation() {
     assert_eq!(client.activate(uploaded.id).await.unwrap(), valid);
     let me = client.me().await.unwrap();
     assert_eq!(me.active_submission, Some(uploaded.id));
-    let next_cutoff = me.next_cut.expect("the season is open");
+    let next_cutoff = me.next_cutoff.expect("the season is open");
     assert_eq!(
         next_cutoff.to_string(),
         "2026-03-01 (UTC) at the earliest, started by an organiser"
@@ -208,7 +208,7 @@ async fn submission_passes_from_upload_to_evaluation() {
     );
     let storage = client.team_storage(team.team.id).await.unwrap();
     assert_eq!(
-        (storage.archives, storage.archive_bytes),
+        (storage.bundles, storage.bundle_bytes),
         (1, uploaded.bytes)
     );
     let all = site.organiser.storage().await.unwrap();

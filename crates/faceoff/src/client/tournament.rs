@@ -48,7 +48,7 @@ impl Client {
     }
 
     /// How often each team won when the whole schedule was replayed.
-    pub async fn certainty(&self, id: TournamentId) -> anyhow::Result<ChampionSharesView> {
+    pub async fn champion_shares(&self, id: TournamentId) -> anyhow::Result<ChampionSharesView> {
         self.get(&tournament_path(id, "/certainty")).await
     }
 
@@ -75,7 +75,7 @@ impl Client {
     }
 
     /// Organiser: removes a team from a tournament.
-    pub async fn depart(
+    pub async fn record_departure(
         &self,
         id: TournamentId,
         departure: &NewDeparture,
@@ -148,7 +148,7 @@ impl Client {
 
     /// Team: its friendly and test games, the newest first. Organiser: all of them.
     pub async fn uncounted_games(&self, id: TournamentId) -> anyhow::Result<Vec<GameView>> {
-        self.list(self.request(Method::GET, &tournament_path(id, "/free-games")))
+        self.list(self.request(Method::GET, &tournament_path(id, "/uncounted-games")))
             .await
     }
 

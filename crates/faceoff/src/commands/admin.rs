@@ -291,7 +291,7 @@ impl AdminCommand {
                             .iter()
                             .map(|team| format!("{:<40} no valid submission", team.name)),
                     );
-                    let exclusions = day.not_taken.iter();
+                    let exclusions = day.excluded.iter();
                     lines.extend(
                         exclusions.map(|one| format!("{:<40} {}", one.team_name, one.reason)),
                     );

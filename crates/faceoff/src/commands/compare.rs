@@ -138,7 +138,7 @@ struct Evaluation {
 
 fn open(path: &str) -> anyhow::Result<Evaluation> {
     let read = || -> anyhow::Result<Evaluation> {
-        let dataset = Dataset::open_unread(Path::new(path))?;
+        let dataset = Dataset::open_lazily(Path::new(path))?;
         let episodes = dataset.episodes()?.into_iter();
         let outcomes: Vec<EpisodeOutcome> = episodes.map(|record| record.outcome).collect();
         Ok(Evaluation {

@@ -3,11 +3,11 @@ use faceoff_types::SubmissionId;
 
 /// When a submission of the team will be evaluated.
 pub(super) fn next_cutoff_text(me: &MeView, submission: SubmissionId) -> String {
-    match (&me.next_cut, me.active_submission) {
+    match (&me.next_cutoff, me.active_submission) {
         (None, _) => "no further evaluation days: the season or its last stage is closed".to_owned(),
         (Some(cutoff), Some(active)) if active == submission => {
             let (at_cutoff, other_stages): (Vec<_>, Vec<_>) =
-                me.not_taken.iter().partition(|exclusion| exclusion.stage == cutoff.stage);
+                me.excluded_by.iter().partition(|exclusion| exclusion.stage == cutoff.stage);
                 let mut text = match at_cutoff.first() {
                     Some(exclusion) => format!(
                         "it is active, but excluded from the next cutoff ({cutoff}): {}",

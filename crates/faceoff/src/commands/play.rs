@@ -13,7 +13,7 @@ use anyhow::{Context, bail};
 use bar::Bar;
 use platform_fault::with_advice;
 use clap::Args;
-use faceoff_dataset::game::{GAME_FILE, clear_game, side_file};
+use faceoff_dataset::game::{GAME_FILE, remove_game, side_file};
 use faceoff_runner::GameReport;
 use faceoff_types::Side;
 use options::PlayOptions;
@@ -63,7 +63,7 @@ impl PlayCommand {
         }
         // If this game has no result, the files of an earlier game must not be mistaken for it.
         let results = Results::clear_in(out)?;
-        clear_game(out).with_context(|| format!("clearing {}", out.display()))?;
+        remove_game(out).with_context(|| format!("clearing {}", out.display()))?;
         let matchup = Matchup::open(options, config)?;
         match series {
             Some((kind, count)) => series::play(options, &matchup, kind, count, &results),

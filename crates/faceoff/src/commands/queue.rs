@@ -8,6 +8,6 @@ pub fn queue_text(queue: &QueueView) -> String {
     };
     format!(
         "position {} of {}, {expected}",
-        queue.place, queue.of
+        queue.position, queue.total
     )
 }

@@ -126,7 +126,7 @@ impl TeamStatus {
         };
         let submissions = status.me.validating.iter_mut().map(|submission| &mut submission.queue);
         let evaluations = status.evaluations.iter_mut().map(|evaluation| &mut evaluation.queue);
-        let today = std::iter::once(&mut status.me.turn.queue);
+        let today = std::iter::once(&mut status.me.today.queue);
         for queue in submissions.chain(evaluations).chain(today).flatten() {
             queue.expected_at = None;
             }

@@ -23,8 +23,8 @@ pub(super) fn storage_line(storage: &StorageView) -> String {
     let mut line = format!(
         "{:<40} {} bundles, {} of {}; {} datasets, {}",
         storage.team_name,
-        storage.archives,
-        bytes(storage.archive_bytes),
+        storage.bundles,
+        bytes(storage.bundle_bytes),
         bytes(storage.quota_bytes),
         storage.datasets,
         bytes(storage.dataset_bytes)

@@ -168,18 +168,18 @@ pub(super) async fn withdraw(
 /// The team's current state, line by line.
 pub(super) fn status_lines(me: &MeView) -> Vec<String> {
     let mut lines = Vec::new();
-    match (&me.turn.evaluation, &me.turn.next) {
+    match (&me.today.evaluation, &me.today.next) {
         (Some(evaluation), next) => {
-            lines.push(format!("{}: evaluation {evaluation}", me.turn.day));
+            lines.push(format!("{}: evaluation {evaluation}", me.today.day));
             lines.extend(
-                me.turn
+                me.today
                     .queue
                     .as_ref()
                     .map(|queue| format!("  {}", queue_text(queue))),
             );
             lines.extend(next.as_ref().map(|next| format!("  next: {next}")));
         }
-        (None, _) => lines.push(format!("{}: no evaluation of the team", me.turn.day)),
+        (None, _) => lines.push(format!("{}: no evaluation of the team", me.today.day)),
     }
     for pending in &me.validating {
         lines.push(format!("submission {}: validating", pending.submission));
@@ -221,7 +221,7 @@ pub(super) fn submission_line(submission: &SubmissionView) -> String {
     if submission.withdrawn_at.is_some() {
         line.push_str(", withdrawn");
     }
-    match (&submission.deleted, &submission.archive_removed) {
+    match (&submission.deleted, &submission.bundle_removed) {
         (Some(deleted), Some(removed)) => line.push_str(&format!(
             ", deleted on {} {}",
             deleted.at.strftime("%Y-%m-%d %H:%M UTC"),

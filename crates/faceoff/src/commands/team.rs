@@ -142,7 +142,7 @@ async fn act(client: &Client, json: bool, action: Action) -> anyhow::Result<()> 
             print(json, &storage, || storage_line(&storage))
         }
         Action::Members => {
-            let people = client.people().await?;
+            let people = client.users().await?;
             print(json, &people, || {
                 let lines = people.iter().map(person_line).collect();
                 lines_or(lines, "no members yet; invite one with faceoff team invite NOTE")
@@ -169,7 +169,7 @@ async fn act(client: &Client, json: bool, action: Action) -> anyhow::Result<()> 
         }
         Action::Leave { confirm } => {
             let id = own_person(client).await?;
-            let person = client.remove_person(id, confirm).await?;
+            let person = client.remove_user(id, confirm).await?;
             print(json, &person, || person_line(&person))
         }
         Action::Retire { confirm } => {

@@ -96,7 +96,7 @@ impl TournamentCommand {
             }
             Action::Certainty { tournament } => {
                 let id = find_tournament_or_newest(&client, tournament.as_deref()).await?;
-                let certainty = client.certainty(id).await?;
+                let certainty = client.champion_shares(id).await?;
                 print(self.server.json, &certainty, || text::champion_shares_text(&certainty))
             }
             Action::Withdraw {

@@ -9,7 +9,7 @@ use clap::Args;
 use faceoff_dataset::{
     Dataset,
     game::GameRecording,
-    verify::{Difference, SeasonClaim, Verified, VerifyError, verify},
+    verify::{Difference, SeasonClaim, VerifiedDataset, VerifyError, verify},
 };
 use faceoff_types::{EvaluationResult, Seed, StageId};
 use failure::{Failure, check_hash};
@@ -192,7 +192,7 @@ impl VerifyCommand {
 fn with_progress(
     dataset: &Dataset,
     workers: NonZero<usize>,
-) -> Result<(Verified, Duration), Failure> {
+) -> Result<(VerifiedDataset, Duration), Failure> {
     let episodes = dataset.manifest().episodes.values();
     let bar = ProgressBar::new(episodes.map(|count| u64::from(*count)).sum()).with_style(
         ProgressStyle::with_template("{bar:40} {pos}/{len} episodes, {per_sec}, {eta} left")

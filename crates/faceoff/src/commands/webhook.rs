@@ -190,8 +190,8 @@ fn webhook_line(webhook: &WebhookView) -> String {
 fn delivery_line(delivery: &DeliveryView) -> String {
     let state = match delivery.state {
         DeliveryStateView::Waiting { next_at } => format!("next attempt at {}", time_text(next_at)),
-        DeliveryStateView::Delivered { settled_at } => format!("delivered {}", time_text(settled_at)),
-        DeliveryStateView::GivenUp { settled_at } => format!("failed {}", time_text(settled_at)),
+        DeliveryStateView::Delivered { ended_at: settled_at } => format!("delivered {}", time_text(settled_at)),
+        DeliveryStateView::GivenUp { ended_at: settled_at } => format!("failed {}", time_text(settled_at)),
     };
     let last = delivery.last.as_ref().map_or_else(String::new, |last| {
         let status = last

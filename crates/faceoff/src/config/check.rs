@@ -2,7 +2,7 @@
 
 use super::Config;
 use anyhow::{Context as _, bail, ensure};
-use faceoff_dataset::has_robot;
+use faceoff_dataset::can_draw_plant;
 use faceoff_types::{
     DayDeadline, IMAGE_RUNTIME, MAX_DEADLINE_H, MAX_EPISODES_PER_TASK, MismatchSettings, Seed,
 };
@@ -61,7 +61,7 @@ impl Config {
         let [least, most] = settings.model_mismatch.static_error_m;
         ensure!(
             settings.model_mismatch == MismatchSettings::default()
-                || has_robot(&settings, mismatch_seed),
+                || can_draw_plant(&settings, mismatch_seed),
             "evaluation.perturbations: none of 300 robots drawn from these ranges of mass and gains has its largest static \
             error within {least} to {most} m (model_mismatch.static_error_m); widen one of the ranges"
         );

@@ -320,11 +320,11 @@ fn sandbox_page_has_the_default_limits() {
             "| log that is kept (standard error) | the last {} KiB |",
             limits.stderr_tail_bytes >> 10
         ),
-        format!("| to start, until `ready` | {} s |", time.startup_s),
-        format!("| to answer `reset` | {} s |", time.reset_s),
-        format!("| to answer `step`, at most | {} s |", time.step_s),
+        format!("| start, until `ready` | {} s |", time.startup_s),
+        format!("| answer to `reset` | {} s |", time.reset_s),
+        format!("| answer to `step` | {} s |", time.step_s),
         format!(
-            "| to answer `step`, mean of an upload's check | {} s |",
+            "| answer to `step`, mean of the validation run | {} s |",
             time.mean_s
         ),
         format!(
@@ -333,7 +333,7 @@ fn sandbox_page_has_the_default_limits() {
         ),
         format!("| shared memory | {} |", mebibytes(limits.scratch_bytes)),
         format!(
-            "largest file that may be written has {}",
+            "A file may have at most {}",
             mebibytes(limits.file_size_bytes)
         ),
     ] {

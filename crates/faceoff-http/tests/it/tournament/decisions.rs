@@ -37,14 +37,14 @@ async fn withdrawn_team_keeps_its_finished_rounds() {
     );
     assert_eq!(problem["confirm"], "A");
     assert_eq!(
-        cup.view().await["entrants"][0].get("left"),
+        cup.view().await["entrants"][0].get("departure"),
         None,
         "nothing has changed"
     );
     let mut confirmed = departure;
     confirmed["confirm"] = json!("A");
     let view = cup.post("departures", confirmed.clone()).await.json(200);
-    let left = &view["entrants"][0]["left"];
+    let left = &view["entrants"][0]["departure"];
     assert_eq!(
         [&left["as"], &left["from_round"], &left["reason"]],
         [&json!("withdrawn"), &json!(2), &json!("the arm is sold")]
@@ -63,10 +63,10 @@ async fn withdrawn_team_keeps_its_finished_rounds() {
         let (home, away) = team_names(&game);
         let with_a = [home, away].contains(&"A".to_owned());
         if game["round"] == 2 && with_a {
-            assert_eq!(game["taken_out_by"], "A");
+            assert_eq!(game["excluded_by"], "A");
             assert_ne!(game["state"], "queued");
         } else {
-            assert_eq!(game.get("taken_out_by"), None);
+            assert_eq!(game.get("excluded_by"), None);
             assert_eq!(game["state"], "played");
         }
     }
@@ -144,7 +144,7 @@ async fn team_is_withdrawn_by_a_member_not_by_its_token() {
             &["A would be withdrawn", "2 of its games"],
         );
     let view = cup.site.post(&path, Some(&ada), &body).await.json(200);
-    assert_eq!(view["entrants"][0]["left"]["as"], "withdrawn");
+    assert_eq!(view["entrants"][0]["departure"]["as"], "withdrawn");
     let log = cup
         .site
         .get("/api/v1/events?kind=team_left_tournament", Some(ADMIN))

@@ -53,11 +53,11 @@ async fn delete(cup: &Cup, path: &str, token: &str) -> Answer {
 async fn test_game_is_private_and_does_not_count() {
     let cup = cup_with_baseline(&["A", "B"], json!({})).await;
     let created = test_game(&cup, "A").await.json(201);
-    let game = &created["ordered"][0];
+    let game = &created["queued"][0];
     assert_eq!(
         (
             &game["purpose"],
-            &game["asked_by"],
+            &game["requested_by"],
             &game["sides"][1]["team_name"]
         ),
         (&json!("test"), &json!("A"), &json!("Organisers"))
@@ -90,7 +90,7 @@ async fn test_game_is_private_and_does_not_count() {
     assert_eq!(view["tables"][0]["standings"], json!([]));
     assert_eq!(cup.games().await, Vec::<Value>::new());
     let listed = async |token: &str| {
-        let path = format!("{}/free-games", cup.path);
+        let path = format!("{}/uncounted-games", cup.path);
         cup.site
             .get(&path, Some(token))
             .await
@@ -119,7 +119,7 @@ async fn daily_quota_of_test_games_applies_to_teams_only() {
         format!("/api/v1/games/{}", string(&played.json(201)["id"]))
     );
     let refused = test_game(&cup, "A").await;
-    let problem = refused.problem(429, "free-games-spent", &["at most 2", "requested 2"]);
+    let problem = refused.problem(429, "daily-game-quota-exceeded", &["at most 2", "requested 2"]);
     assert_eq!(
         (&problem["limit"], &problem["used"]),
         (&json!(2), &json!(2))
@@ -131,11 +131,11 @@ async fn daily_quota_of_test_games_applies_to_teams_only() {
     );
     friendly(&cup, "A", "B")
         .await
-        .problem(429, "free-games-spent", &[]);
+        .problem(429, "daily-game-quota-exceeded", &[]);
     // B has its own quota, and organisers have no limit.
     friendly(&cup, "B", "a").await.json(201);
     let all = cup.post("test-games", json!({})).await.json(201);
-    assert_eq!(all["ordered"].as_array().unwrap().len(), 2);
+    assert_eq!(all["queued"].as_array().unwrap().len(), 2);
     let some = cup
         .post("test-games", json!({ "teams": ["A", "Organisers"] }))
         .await;

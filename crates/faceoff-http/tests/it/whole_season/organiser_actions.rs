@@ -265,7 +265,7 @@ impl Season {
 
     async fn start_extra_evaluation(&mut self) {
         let (stage, day) = (self.stage_of(EXTRA_EVALUATION), date(EXTRA_EVALUATION - 1));
-        let path = format!("/stages/{stage}/days/{day}/extra-turn");
+        let path = format!("/stages/{stage}/days/{day}/extra-evaluation");
         let team = &self.teams[9];
         let mut body = json!({ "team": team.team.id, "reason": "its cable was cut" });
         self.post(&path, body.clone())

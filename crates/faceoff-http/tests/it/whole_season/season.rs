@@ -174,9 +174,9 @@ impl Season {
     pub async fn evening(&mut self, day: i32) -> usize {
         let stage = self.stage_of(day);
         let shown = self.get(&format!("/stages/{stage}")).await;
-        let cutoff: Timestamp = string(&shown["next_cut"]["at"]).parse().unwrap();
+        let cutoff: Timestamp = string(&shown["next_cutoff"]["at"]).parse().unwrap();
         assert_eq!(
-            (cutoff, &shown["next_cut"]["day"]),
+            (cutoff, &shown["next_cutoff"]["day"]),
             (at(day, 18), &json!(date(day)))
         );
         self.site.set_time(cutoff - SignedDuration::from_millis(1));

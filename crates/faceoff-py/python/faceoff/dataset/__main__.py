@@ -31,12 +31,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="python -m faceoff.dataset",
-        description="Looks into recordings of evaluations and games, and writes them in other layouts.",
+        description="Summarises recordings of evaluations and games, and exports datasets in other layouts.",
     )
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
-    recording = "dataset.zip or game.zip, the folder it was unpacked to, or the one it was written to"
+    recording = "dataset.zip or game.zip, a folder with its content, or the output folder of eval or play"
 
-    info = commands.add_parser("info", help="what is in a recording")
+    info = commands.add_parser("info", help="summarise a recording")
     info.add_argument("recording", help=recording)
     info.add_argument("--json", action="store_true", help="print it as a JSON object")
     info.set_defaults(run=_info)
@@ -47,14 +47,14 @@ def _parser() -> argparse.ArgumentParser:
         "--layout",
         required=True,
         choices=("2023", "minari", "lerobot"),
-        help="of the 2023 challenge (a folder per task), a Minari dataset, or LeRobot v3.0 (a folder per task)",
+        help="the 2023 challenge's (a folder per task), Minari, or LeRobot v3.0 (a folder per task)",
     )
     export.add_argument(
         "--out",
         metavar="DIR",
-        help="where it is written; for minari the folder of datasets [default: Minari's own]",
+        help="output folder; for minari the folder of datasets [default: Minari's own]",
     )
-    export.add_argument("--id", metavar="ID", help="of a Minari dataset, e.g. faceoff/hit/striker-v0")
+    export.add_argument("--id", metavar="ID", help="id of the Minari dataset, e.g. faceoff/hit/striker-v0")
     export.add_argument("--task", help="one task only [default: all; for minari the one that the id names]")
     export.set_defaults(run=_export)
     return parser

@@ -10,12 +10,12 @@ from faceoff.kinematics import model, plain
 Floats = NDArray[np.float64]
 
 
-def finite(name: str, given: ArrayLike) -> Floats:
+def finite(name: str, value: ArrayLike) -> Floats:
     """The argument as a float64 array of any shape; ValueError unless all numbers are within ±10,000."""
     try:
-        array: NDArray[Any] = np.asarray(given, dtype=np.float64)
+        array: NDArray[Any] = np.asarray(value, dtype=np.float64)
     except (TypeError, ValueError) as error:
-        raise ValueError(f"{name}: expected an array of numbers, got {given!r:.80}") from error
+        raise ValueError(f"{name}: expected an array of numbers, got {value!r:.80}") from error
     # This comparison is false for NaN, too.
     is_allowed = np.abs(array) <= plain.NUMBER_LIMIT
     if not is_allowed.all():
@@ -24,17 +24,17 @@ def finite(name: str, given: ArrayLike) -> Floats:
     return array
 
 
-def joints(name: str, given: ArrayLike) -> Floats:
+def joints(name: str, value: ArrayLike) -> Floats:
     """The argument as an array of shape (..., 7)."""
-    array = finite(name, given)
+    array = finite(name, value)
     if array.ndim == 0 or array.shape[-1] != model.JOINTS:
         raise ValueError(f"{name}: expected shape (..., {model.JOINTS}), got {array.shape}")
     return array
 
 
-def points(name: str, given: ArrayLike, z: float) -> Floats:
+def points(name: str, value: ArrayLike, z: float) -> Floats:
     """The argument as an array of shape (..., 3); `z` (m or m/s) completes points of shape (..., 2)."""
-    array = finite(name, given)
+    array = finite(name, value)
     if array.ndim == 0 or array.shape[-1] not in (2, 3):
         raise ValueError(f"{name}: expected shape (..., 2) or (..., 3), got {array.shape}")
     if array.shape[-1] == 3:

@@ -73,7 +73,7 @@ LIMIT_FRACTION: Final = 0.95
 LIMITER_GAIN_PER_S: Final = 20.0
 # joint positions at the start of an episode, rad
 START_Q: Final = (0.0, -0.196067345, 0.0, -1.84363898, 0.0, 0.970422238, 0.0)
-# the universal joint's there, the mallet vertical
+# angles of the universal joint in that pose, mallet vertical
 START_UNIVERSAL_RAD: Final = (0.52359878059, 0.0)
 
 # The tool: on link 7 the end effector, on it by the universal joint the mallet.

@@ -177,7 +177,7 @@ fn read(path: &Path, rng: &mut Rng) -> Result<(), VerifyError> {
     let dataset = if rng.once_in(2) {
         Dataset::open(path)?
     } else {
-        Dataset::open_unread(path)?
+        Dataset::open_lazily(path)?
     };
     dataset.results()?;
     dataset.calibration()?;

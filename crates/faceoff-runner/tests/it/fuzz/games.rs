@@ -65,7 +65,7 @@ fn record_game(out: &Path) {
     let record_game = RecordedGame {
         spec: &spec,
         agents: &["one".to_owned(), "other".to_owned()],
-        played: course.finish(),
+        finished: course.finish(),
         calibration: GameCalibration {
             sides: [SlotTiming::default(); 2],
         },

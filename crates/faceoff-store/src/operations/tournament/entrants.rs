@@ -62,8 +62,8 @@ async fn cancel_open_games(tx: &mut Tx, id: TournamentId, team: TeamId, reason: 
             continue;
         }
         game_lifecycle::cancel(tx, &game, reason).await?;
-        if let GamePurpose::Round(meeting) = game.purpose {
-            rounds.insert(meeting.round);
+        if let GamePurpose::Round(entry) = game.purpose {
+            rounds.insert(entry.round);
         }
     }
     for round in rounds {

@@ -45,7 +45,7 @@ async fn insert_job(tx: &mut Tx, game: &Game, job: NewJob, account: Account) -> 
         bundles::check_available(tx, submission).await?;
     }
     let batch = match game.purpose {
-        GamePurpose::Round(meeting) => i64::from(meeting.matchday),
+        GamePurpose::Round(entry) => i64::from(entry.matchday),
         GamePurpose::Replay { replay, .. } => i64::from(replay),
         GamePurpose::Test { .. } | GamePurpose::Friendly { .. } => 0,
     };
@@ -161,7 +161,7 @@ pub(super) async fn cancel(tx: &mut Tx, game: &Game, reason: &str) -> Result<()>
 
 async fn end_round_of_game(tx: &mut Tx, game: &Game) -> Result<()> {
     match game.purpose {
-        GamePurpose::Round(meeting) => end_round_if_over(tx, game.tournament, meeting.round).await,
+        GamePurpose::Round(entry) => end_round_if_over(tx, game.tournament, entry.round).await,
         GamePurpose::Test { .. } | GamePurpose::Friendly { .. } | GamePurpose::Replay { .. } => {
             Ok(())
         }

@@ -136,10 +136,10 @@ async fn queue_games(
     } else {
         &[false]
     };
-    let (mut meeting, mut count, mut account) = (0, 0, None);
+    let (mut pairing, mut count, mut account) = (0, 0, None);
     for (matchday, day) in (1..).zip(&drawn.matchdays) {
         for pair in &day.games {
-            meeting += 1;
+            pairing += 1;
             for second_half in halves.iter().copied() {
                 let mut teams = *pair;
                 if second_half {
@@ -151,7 +151,7 @@ async fn queue_games(
                     purpose: GamePurpose::Round(ScheduleEntry {
                         round: drawn.number,
                         matchday,
-                        pairing: meeting,
+                        pairing,
                         second_half,
                     }),
                     teams,
@@ -159,7 +159,7 @@ async fn queue_games(
                     seed: GameSeedLabel::Fixture {
                         tournament: tournament.number,
                         round: drawn.number,
-                        meeting,
+                        meeting: pairing,
                     },
                     created_at: tx.now,
                     state: GameState::Queued,

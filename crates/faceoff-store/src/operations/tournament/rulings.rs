@@ -63,11 +63,11 @@ impl Store {
                 ));
             }
             let lane = match game.purpose {
-                GamePurpose::Round(meeting) => {
+                GamePurpose::Round(entry) => {
                     let has_left = |entrant: &Entrant| {
                         let left = entrant.departure.as_ref();
                         game.teams.contains(&entrant.team)
-                            && left.is_some_and(|left| left.from_round <= meeting.round)
+                            && left.is_some_and(|left| left.from_round <= entry.round)
                     };
                     if entrants::all(tx, game.tournament).await?.iter().any(has_left) {
                         return Err(StoreError::Conflict(

@@ -90,7 +90,7 @@ async fn find_person(client: &Client, name_or_id: &str) -> anyhow::Result<UserId
     if let Ok(id) = name_or_id.parse() {
         return Ok(id);
     }
-    let people = client.people().await?;
+    let people = client.users().await?;
     match people.iter().find(|person| person.name.as_str() == name_or_id) {
         Some(person) => Ok(person.id),
         None => bail!("there is no user {name_or_id:?}; see faceoff admin people list"),
@@ -119,7 +119,7 @@ pub(super) async fn people(
 ) -> anyhow::Result<()> {
     match action {
         PeopleAction::List => {
-            let people = client.people().await?;
+            let people = client.users().await?;
             print(json, &people, || {
                 let lines = people.iter().map(person_line).collect();
                 lines_or(
@@ -158,7 +158,7 @@ pub(super) async fn people(
         }
         PeopleAction::Remove { person, confirm } => {
             let id = find_person(client, &person).await?;
-            let removed = client.remove_person(id, confirm).await?;
+            let removed = client.remove_user(id, confirm).await?;
             print(json, &removed, || person_line(&removed))
         }
     }

@@ -361,7 +361,7 @@ fn stage_text(stage: &StageView) -> String {
     let closes = stage.closes_at.map_or_else(|| "open end".to_owned(), local_time);
     let rules = &stage.rules.rules;
     let tasks: Vec<&str> = rules.tasks.iter().map(|task| task.as_str()).collect();
-    let next = match &stage.next_cut {
+    let next = match &stage.next_cutoff {
         Some(next) => next.to_string(),
         None => "none".to_owned(),
     };

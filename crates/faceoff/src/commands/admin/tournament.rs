@@ -291,7 +291,7 @@ pub(super) async fn act(
                 confirm,
             };
             let id = find_tournament(client, &tournament).await?;
-            client.depart(id, &departure).await?
+            client.record_departure(id, &departure).await?
         }
         TournamentAction::Pause { tournament, reason } => {
             let id = find_tournament(client, &tournament).await?;

@@ -55,14 +55,14 @@ fn workers_text(view: &WorkersView) -> String {
         view.own_slots, view.remote_slots
     );
     let workers = view.workers.iter().map(worker_lines);
-    let workers = match view.is_given {
+    let workers = match view.leases_jobs {
         true => lines_or(workers.collect(), "no worker has connected yet"),
         false => "remote workers are not enabled".to_owned(),
     };
     let bans = view.bans.iter().map(ban_lines);
     [own]
         .into_iter()
-        .chain(view.troubles.iter().cloned())
+        .chain(view.problems.iter().cloned())
         .chain(view.alarms.iter().cloned())
         .chain([workers])
         .chain(bans)
@@ -92,7 +92,7 @@ fn worker_lines(worker: &WorkerView) -> String {
 }
 
 fn busy_line(busy: &BusySlotView) -> String {
-    let job = busy.what.as_deref().unwrap_or("job from before the server's start");
+    let job = busy.job_description.as_deref().unwrap_or("job from before the server's start");
     let long = if busy.is_long {
         "  for more than an hour"
     } else {

@@ -15,7 +15,7 @@ pub struct ListArgs {
 
 impl ListArgs {
     pub fn run(self) -> anyhow::Result<()> {
-        let episodes = Dataset::open_unread(&self.dataset)?.episodes()?;
+        let episodes = Dataset::open_lazily(&self.dataset)?.episodes()?;
         let mut out = terminal::stdout();
         if !self.json {
             writeln!(

@@ -70,7 +70,7 @@ impl FromStr for Steps {
 
 impl SliceArgs {
     pub fn run(self) -> anyhow::Result<()> {
-        let dataset = Dataset::open_unread(&self.dataset)?;
+        let dataset = Dataset::open_lazily(&self.dataset)?;
         let columns = self.columns.as_ref().map(|names| {
             let step = "step".to_owned();
             names.iter().cloned().chain([step]).collect::<Vec<_>>()

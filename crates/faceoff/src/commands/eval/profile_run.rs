@@ -7,7 +7,7 @@ use super::{
     pool::{Job, Verdict, run_shards},
 };
 use anyhow::{Context, bail};
-use faceoff_dataset::{ARCHIVE_FILE, Assembled, assemble};
+use faceoff_dataset::{ARCHIVE_FILE, AssembledDataset, assemble};
 use faceoff_runner::{AgentEnvironment, bundle::Bundle};
 use faceoff_types::{
     AgentFault, EpisodeOutcome, EvaluationResult, Profile, Ruleset, Seed, Task, Variation,
@@ -85,7 +85,7 @@ pub(super) fn run_profile(setup: &EvalSetup, profile: Profile, out: &Path) -> an
         ruleset: Ruleset::CURRENT,
         variation: setup.variation.clone(),
     };
-    let Assembled {
+    let AssembledDataset {
         result, archive, ..
     } = assemble(&meta, &dirs, &out.join(ARCHIVE_FILE), None).context("joining the recordings")?;
     // The dataset contains them now, and further profiles need the disk space.

@@ -57,7 +57,7 @@ pub const CONSTRAINTS: [(&str, f64, &str); 4] = [
 impl EpisodeRecording {
     /// Reads one episode of a dataset, and little else.
     pub fn read(path: &Path, task: Task, episode: u32) -> anyhow::Result<Self> {
-        let dataset = Dataset::open_unread(path).with_context(|| {
+        let dataset = Dataset::open_lazily(path).with_context(|| {
             format!(
                 "opening {} as the dataset of an evaluation (the server has replays of games)",
                 path.display()

@@ -131,7 +131,7 @@ impl BenchArgs {
         let setup = GameSetup {
             interpolation: [HOLD_INTERPOLATION; 2],
             factors,
-            plant: Plant::under(factors, &settings, self.seed.model_mismatch()),
+            plant: Plant::for_factors(factors, &settings, self.seed.model_mismatch()),
             settings,
             seed: self.seed,
         };

@@ -5,7 +5,7 @@ use faceoff_sim::{
     ConstraintValues, JOINTS,
     dynamics::arm::{Bodies, Kinematics, controller_torques, mass_matrix, plant_bias},
     model::DOFS,
-    robot::{inverse_kinematics::full, universal_joint::vertical},
+    robot::{inverse_kinematics::with_zero_universal, universal_joint::vertical},
 };
 use serde::{Deserialize, Serialize};
 use std::io::{BufRead as _, IsTerminal as _, Read as _, Write};
@@ -92,9 +92,9 @@ fn evaluate_line(line: &str) -> Result<PoseModel> {
         .context("expected a pose, as in {\"q\": [7 numbers], \"dq\": [7 numbers]}")?;
     let q = match joints("q", &pose.q)? {
         Joints::Driven(driven) => {
-            let ee = Kinematics::new(&full(&driven)).end_effector;
+            let ee = Kinematics::new(&with_zero_universal(&driven)).end_effector;
             let universal = vertical(ee.x, ee.y, [0.0; 2]);
-            let mut q = full(&driven);
+            let mut q = with_zero_universal(&driven);
             q[JOINTS..].copy_from_slice(&universal);
             q
         }
@@ -102,7 +102,7 @@ fn evaluate_line(line: &str) -> Result<PoseModel> {
     };
     let dq = match pose.dq.as_deref().map(|dq| joints("dq", dq)).transpose()? {
         None => [0.0; DOFS],
-        Some(Joints::Driven(driven)) => full(&driven),
+        Some(Joints::Driven(driven)) => with_zero_universal(&driven),
         Some(Joints::All(dq)) => dq,
     };
     Ok(evaluate(&q, &dq))

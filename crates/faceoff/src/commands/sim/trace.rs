@@ -61,7 +61,7 @@ pub fn run() -> Result<()> {
 fn trace(scenario: &Scenario, out: &mut impl Write) -> Result<()> {
     let settings = PerturbationSettings::default();
     let factors = scenario.profile.factors();
-    let plant = Plant::under(factors, &settings, scenario.seed.model_mismatch());
+    let plant = Plant::for_factors(factors, &settings, scenario.seed.model_mismatch());
     let mut world = World::new(&plant, &scenario.joints, scenario.puck);
     let mut table = TableFactors::new(factors, &settings, &scenario.seed, &mut world);
     let mut opponent = (scenario.task == Some(faceoff_types::Task::Hit)).then(Opponent::new);

@@ -81,7 +81,7 @@ fn state_text(game: &GameView) -> String {
             )
         }
     };
-    if let Some(team) = &game.taken_out_by {
+    if let Some(team) = &game.excluded_by {
         text.push_str(&format!(" (does not count: {team} left)"));
     }
     text
@@ -107,8 +107,8 @@ pub(in crate::commands) fn game_text(game: &GameView) -> String {
         PurposeView::Test { .. } => {
             "test game against the baseline, does not count".to_owned()
         }
-        PurposeView::Friendly { asked_by } => {
-            format!("friendly game requested by {asked_by}, does not count")
+        PurposeView::Friendly { requested_by } => {
+            format!("friendly game requested by {requested_by}, does not count")
         }
         PurposeView::Replay { replay, round, .. } => {
             format!("replay {replay} of round {round}, does not count")
@@ -157,7 +157,7 @@ pub(in crate::commands) fn attempts_text(attempts: &[GameAttemptView]) -> String
         format!(
             "{:>3}  {}  {}  {end}{reason}",
             attempt.number,
-            attempt.begun_at.strftime("%Y-%m-%d %H:%M:%S UTC"),
+            attempt.started_at.strftime("%Y-%m-%d %H:%M:%S UTC"),
             attempt.worker
         )
     };
@@ -169,8 +169,8 @@ pub(in crate::commands) fn attempts_text(attempts: &[GameAttemptView]) -> String
 
 /// The requested test games, and the teams without one.
 pub(in crate::commands) fn requested_text(view: &TestGamesView) -> String {
-    let mut text = games_table(&view.ordered);
-    for team in &view.not_ordered {
+    let mut text = games_table(&view.queued);
+    for team in &view.skipped {
         text.push_str(&format!("\n{}: none, {}", team.team_name, team.reason));
     }
     text

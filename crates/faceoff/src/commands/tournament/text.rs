@@ -114,16 +114,16 @@ fn round_count(rounds: RoundNumber) -> String {
 }
 
 fn entrant_text(entrant: &EntrantView) -> String {
-    match &entrant.left {
+    match &entrant.departure {
         None => entrant.team_name.to_string(),
-        Some(left) => {
-            let kind = match left.r#as {
+        Some(departure) => {
+            let kind = match departure.r#as {
                 DepartureKind::Withdrawn => "withdrawn",
                 DepartureKind::Disqualified => "disqualified",
             };
             format!(
                 "{} ({kind} from round {}: {})",
-                entrant.team_name, left.from_round, left.reason
+                entrant.team_name, departure.from_round, departure.reason
             )
         }
     }
@@ -146,7 +146,7 @@ pub(in crate::commands) fn round_text(round: &RoundView) -> String {
             parts.push(format!("{count} {state}"));
         }
     }
-    let end = match round.over_at {
+    let end = match round.ended_at {
         Some(at) => format!(", finished {}", time_text(at)),
         None => String::new(),
     };

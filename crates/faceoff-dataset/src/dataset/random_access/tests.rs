@@ -1,0 +1,178 @@
+use super::*;
+use crate::table::{ShardTable, StepRows, TableWriter, join};
+use bytes::Bytes;
+use faceoff_episode::{AnswerTiming, StepRow};
+use faceoff_sim::{Episode, Interpolation, PerturbationSettings, Plant};
+use faceoff_types::{Profile, Seed};
+use parquet::file::reader::Length;
+use std::{
+    io::Read,
+    path::Path,
+    sync::{
+        Mutex,
+        atomic::{AtomicU64, Ordering},
+    },
+};
+
+/// A table that records its accesses.
+#[derive(Clone)]
+struct Counted {
+    table: Bytes,
+    read: Arc<AtomicU64>,
+    /// Start and end of each access.
+    ranges: Arc<Mutex<Vec<(u64, u64)>>>,
+}
+
+struct CountedReader {
+    counted: Counted,
+    at: u64,
+}
+
+impl Counted {
+    fn new(path: &Path) -> Self {
+        Self {
+            table: std::fs::read(path).unwrap().into(),
+            read: Arc::default(),
+            ranges: Arc::default(),
+        }
+    }
+
+    fn record(&self, start: u64, bytes: u64) {
+        self.read.fetch_add(bytes, Ordering::Relaxed);
+        self.ranges.lock().unwrap().push((start, start + bytes));
+    }
+}
+
+impl Read for CountedReader {
+    fn read(&mut self, out: &mut [u8]) -> std::io::Result<usize> {
+        let read = self
+            .counted
+            .table
+            .slice(self.at as usize..)
+            .as_ref()
+            .read(out)?;
+        self.counted.record(self.at, read as u64);
+        self.at += read as u64;
+        Ok(read)
+    }
+}
+
+impl Length for Counted {
+    fn len(&self) -> u64 {
+        self.table.len() as u64
+    }
+}
+
+impl ChunkReader for Counted {
+    type T = CountedReader;
+
+    fn get_read(&self, start: u64) -> Result<Self::T> {
+        Ok(CountedReader {
+            counted: self.clone(),
+            at: start,
+        })
+    }
+
+    fn get_bytes(&self, start: u64, length: usize) -> Result<Bytes> {
+        self.record(start, length as u64);
+        Ok(self.table.slice(start as usize..start as usize + length))
+    }
+}
+
+/// Shards of one row group each, joined.
+fn joined(dir: &Path, task: Task, shards: u32, episodes: u32, steps: u32) -> Vec<ShardTable> {
+    let settings = PerturbationSettings::default();
+    let (seed, plant) = (Seed::from_number(3), Plant::nominal());
+    let factors = Profile::Ideal.factors();
+    let world = Episode::new(task, Interpolation::Cubic, factors, &settings, &plant, seed);
+    let mut state = world.state();
+    (0..shards)
+        .map(|shard| {
+            let path = dir.join(format!("{task}-{shard}.parquet"));
+            let mut rows = StepRows::new(task);
+            let mut writer = TableWriter::create(&path, rows.schema()).unwrap();
+            for episode in shard * episodes..(shard + 1) * episodes {
+                rows.begin(episode);
+                for step in 0..steps {
+                    // Numbers that rarely repeat, like measurements.
+                    state.q = state.q.map(|q| (q * 1e3 + 0.37).sin());
+                    rows.observe(world.observation());
+                    rows.push(&StepRow {
+                        step,
+                        action: &state.q.repeat(2),
+                        timing: AnswerTiming {
+                            computation_time_s: 1e-3,
+                            host_time_s: 0.0,
+                            cpu_time_s: None,
+                        },
+                        state: &state,
+                        constraints: Default::default(),
+                        next_observation: world.observation(),
+                        puck_lost: false,
+                        impacts: &[],
+                    });
+                }
+                writer.write(rows.take()).unwrap();
+            }
+            writer.finish().unwrap();
+            ShardTable::Current(path)
+        })
+        .collect()
+}
+
+fn write(dir: &Path, tables: &[ShardTable]) -> Counted {
+    let path = dir.join("joined.parquet");
+    join(tables, dir, std::fs::File::create(&path).unwrap()).unwrap();
+    Counted::new(&path)
+}
+
+#[test]
+fn read_accesses_one_row_group_of_many() {
+    let dir = tempfile::tempdir().unwrap();
+    let mut tables = joined(dir.path(), Task::Hit, 40, 2, 60);
+    tables.extend(joined(dir.path(), Task::Defend, 40, 2, 60));
+    let table = write(dir.path(), &tables);
+    let metadata = ParquetMetaDataReader::new()
+        .parse_and_finish(&table)
+        .unwrap();
+    assert_eq!(metadata.num_row_groups(), 80);
+    let data = |group: usize| -> (u64, u64) {
+        let columns = metadata.row_group(group).columns().iter();
+        let columns = columns.map(|column| column.byte_range());
+        columns.fold((u64::MAX, 0), |(start, end), (at, length)| {
+            (start.min(at), end.max(at + length))
+        })
+    };
+    table.ranges.lock().unwrap().clear();
+    // The 17th shard of the second task.
+    let rows = episode(table.clone(), Task::Defend, 33, None).unwrap();
+    assert_eq!(rows.num_rows(), 60);
+    let accessed: Vec<usize> = (0..80)
+        .filter(|group| {
+            let (start, end) = data(*group);
+            let ranges = table.ranges.lock().unwrap();
+            ranges.iter().any(|(from, to)| *from < end && start < *to)
+        })
+        .collect();
+    assert_eq!(accessed, [40 + 16]);
+}
+
+#[test]
+fn read_accesses_few_pages_of_a_row_group() {
+    let dir = tempfile::tempdir().unwrap();
+    let tables = joined(dir.path(), Task::Hit, 1, 60, 500);
+    let table = write(dir.path(), &tables);
+    let metadata = ParquetMetaDataReader::new()
+        .parse_and_finish(&table)
+        .unwrap();
+    assert_eq!(
+        metadata.num_row_groups(),
+        1,
+        "30,000 rows are one row group"
+    );
+    table.read.store(0, Ordering::Relaxed);
+    let rows = episode(table.clone(), Task::Hit, 31, None).unwrap();
+    assert_eq!(rows.num_rows(), 500);
+    let (read, all) = (table.read.load(Ordering::Relaxed), table.len());
+    assert!(read < all / 8, "{read} of {all} bytes");
+}

@@ -1,0 +1,272 @@
+//! Inputs of a game that cannot be simulated and are read from its recording: answers, their times, faults, and the
+//! start and reset of each side.
+
+use crate::{
+    dataset::Columns, interpolation_text, table::SIDE_TIMES, times::seconds, verify::Difference,
+};
+use arrow_array::{
+    Array, Float64Array, Int64Array, ListArray, RecordBatch,
+    cast::AsArray,
+    types::{Float64Type, Int64Type},
+};
+use faceoff_episode::{AnswerTiming, Effect, RallyEntry, Response, SideFault};
+use faceoff_types::{ACTION_LIMIT, AgentFault, AgentFaultKind, AgentTask, Interpolation, Side};
+
+/// Location of a row in a recording.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct RowLocation {
+    pub file: &'static str,
+    pub rally: u32,
+    pub step: Option<u32>,
+}
+
+impl RowLocation {
+    pub fn difference(
+        self,
+        field: &str,
+        recorded: impl Into<String>,
+        expected: impl Into<String>,
+    ) -> Difference {
+        Difference {
+            file: self.file,
+            task: None,
+            episode: None,
+            rally: Some(self.rally),
+            step: self.step,
+            field: field.to_owned(),
+            recorded: recorded.into(),
+            expected: expected.into(),
+        }
+    }
+}
+
+/// Start and reset of one side for a rally, and its fault in it.
+#[derive(Debug)]
+pub(super) struct RecordedEntry {
+    pub entry: RallyEntry,
+    /// The fault at one of the rally's steps.
+    pub step_fault: Option<AgentFault>,
+}
+
+impl RecordedEntry {
+    /// Reads a row; `must_start` says whether the side had to be started.
+    pub fn read(
+        row: &RecordBatch,
+        side: Side,
+        must_start: bool,
+        at: RowLocation,
+    ) -> Result<Self, Difference> {
+        let columns = Columns(row);
+        let fault = columns
+            .text("fault", 0)
+            .map(serde_json::from_str::<AgentFault>)
+            .transpose()
+            .map_err(|error| at.difference("fault", error.to_string(), "a fault as JSON"))?;
+        if let Some(fault) = &fault {
+            let is_own = fault.agent_task == AgentTask::Game { side };
+            let is_current = match (fault.episode, fault.step) {
+                (None, None) => true,
+                (Some(rally), _) => rally == at.rally,
+                (None, Some(_)) => false,
+            };
+            if !(is_own && is_current) {
+                let expected = format!("a fault of side {} in this rally", side.number());
+                return Err(at.difference("fault", fault.to_string(), expected));
+            }
+        }
+        // A divergence is caused by an answer, and the simulation of that answer shows it.
+        if let Some(fault) = &fault
+            && matches!(fault.fault, AgentFaultKind::Diverged { .. })
+            && fault.step.is_none()
+        {
+            let expected = "a fault of the agent at its start or reset";
+            return Err(at.difference("fault", fault.to_string(), expected));
+        }
+        let startup_s = read_time(row, "startup_ns", 0, at)?;
+        let reset_s = read_time(row, "reset_ns", 0, at)?;
+        let interpolation = columns
+            .text("interpolation", 0)
+            .map(|text| {
+                interpolation_text::parse(text)
+                    .ok_or_else(|| at.difference("interpolation", text, "1 to 5, -1 or null"))
+            })
+            .transpose()?;
+        match (startup_s.is_some(), must_start) {
+            (true, false) => {
+                let expected = "nothing: the agent was already running";
+                return Err(at.difference("startup_ns", "a time", expected));
+            }
+            (false, true) => {
+                let expected = "a time: the agent had to be started";
+                return Err(at.difference("startup_ns", "nothing", expected));
+            }
+            _ => {}
+        }
+        let started = fault.as_ref().is_none_or(|fault| fault.episode.is_some());
+        let (entry, later) = match (startup_s, interpolation, reset_s) {
+            (Some(startup_s), None, None) if !started => {
+                let fault = fault.map(side_fault).ok_or_else(|| {
+                    at.difference("fault", "nothing", "the fault that prevented the start")
+                })?;
+                (RallyEntry::StartFailed { startup_s, fault }, None)
+            }
+            (startup_s, Some(interpolation), Some(reset_s)) if started => match fault {
+                Some(fault) if fault.step.is_none() => {
+                    let entry = RallyEntry::ResetFailed {
+                        startup_s,
+                        interpolation,
+                        reset_s,
+                        fault: side_fault(fault),
+                    };
+                    (entry, None)
+                }
+                later => {
+                    let entry = RallyEntry::Ready {
+                        startup_s,
+                        interpolation,
+                        reset_s,
+                    };
+                    (entry, later)
+                }
+            },
+            (_, interpolation, _) => {
+                let recorded = interpolation.map_or("nothing".to_owned(), |code| code.to_string());
+                let expected = if started {
+                    "the agent's interpolation, with the time of its reset"
+                } else {
+                    "nothing, and no time of a reset: the agent had not started"
+                };
+                return Err(at.difference("interpolation", recorded, expected));
+            }
+        };
+        Ok(Self { entry, step_fault: later })
+    }
+}
+
+fn side_fault(fault: AgentFault) -> SideFault {
+    SideFault {
+        kind: fault.fault,
+        line: fault.line,
+    }
+}
+
+/// The response of one side in a control step.
+#[derive(Debug)]
+pub(super) enum RecordedResponse {
+    Answer {
+        action: Float64Array,
+        timing: AnswerTiming,
+    },
+    Fault {
+        fault: SideFault,
+        timing: AnswerTiming,
+    },
+    Held,
+}
+
+impl RecordedResponse {
+    /// Reads a row of the side's steps. `active`: had the side no fault before? `fault` is the fault in its entry.
+    pub fn read(
+        steps: &RecordBatch,
+        row: usize,
+        interpolation: Interpolation,
+        active: bool,
+        fault: Option<&AgentFault>,
+        at: RowLocation,
+    ) -> Result<Self, Difference> {
+        let text = Columns(steps).text("effect", row).unwrap_or("nothing");
+        let effect = Effect::ALL
+            .into_iter()
+            .find(|effect| effect.as_str() == text);
+        let wrong = |expected: &str| Err(at.difference("effect", text, expected));
+        match effect {
+            None => wrong("in_time, late, fault or held"),
+            Some(Effect::Held) if active => wrong("in_time, late or fault: the side had no fault before"),
+            Some(Effect::Held) => Ok(Self::Held),
+            Some(_) if !active => wrong("held, after its fault"),
+            Some(Effect::Fault) => {
+                let fault = fault.filter(|fault| fault.step == at.step);
+                let Some(fault) = fault.cloned() else {
+                    return wrong("in_time or late: no fault of this step is recorded");
+                };
+                if matches!(fault.fault, AgentFaultKind::Diverged { .. }) {
+                    return wrong("in_time or late: only an answer can make a world diverge");
+                }
+                Ok(Self::Fault {
+                    fault: side_fault(fault),
+                    timing: read_timing(steps, row, at)?,
+                })
+            }
+            Some(Effect::InTime | Effect::Late) => Ok(Self::Answer {
+                action: read_action(steps, row, interpolation, at)?,
+                timing: read_timing(steps, row, at)?,
+            }),
+        }
+    }
+
+    pub fn response(&self) -> Response<'_> {
+        match self {
+            Self::Answer { action, timing } => Response::Answer {
+                action: action.values(),
+                timing: *timing,
+            },
+            Self::Fault { fault, timing } => Response::Fault {
+                fault: fault.clone(),
+                timing: *timing,
+            },
+            Self::Held => Response::Held,
+        }
+    }
+}
+
+/// The recorded action, checked, since it is an input of the simulation.
+fn read_action(
+    steps: &RecordBatch,
+    row: usize,
+    interpolation: Interpolation,
+    at: RowLocation,
+) -> Result<Float64Array, Difference> {
+    let expected = format!(
+        "{} numbers of at most {ACTION_LIMIT} in magnitude",
+        interpolation.len()
+    );
+    let actions: &ListArray = steps["action"].as_list();
+    if actions.is_null(row) {
+        return Err(at.difference("action", "nothing", expected));
+    }
+    let values = actions.value(row);
+    let action: &Float64Array = values.as_primitive::<Float64Type>();
+    let present = action.len() - action.null_count();
+    if present != interpolation.len() || action.null_count() > 0 {
+        return Err(at.difference("action", format!("{present} numbers"), expected));
+    }
+    let allowed = |number: &&f64| number.abs() <= ACTION_LIMIT;
+    match action.values().iter().find(|number| !allowed(number)) {
+        Some(number) => Err(at.difference("action", format!("{number:?}"), expected)),
+        None => Ok(action.clone()),
+    }
+}
+
+fn read_timing(steps: &RecordBatch, row: usize, at: RowLocation) -> Result<AnswerTiming, Difference> {
+    let [computation, host, cpu] = SIDE_TIMES;
+    let needed = |name: &str| {
+        read_time(steps, name, row, at)?.ok_or_else(|| at.difference(name, "nothing", "a time"))
+    };
+    Ok(AnswerTiming {
+        computation_time_s: needed(computation)?,
+        host_time_s: needed(host)?,
+        cpu_time_s: read_time(steps, cpu, row, at)?,
+    })
+}
+
+/// A recorded time, s.
+fn read_time(rows: &RecordBatch, name: &str, row: usize, at: RowLocation) -> Result<Option<f64>, Difference> {
+    let column: &Int64Array = rows[name].as_primitive::<Int64Type>();
+    if column.is_null(row) {
+        return Ok(None);
+    }
+    match column.value(row) {
+        negative @ ..0 => Err(at.difference(name, negative.to_string(), "at least 0")),
+        time => Ok(Some(seconds(time))),
+    }
+}

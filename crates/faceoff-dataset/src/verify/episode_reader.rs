@@ -1,0 +1,245 @@
+use super::{difference::Difference, error::VerifyError};
+use crate::{
+    dataset::{Columns, Dataset, FileRange, StepBatches, StepTable, episode_batches},
+    files::{EPISODES_FILE, STEPS_FILE},
+};
+use arrow_array::RecordBatch;
+use faceoff_sim::EPISODE_STEPS;
+use faceoff_types::Task;
+use faceoff_wire::job::ShardSpec;
+use std::{collections::BTreeMap, path::Path};
+
+/// The recording of one episode.
+pub(super) struct RecordedEpisode {
+    pub task: Task,
+    pub episode: u32,
+    pub row: RecordBatch,
+    /// Its steps, as many as the row states.
+    pub steps: Vec<RecordBatch>,
+}
+
+/// Consecutive episodes, and the error that ended their reading, if any.
+pub(super) struct EpisodeBatch {
+    pub episodes: Vec<RecordedEpisode>,
+    pub result: Result<(), VerifyError>,
+}
+
+impl Default for EpisodeBatch {
+    fn default() -> Self {
+        Self {
+            episodes: Vec::new(),
+            result: Ok(()),
+        }
+    }
+}
+
+/// Reads the episodes of a dataset, and checks their order.
+pub(super) struct EpisodeReader<'a> {
+    expected: Box<dyn Iterator<Item = (Task, u32)> + Send + 'a>,
+    rows: Box<dyn Iterator<Item = RecordBatch> + Send>,
+    steps: StepBatches,
+    steps_of_tasks: BTreeMap<Task, u64>,
+}
+
+impl<'a> EpisodeReader<'a> {
+    pub fn open(dataset: &'a Dataset) -> Result<Self, VerifyError> {
+        let expected = dataset
+            .manifest()
+            .episodes
+            .iter()
+            .flat_map(|(task, count)| (0..*count).map(|episode| (*task, episode)));
+        Ok(Self::new(
+            Box::new(expected),
+            dataset.episode_batches()?,
+            dataset.steps()?.read(None)?,
+        ))
+    }
+
+    /// Opens a shard that holds the first `played` of the specified episodes.
+    pub fn open_shard(
+        spec: &ShardSpec,
+        played: usize,
+        episodes: &Path,
+        steps: &Path,
+    ) -> Result<Self, VerifyError> {
+        let task = spec.task;
+        let expected = spec.episodes.clone().take(played);
+        let steps = StepTable::open(FileRange::whole(steps)?)?;
+        Ok(Self::new(
+            Box::new(expected.map(move |episode| (task, episode))),
+            episode_batches(FileRange::whole(episodes)?)?,
+            steps.read(None)?,
+        ))
+    }
+
+    fn new(
+        expected: Box<dyn Iterator<Item = (Task, u32)> + Send + 'a>,
+        batches: Vec<RecordBatch>,
+        steps: StepBatches,
+    ) -> Self {
+        let mut steps_of_tasks = BTreeMap::new();
+        for batch in &batches {
+            let columns = Columns(batch);
+            for row in 0..batch.num_rows() {
+                let task = columns.text("task", row).and_then(|task| task.parse().ok());
+                if let (Some(task), Some(steps)) = (task, columns.int("steps", row)) {
+                    *steps_of_tasks.entry(task).or_default() += u64::from(steps);
+                }
+            }
+        }
+        let rows = batches
+            .into_iter()
+            .flat_map(|batch| (0..batch.num_rows()).map(move |row| batch.slice(row, 1)));
+        Self {
+            expected,
+            rows: Box::new(rows),
+            steps,
+            steps_of_tasks,
+        }
+    }
+
+    /// Number of control steps per task, as stated by the rows of its episodes.
+    pub fn steps_of_tasks(&self) -> BTreeMap<Task, u64> {
+        self.steps_of_tasks.clone()
+    }
+
+    /// The next `count` episodes; empty after the last.
+    pub fn next_episodes(&mut self, count: usize) -> EpisodeBatch {
+        let mut episodes = EpisodeBatch::default();
+        while episodes.episodes.len() < count {
+            match self.next_episode() {
+                Ok(Some(episode)) => episodes.episodes.push(episode),
+                Ok(None) => break,
+                Err(error) => {
+                    episodes.result = Err(error);
+                    break;
+                }
+            }
+        }
+        episodes
+    }
+
+    /// The next episode; `None` after the last.
+    ///
+    /// # Errors
+    /// A difference if an episode is missing, repeated or surplus; otherwise a table that cannot be read.
+    fn next_episode(&mut self) -> Result<Option<RecordedEpisode>, VerifyError> {
+        let (task, episode, row) = match (self.expected.next(), self.rows.next()) {
+            (None, None) => {
+                return match self.steps.take_rows(1)?.pop() {
+                    None => Ok(None),
+                    Some(extra) => Err(self.extra_row(STEPS_FILE, &extra, "no more steps")),
+                };
+            }
+            (None, Some(extra)) => {
+                return Err(self.extra_row(EPISODES_FILE, &extra, "no more episodes"));
+            }
+            (Some((task, episode)), None) => {
+                return Err(difference(
+                    task,
+                    episode,
+                    EPISODES_FILE,
+                    "episode",
+                    "nothing",
+                    episode,
+                ));
+            }
+            (Some((task, episode)), Some(row)) => (task, episode, row),
+        };
+        let columns = Columns(&row);
+        let found = columns.text("task", 0);
+        if found != Some(task.as_str()) {
+            return Err(difference(
+                task,
+                episode,
+                EPISODES_FILE,
+                "task",
+                value_text(found),
+                task,
+            ));
+        }
+        let found = columns.int("episode", 0);
+        if found != Some(episode) {
+            return Err(difference(
+                task,
+                episode,
+                EPISODES_FILE,
+                "episode",
+                value_text(found),
+                episode,
+            ));
+        }
+        let count = match columns.int("steps", 0) {
+            Some(count) if count <= EPISODE_STEPS => count as usize,
+            found => {
+                let expected = format!("at most {EPISODE_STEPS}");
+                return Err(difference(
+                    task,
+                    episode,
+                    EPISODES_FILE,
+                    "steps",
+                    value_text(found),
+                    expected,
+                ));
+            }
+        };
+        let steps = self.steps.take_rows(count)?;
+        let read: usize = steps.iter().map(RecordBatch::num_rows).sum();
+        if read < count {
+            let mut missing = difference(task, episode, STEPS_FILE, "step", "nothing", read);
+            if let VerifyError::Differs(difference) = &mut missing {
+                difference.step = u32::try_from(read).ok();
+            }
+            return Err(missing);
+        }
+        Ok(Some(RecordedEpisode {
+            task,
+            episode,
+            row,
+            steps,
+        }))
+    }
+
+    /// The difference for a row after the last expected one.
+    fn extra_row(&self, file: &'static str, row: &RecordBatch, expected: &str) -> VerifyError {
+        let columns = Columns(row);
+        Difference {
+            file,
+            task: columns.text("task", 0).and_then(|task| task.parse().ok()),
+            episode: columns.int("episode", 0),
+            rally: None,
+            step: (file == STEPS_FILE)
+                .then(|| columns.int("step", 0))
+                .flatten(),
+            field: "rows".to_owned(),
+            recorded: "another row".to_owned(),
+            expected: expected.to_owned(),
+        }
+        .into()
+    }
+}
+
+fn value_text<T: ToString>(value: Option<T>) -> String {
+    value.map_or_else(|| "nothing".to_owned(), |value| value.to_string())
+}
+
+fn difference(
+    task: Task,
+    episode: u32,
+    file: &'static str,
+    field: &str,
+    recorded: impl ToString,
+    expected: impl ToString,
+) -> VerifyError {
+    Difference {
+        file,
+        task: Some(task),
+        episode: Some(episode),
+        rally: None,
+        step: None,
+        field: field.to_owned(),
+        recorded: recorded.to_string(),
+        expected: expected.to_string(),
+    }
+    .into()
+}

@@ -1,0 +1,313 @@
+//! Evaluations of agents that are functions: no process, no clock, the same numbers on every machine.
+
+use arrow_array::RecordBatch;
+use faceoff_dataset::{AssembledDataset, Recorder, RecordingError, ShardFolder, ShardReport, assemble};
+use faceoff_episode::{AnswerTiming, EpisodeStart, StepRow, StepSink};
+use faceoff_sim::{Episode, Interpolation, Plant};
+use faceoff_types::{
+    AgentFault, AgentFaultKind, ComputationTime, EpisodeEnd, EpisodeOutcome, Profile, RoundTrips,
+    Ruleset, Seed, SlotTiming, Task, Variation,
+};
+use faceoff_wire::job::{EvaluationMeta, ShardSpec};
+use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
+use std::{
+    fs::{self, File},
+    ops::Range,
+    path::{Path, PathBuf},
+    time::Duration,
+};
+use tempfile::TempDir;
+use zip::ZipArchive;
+
+/// A question to an agent.
+pub struct Question {
+    pub episode: u32,
+    /// `None` at the reset.
+    pub step: Option<u32>,
+    /// The pose in the episode's first observation.
+    pub held: [f64; 7],
+}
+
+/// Answers with joint positions and velocities, or with a fault (`None`).
+pub type Agent = fn(&Question) -> Option<[[f64; 7]; 2]>;
+
+pub fn hold_still(question: &Question) -> Option<[[f64; 7]; 2]> {
+    Some([question.held, [0.0; 7]])
+}
+
+/// Moves the arm, so that every column changes.
+pub fn swing_arm(question: &Question) -> Option<[[f64; 7]; 2]> {
+    let offset = 0.002 * f64::from(question.step.unwrap_or(0) % 7);
+    Some([question.held.map(|q| q + offset), [0.1; 7]])
+}
+
+pub fn spec(task: Task, episodes: Range<u32>) -> ShardSpec {
+    let seed = Seed::from_number(7);
+    ShardSpec {
+        ruleset: Ruleset::CURRENT,
+        platform_retries: 0,
+        task,
+        episodes,
+        profile: Profile::Evaluation,
+        seed,
+        mismatch_seed: seed.model_mismatch(),
+        max_faults: 2,
+        perturbations: Default::default(),
+    }
+}
+
+/// Records a shard; an agent that is `None` fails to start.
+pub fn play(spec: &ShardSpec, agent: Option<Agent>, out: &Path) -> ShardReport {
+    let folder = ShardFolder::create(out).unwrap();
+    let mut recorder = Recorder::create(&folder, spec.task).unwrap();
+    let settings = (*spec.perturbations).clone();
+    let plant = Plant::mismatched(&settings, spec.mismatch_seed);
+    let mut outcomes = Vec::new();
+    for episode in spec.episodes.clone() {
+        let seed = spec.seed.episode(spec.task, episode);
+        let factors = spec.profile.factors();
+        let mut world = Episode::new(
+            spec.task,
+            Interpolation::Cubic,
+            factors,
+            &settings,
+            &plant,
+            seed,
+        );
+        recorder.begin(EpisodeStart {
+            episode,
+            seed,
+            interpolation: agent.map(|_| Interpolation::Cubic),
+            state: &world.state(),
+        });
+        let outcome = match agent {
+            Some(agent) => play_episode(spec.task, episode, agent, &mut world, &mut recorder),
+            None => failed(spec.task, None, None, episode, &world, &[]),
+        };
+        recorder.end(&outcome, 0).unwrap();
+        outcomes.push(outcome);
+        let faults = outcomes.iter().filter(|outcome| outcome.fault.is_some());
+        if faults.count() > spec.max_faults as usize {
+            break;
+        }
+    }
+    recorder.finish().unwrap();
+    let trips = RoundTrips {
+        count: 10,
+        p50: 1e-5,
+        p99: 2e-5,
+        max: 3e-5 + f64::from(spec.episodes.start) * 1e-6,
+    };
+    let report = ShardReport {
+        stopped_by_faults: outcomes.len() < spec.episodes.len(),
+        outcomes,
+        log: "goodbye\n".to_owned(),
+        timing: SlotTiming {
+            before_s: trips,
+            during_s: trips,
+            longest_stall_s: 0.0,
+            host_noise_reruns: 0,
+            platform_retries: spec.platform_retries,
+        },
+    };
+    folder.commit(spec, &report).unwrap();
+    report
+}
+
+fn play_episode(
+    task: Task,
+    episode: u32,
+    agent: Agent,
+    world: &mut Episode,
+    recorder: &mut Recorder,
+) -> EpisodeOutcome {
+    let mut held = [0.0; 7];
+    // Joint positions follow the puck's six numbers.
+    held.copy_from_slice(&world.observation()[6..13]);
+    let ask = |step| {
+        agent(&Question {
+            episode,
+            step,
+            held,
+        })
+    };
+    if ask(None).is_none() {
+        return failed(task, Some(episode), None, episode, world, &[]);
+    }
+    let mut times_s = Vec::new();
+    loop {
+        let step = world.steps();
+        let Some(action) = ask(Some(step)) else {
+            return failed(task, Some(episode), Some(step), episode, world, &times_s);
+        };
+        let time = Duration::from_nanos(100_000 + u64::from(step) * 7919 % 977);
+        times_s.push(time.as_secs_f64());
+        recorder.observe(world.observation());
+        let outcome = world.step(action.as_flattened());
+        recorder.step(&StepRow {
+            step,
+            action: action.as_flattened(),
+            timing: AnswerTiming {
+                computation_time_s: time.as_secs_f64(),
+                host_time_s: 0.0,
+                cpu_time_s: (!step.is_multiple_of(5)).then(|| (time / 2).as_secs_f64()),
+            },
+            state: &world.state(),
+            constraints: outcome.constraints,
+            next_observation: world.observation(),
+            puck_lost: world.is_puck_lost(),
+            impacts: world.world().impacts(),
+        });
+        if let Some(divergence) = world.divergence() {
+            let mut outcome = failed(task, Some(episode), Some(step), episode, world, &times_s);
+            let detail = divergence.cause.to_string();
+            let fault = AgentFaultKind::Diverged { detail };
+            outcome.fault.as_mut().unwrap().fault = fault;
+            return outcome;
+        }
+        if let Some(end) = outcome.end {
+            return EpisodeOutcome {
+                task,
+                episode,
+                steps: world.steps(),
+                end,
+                success: world.success(),
+                violations: world.violations(),
+                computation_time: summary(&times_s),
+                fault: None,
+            };
+        }
+    }
+}
+
+fn failed(
+    task: Task,
+    during: Option<u32>,
+    step: Option<u32>,
+    episode: u32,
+    world: &Episode,
+    times_s: &[f64],
+) -> EpisodeOutcome {
+    EpisodeOutcome {
+        task,
+        episode,
+        steps: world.steps(),
+        end: EpisodeEnd::AgentFault,
+        success: false,
+        violations: world.violations(),
+        computation_time: summary(times_s),
+        fault: Some(AgentFault {
+            fault: AgentFaultKind::NonFinite,
+            agent_task: task.into(),
+            episode: during,
+            step,
+            line: None,
+        }),
+    }
+}
+
+fn summary(times_s: &[f64]) -> ComputationTime {
+    ComputationTime {
+        mean_s: times_s.iter().fold(0.0, |sum, time_s| sum + time_s) / times_s.len().max(1) as f64,
+        max_s: times_s.iter().copied().fold(0.0, f64::max),
+    }
+}
+
+/// The shards of an evaluation and the folder of its dataset.
+pub struct Evaluation {
+    pub dir: TempDir,
+    pub shards: Vec<PathBuf>,
+    pub reports: Vec<ShardReport>,
+    pub meta: EvaluationMeta,
+}
+
+impl Evaluation {
+    pub fn play(agent: Option<Agent>, shards: &[(Task, Range<u32>)]) -> Self {
+        Self::play_with_variation(Variation::default(), agent, shards)
+    }
+
+    pub fn play_with_variation(
+        variation: Variation,
+        agent: Option<Agent>,
+        shards: &[(Task, Range<u32>)],
+    ) -> Self {
+        let dir = tempfile::tempdir().unwrap();
+        let spec = spec(Task::Hit, 0..1);
+        let mut evaluation = Self {
+            shards: Vec::new(),
+            reports: Vec::new(),
+            meta: EvaluationMeta {
+                profile: spec.profile,
+                seed: spec.seed,
+                mismatch_seed: spec.mismatch_seed,
+                agent: "test".into(),
+                ruleset: Ruleset::CURRENT,
+                variation,
+            },
+            dir,
+        };
+        for (task, range) in shards {
+            let out = evaluation
+                .dir
+                .path()
+                .join(format!("{task}-{}", range.start));
+            let spec = ShardSpec {
+                perturbations: evaluation.meta.variation.perturbations.clone(),
+                ..self::spec(*task, range.clone())
+            };
+            let report = play(&spec, agent, &out);
+            evaluation.reports.push(report);
+            evaluation.shards.push(out);
+        }
+        evaluation
+    }
+
+    pub fn assemble(&self, name: &str) -> Result<(AssembledDataset, PathBuf), RecordingError> {
+        let archive = self.dir.path().join(name);
+        assemble(&self.meta, &self.shards, &archive, None).map(|assembled| (assembled, archive))
+    }
+
+    /// Assembles `dataset.zip` and unpacks it to `dataset`.
+    pub fn assembled(self) -> Self {
+        self.assemble("dataset.zip").unwrap();
+        unzip(&self.archive(), &self.folder());
+        self
+    }
+
+    pub fn archive(&self) -> PathBuf {
+        self.dir.path().join("dataset.zip")
+    }
+
+    pub fn folder(&self) -> PathBuf {
+        self.dir.path().join("dataset")
+    }
+}
+
+pub fn unzip(archive: &Path, into: &Path) -> Vec<String> {
+    let mut zip = ZipArchive::new(File::open(archive).unwrap()).unwrap();
+    zip.extract(into).unwrap();
+    (0..zip.len())
+        .map(|i| zip.by_index(i).unwrap().name().unwrap().into_owned())
+        .collect()
+}
+
+pub fn json<T: serde::de::DeserializeOwned>(path: &Path) -> T {
+    serde_json::from_slice(&fs::read(path).unwrap()).unwrap()
+}
+
+/// The whole table, in one batch.
+pub fn table(path: &Path) -> RecordBatch {
+    let builder = ParquetRecordBatchReaderBuilder::try_new(File::open(path).unwrap()).unwrap();
+    let rows = builder.metadata().file_metadata().num_rows() as usize;
+    let mut batches = builder.with_batch_size(rows).build().unwrap();
+    let batch = batches.next().expect("a row").unwrap();
+    assert_eq!(batch.num_rows(), rows);
+    batch
+}
+
+/// Data of an earlier version: an archive, or a shard of a running evaluation.
+pub fn fixture(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("../../tests/fixtures")
+        .join(name)
+}

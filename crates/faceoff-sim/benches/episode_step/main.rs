@@ -1,0 +1,134 @@
+//! Compares episodes stepped at once with the same episodes stepped one by one: held arms, and recorded actions of
+//! striker. Prints control steps and physics steps per second of one core, and the speed-up; then a batch on all
+//! cores.
+//!
+//! The variants alternate, and the least CPU time of each counts, so that other load has little effect. An argument
+//! filters the rows: `cargo bench --bench episode_step -- held`.
+
+#![expect(clippy::print_stdout, reason = "the benchmark prints a table")]
+
+mod recorded;
+
+use faceoff_sim::{
+    Batch, BatchSetup, Interpolation, JOINTS, LanePath, PerturbationSettings, Plant, SUBSTEPS,
+    model::INITIAL_Q,
+};
+use faceoff_types::{Factors, Seed, Task};
+use recorded::{Recorded, Worlds, hold, record};
+use rustix::time::{ClockId, clock_gettime};
+use std::time::{Duration, Instant};
+
+/// Worlds per row of the table, control steps of each in a round, and rounds.
+const WORLDS: usize = 16;
+const STEPS: usize = 100;
+const ROUNDS: usize = 20;
+
+/// Worlds of the batch, and control steps of each in a round.
+const BATCH: u32 = 256;
+const BATCH_STEPS: usize = 20;
+
+fn main() {
+    let filter = std::env::args().nth(1).filter(|arg| !arg.starts_with("--"));
+    let is_wanted = |name: &str| filter.as_ref().is_none_or(|filter| name.contains(filter));
+    println!("control steps/s (physics steps/s) of one core; speed-up over one by one");
+    for (profile, factors) in [("ideal", Factors::NONE), ("evaluation", Factors::ALL)] {
+        for task in Task::ALL {
+            let name = format!("held/{task}/{profile}");
+            if is_wanted(&name) {
+                compare(&name, &hold(task, factors, STEPS as u32, WORLDS as u32));
+            }
+            let name = format!("striker/{task}/{profile}");
+            if is_wanted(&name) {
+                compare(&name, &record(task, factors, 2 * WORLDS as u32));
+            }
+        }
+    }
+    if is_wanted("batch") {
+        batch();
+    }
+}
+
+/// One row: each variant steps the same worlds.
+fn compare(name: &str, recorded: &[Recorded]) {
+    let variants = [
+        ("one by one", None),
+        ("plain", Some(LanePath::PLAIN)),
+        ("avx", LanePath::avx()),
+    ];
+    let mut least = [Duration::MAX; 3];
+    for _ in 0..ROUNDS {
+        for (least, (variant, path)) in least.iter_mut().zip(variants) {
+            if path.is_none() && variant == "avx" {
+                continue;
+            }
+            let mut worlds = Worlds::new(recorded, WORLDS);
+            let start = cpu_time();
+            for _ in 0..STEPS {
+                worlds.step(path);
+            }
+            *least = (cpu_time() - start).min(*least);
+        }
+    }
+    print!("{name:28}");
+    for ((variant, _), time) in variants.into_iter().zip(least) {
+        if time < Duration::MAX {
+            print!(
+                "  {variant} {} x{:.2}",
+                rate(WORLDS * STEPS, time),
+                least[0].as_secs_f64() / time.as_secs_f64()
+            );
+        }
+    }
+    println!();
+}
+
+/// A batch on one thread and on all threads, by wall time.
+fn batch() {
+    let held = Interpolation::Cubic.hold_position(&INITIAL_Q);
+    let actions = held[..2 * JOINTS].repeat(BATCH as usize);
+    let all = std::thread::available_parallelism().map_or(1, usize::from);
+    let counts = [1, all];
+    let mut least = [Duration::MAX; 2];
+    for _ in 0..ROUNDS {
+        for (least, threads) in least.iter_mut().zip(counts) {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
+            let pool = pool.build().expect("a machine that has threads");
+            let mut batch = Batch::new(BatchSetup {
+                task: Task::Prepare,
+                interpolation: Interpolation::Cubic,
+                factors: Factors::NONE,
+                settings: PerturbationSettings::default(),
+                plant: Plant::nominal(),
+                seed: Seed::from_number(0),
+                worlds: BATCH,
+            });
+            let start = Instant::now();
+            pool.install(|| {
+                for _ in 0..BATCH_STEPS {
+                    batch.step(&actions);
+                }
+            });
+            *least = start.elapsed().min(*least);
+        }
+    }
+    for (threads, time) in counts.into_iter().zip(least) {
+        println!(
+            "batch of {BATCH}, prepare/ideal: {threads} threads {}",
+            rate(BATCH as usize * BATCH_STEPS, time)
+        );
+    }
+    let per_core = least[0].as_secs_f64() / least[1].as_secs_f64() / all as f64;
+    println!("throughput per thread with {all} threads: {per_core:.2} of a single thread");
+}
+
+/// Control steps per second, and physics steps.
+fn rate(control_steps: usize, time: Duration) -> String {
+    let per_s = control_steps as f64 / time.as_secs_f64();
+    format!("{per_s:.0} ({:.0})", per_s * SUBSTEPS as f64)
+}
+
+/// Time that this thread has spent on a CPU.
+fn cpu_time() -> Duration {
+    let time = clock_gettime(ClockId::ThreadCPUTime);
+    Duration::try_from(time).expect("a time that has passed")
+}

@@ -1,0 +1,151 @@
+//! Recorded actions of striker in whole episodes, and worlds that replay them.
+
+use faceoff_sim::{
+    Episode, Interpolation, LanePath, PerturbationSettings, Plant, StepOutcome, env_info,
+    model::INITIAL_Q, step_episodes_on,
+};
+use faceoff_types::{Factors, Seed, Task};
+use striker::{Agent, Policy};
+
+/// An episode at its start, and the action of each of its control steps.
+#[derive(Clone)]
+pub struct Recorded {
+    start: Episode,
+    actions: Vec<Vec<f64>>,
+}
+
+/// Records episodes of an evaluation that striker plays to their ends.
+pub fn record(task: Task, factors: Factors, episodes: u32) -> Vec<Recorded> {
+    (0..episodes)
+        .map(|number| {
+            let start = start(task, factors, number);
+            let mut agent = agent(task);
+            let mut episode = start.clone();
+            let mut actions = vec![];
+            loop {
+                let rows = agent.act(episode.observation()).expect("an observation");
+                actions.push(rows.concat());
+                if episode.step(&rows.concat()).end.is_some() {
+                    return Recorded { start, actions };
+                }
+            }
+        })
+        .collect()
+}
+
+/// Records episodes in which the arm holds still, for at most `steps` steps.
+pub fn hold(task: Task, factors: Factors, steps: u32, episodes: u32) -> Vec<Recorded> {
+    let held = Interpolation::Cubic.hold_position(&INITIAL_Q);
+    let action = held[..Interpolation::Cubic.len()].to_vec();
+    (0..episodes)
+        .map(|number| {
+            let start = start(task, factors, number);
+            let mut episode = start.clone();
+            let mut actions = vec![];
+            while episode.steps() < steps {
+                actions.push(action.clone());
+                if episode.step(&action).end.is_some() {
+                    break;
+                }
+            }
+            Recorded { start, actions }
+        })
+        .collect()
+}
+
+fn start(task: Task, factors: Factors, number: u32) -> Episode {
+    let settings = PerturbationSettings::default();
+    let seed = Seed::from_number(0);
+    let plant = Plant::for_factors(factors, &settings, seed.model_mismatch());
+    let seed = seed.episode(task, number);
+    Episode::new(task, Interpolation::Cubic, factors, &settings, &plant, seed)
+}
+
+fn agent(task: Task) -> Agent {
+    let env = env_info(task);
+    let radius = |radius: f64| striker::RadiusInfo { radius };
+    let task = match task {
+        Task::Hit => striker::Task::Hit,
+        Task::Defend => striker::Task::Defend,
+        Task::Prepare => striker::Task::Prepare,
+    };
+    let env = striker::Env {
+        dt: env.dt,
+        table: striker::TableInfo {
+            length: env.table_length,
+            width: env.table_width,
+            goal_width: env.goal_width,
+        },
+        puck: radius(env.puck_radius),
+        mallet: radius(env.mallet_radius),
+        robot: striker::RobotInfo {
+            ee_desired_height: env.ee_desired_height,
+            joint_pos_limit: env.joint_pos_limit,
+            joint_vel_limit: env.joint_vel_limit,
+            base_frame: env
+                .base_frame
+                .into_iter()
+                .map(striker::BaseFrame::Flat)
+                .collect(),
+        },
+    };
+    let mut agent = Agent::new(task, &env);
+    agent.reset();
+    agent
+}
+
+/// Worlds that replay recorded episodes in order, each from a different one on.
+#[derive(Clone)]
+pub struct Worlds<'r> {
+    recorded: &'r [Recorded],
+    /// The index of each world's episode.
+    playing: Vec<usize>,
+    episodes: Vec<Episode>,
+    outcomes: Vec<StepOutcome>,
+}
+
+impl<'r> Worlds<'r> {
+    /// Worlds at the start of an episode.
+    pub fn new(recorded: &'r [Recorded], count: usize) -> Self {
+        let playing: Vec<usize> = (0..count).map(|w| w % recorded.len()).collect();
+        let mut first = recorded[0].start.clone();
+        let outcome = first.step(&recorded[0].actions[0]);
+        Self {
+            episodes: playing.iter().map(|&e| recorded[e].start.clone()).collect(),
+            outcomes: vec![outcome; count],
+            playing,
+            recorded,
+        }
+    }
+
+    /// A control step of all worlds: at once with an instruction set, or one by one.
+    pub fn step(&mut self, path: Option<LanePath>) {
+        let actions = self
+            .playing
+            .iter()
+            .zip(&self.episodes)
+            .map(|(&e, episode)| {
+                let actions = &self.recorded[e].actions;
+                actions[episode.steps() as usize].as_slice()
+            });
+        match path {
+            Some(path) => {
+                let actions: Vec<&[f64]> = actions.collect();
+                let mut episodes: Vec<&mut Episode> = self.episodes.iter_mut().collect();
+                step_episodes_on(path, &mut episodes, &actions, &mut self.outcomes);
+            }
+            None => {
+                let actions: Vec<&[f64]> = actions.collect();
+                for (w, episode) in self.episodes.iter_mut().enumerate() {
+                    self.outcomes[w] = episode.step(actions[w]);
+                }
+            }
+        }
+        for (w, outcome) in self.outcomes.iter().enumerate() {
+            if outcome.end.is_some() {
+                self.playing[w] = (self.playing[w] + 1) % self.recorded.len();
+                self.episodes[w] = self.recorded[self.playing[w]].start.clone();
+            }
+        }
+    }
+}

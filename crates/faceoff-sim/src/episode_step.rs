@@ -1,0 +1,63 @@
+//! One control step of several episodes at once.
+//!
+//! In an arm's equations each link depends on the previous one, so that a single arm leaves most of a core's
+//! arithmetic units idle. Arms of different worlds are independent: four of them share the lanes of a register
+//! and are computed at once, for any tasks, plants and step numbers.
+
+use crate::{
+    dynamics::path::LanePath,
+    episode::{Episode, StepOutcome},
+    world::World,
+};
+
+/// Advances each episode by its action, with the same bits as [`Episode::step`]; one outcome per episode. Tasks,
+/// plants and step numbers may differ.
+///
+/// # Panics
+/// If the three slices differ in length.
+pub fn step_episodes(
+    episodes: &mut [&mut Episode],
+    actions: &[&[f64]],
+    outcomes: &mut [StepOutcome],
+) {
+    step_episodes_on(LanePath::fastest(), episodes, actions, outcomes);
+}
+
+/// As [`step_together`], with a given instruction set. All of them give the same bits.
+///
+/// # Panics
+/// If the three slices differ in length.
+pub fn step_episodes_on(
+    path: LanePath,
+    episodes: &mut [&mut Episode],
+    actions: &[&[f64]],
+    outcomes: &mut [StepOutcome],
+) {
+    assert_eq!(
+        episodes.len(),
+        actions.len(),
+        "expected an action for each episode"
+    );
+    assert_eq!(
+        episodes.len(),
+        outcomes.len(),
+        "expected room for each episode's outcome"
+    );
+    for (episode, action) in episodes.iter_mut().zip(actions) {
+        episode.command(action);
+    }
+    // Worlds with the same number of robots share the lanes, so that only the last group can leave lanes empty.
+    for robots in 1..=2 {
+        let mut same_size = episodes
+            .iter_mut()
+            .filter(|episode| episode.world().robots() == robots)
+            .peekable();
+        while same_size.peek().is_some() {
+            let worlds = same_size.by_ref().take(path.worlds_at_once(robots));
+            World::control_step_all(path, worlds.map(|episode| episode.world_and_air_force()));
+        }
+    }
+    for (episode, outcome) in episodes.iter_mut().zip(outcomes) {
+        *outcome = episode.observe();
+    }
+}

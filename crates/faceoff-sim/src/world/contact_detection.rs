@@ -1,0 +1,112 @@
+//! Contact detection of a substep.
+
+use super::contacts::{Contacts, MalletMotion, Pair};
+use crate::{
+    dynamics::spatial::{Motion, Vec3},
+    model::DOFS,
+    table::{
+        contact_finder::{self, Touch},
+        contact_law::{MALLET, MALLETS, RIM},
+        frames::{robot_from_table, side, table_from_robot},
+        mallet_cylinder::MalletCylinder,
+        puck::Puck,
+    },
+};
+
+/// Pose of a robot's mallet, in the robot's base frame.
+#[derive(Debug, Clone, Copy)]
+pub struct MalletPose {
+    /// Centre of the striking cylinder, m.
+    pub centre: [f64; 3],
+    /// Unit vector along the mallet.
+    pub axis: [f64; 3],
+}
+
+/// Broad phase: whether mallets, puck or rims may be in contact. `centres` are those of the mallets' cylinders, m,
+/// the robots' base frames.
+#[inline(always)]
+pub fn may_touch(centres: &[[f64; 3]], puck: &Puck) -> bool {
+    let puck_xy = [puck.pose[0], puck.pose[1]];
+    let centre = |robot: usize| table_from_robot(robot, centres[robot]);
+    let mallets = match centres.len() {
+        2 => contact_finder::mallets_near(centre(0), centre(1)),
+        _ => false,
+    };
+    let by_mallet =
+        (0..centres.len()).any(|robot| contact_finder::mallet_near_puck(centre(robot), puck_xy));
+    mallets || by_mallet || contact_finder::near_rims(puck_xy)
+}
+
+/// Contacts of this substep, `None` if there are none. `motion` returns a robot's joint axes, in its base frame,
+/// and velocities (rad/s).
+#[cold]
+pub fn find_contacts(
+    mallets: &[MalletPose],
+    motion: impl Fn(usize) -> ([Motion<f64>; DOFS], [f64; DOFS]),
+    puck: &Puck,
+) -> Option<Contacts> {
+    let puck_xy = [puck.pose[0], puck.pose[1]];
+    let cylinder = |robot: usize| {
+        let ([x, y, z], side) = (mallets[robot].axis, side(robot));
+        let centre = table_from_robot(robot, mallets[robot].centre);
+        MalletCylinder::along(centre, [side * x, side * y, z])
+    };
+    let touches: [Option<Touch>; 2] = std::array::from_fn(|robot| {
+        (robot < mallets.len())
+            .then(|| contact_finder::mallet_and_puck(&cylinder(robot), puck_xy))
+            .flatten()
+    });
+    let between_mallets = (mallets.len() == 2)
+        .then(|| contact_finder::mallets(&cylinder(0), &cylinder(1)))
+        .flatten();
+    let mallets_touch = between_mallets.is_some() || touches != [None, None];
+    if !mallets_touch && !contact_finder::near_rims(puck_xy) {
+        return None;
+    }
+    let mut contacts = Contacts::none();
+    add_rims(&mut contacts, puck);
+    if !mallets_touch {
+        return (!contacts.is_empty()).then_some(contacts);
+    }
+    let mallet = |robot: usize, touch: &Touch| {
+        let side = side(robot);
+        let [x, y, z] = robot_from_table(robot, touch.point);
+        let (axes, dq) = motion(robot);
+        let jacobian = axes.map(|axis| axis.at(Vec3::new(x, y, z)));
+        let rows: [[f64; DOFS]; 3] = [
+            jacobian.map(|column| side * column.x),
+            jacobian.map(|column| side * column.y),
+            jacobian.map(|column| column.z),
+        ];
+        let velocity = rows.map(|row| (0..DOFS).map(|i| row[i] * dq[i]).sum());
+        MalletMotion {
+            jacobian: Some(rows),
+            velocity,
+        }
+    };
+    for (robot, touch) in touches.into_iter().enumerate() {
+        if let Some(touch) = touch {
+            let pair = Pair::Mallet {
+                robot,
+                mallet: &mallet(robot, &touch),
+                puck: &puck.velocity,
+            };
+            contacts.add(touch, &MALLET, pair);
+        }
+    }
+    if let Some(touch) = between_mallets {
+        let mallets = [&mallet(0, &touch), &mallet(1, &touch)];
+        contacts.add(touch, &MALLETS, Pair::Mallets { mallets });
+    }
+    Some(contacts)
+}
+
+/// Contacts of the puck with the rims.
+pub fn add_rims(contacts: &mut Contacts, puck: &Puck) {
+    contact_finder::rims([puck.pose[0], puck.pose[1]], |touch| {
+        let pair = Pair::Rim {
+            puck: &puck.velocity,
+        };
+        contacts.add(touch, &RIM, pair);
+    });
+}

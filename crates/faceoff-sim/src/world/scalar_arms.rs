@@ -1,0 +1,203 @@
+//! Arms that are solved one by one, outside of the lanes: arms in contact, and arms with a joint at its stop.
+
+use super::{
+    arm_lanes::ArmLanes,
+    contacts::Contacts,
+    lane_worlds::LaneWorld,
+    solver::{Mass, Problem, accelerations, accelerations_in_contact},
+    contact_detection::{MalletPose, find_contacts},
+};
+use crate::{
+    dynamics::{
+        arm::Kinematics,
+        lanes::{Lanes, MAX_LANES, row, set_row},
+        spatial::{Motion, Vec3},
+    },
+    model::DOFS,
+};
+
+/// Dynamics of all arms in one substep, before constraints and contacts.
+#[derive(Debug)]
+pub struct ArmDynamics<T> {
+    pub kinematics: Kinematics<T>,
+    /// The plants' inertias, kg m².
+    pub mass: Mass<T>,
+    /// Torques of the controllers minus bias and damping, N m.
+    pub load: [T; DOFS],
+}
+
+impl<T: Lanes> ArmDynamics<T> {
+    /// The equations of one arm.
+    pub fn problem(&self, lane: usize) -> Problem {
+        Problem {
+            mass: std::array::from_fn(|i| row(&self.mass[i], lane)),
+            load: row(&self.load, lane),
+        }
+    }
+}
+
+/// Solutions of the arms that were solved one by one.
+#[derive(Debug)]
+pub struct ScalarSolutions {
+    /// The lanes of these arms, as bits.
+    pub lanes: u32,
+    /// The lanes of the arms in contact, as bits.
+    pushed: u32,
+    solutions: [ArmSolution; MAX_LANES],
+}
+
+#[derive(Debug, Clone, Copy)]
+struct ArmSolution {
+    /// rad/s².
+    acceleration: [f64; DOFS],
+    /// Torques of the contacts, N m.
+    contact: [f64; DOFS],
+    /// Torques of dry friction and stops, N m.
+    constraint: [f64; DOFS],
+}
+
+impl ScalarSolutions {
+    pub fn empty() -> Self {
+        let zero = ArmSolution {
+            acceleration: [0.0; DOFS],
+            contact: [0.0; DOFS],
+            constraint: [0.0; DOFS],
+        };
+        Self {
+            lanes: 0,
+            pushed: 0,
+            solutions: [zero; MAX_LANES],
+        }
+    }
+
+    /// Removes the solutions of the previous substep.
+    #[inline(always)]
+    pub fn clear(&mut self) {
+        self.lanes = 0;
+        self.pushed = 0;
+    }
+
+    /// Writes the solutions into their lanes.
+    #[cold]
+    #[inline(never)]
+    pub fn insert<T: Lanes>(
+        &self,
+        acceleration: &mut [T; DOFS],
+        constraint: &mut [T; DOFS],
+        load: &mut [T; DOFS],
+    ) {
+        for (lane, solved) in self.solutions.iter().enumerate() {
+            let contains = |lanes: u32| lanes >> lane & 1 == 1;
+            if contains(self.lanes) {
+                set_row(acceleration, lane, &solved.acceleration);
+                set_row(constraint, lane, &solved.constraint);
+            }
+            if contains(self.pushed) {
+                let mut torques = row(load, lane);
+                for i in 0..DOFS {
+                    torques[i] += solved.contact[i];
+                }
+                set_row(load, lane, &torques);
+            }
+        }
+    }
+}
+
+/// Solves one world's contacts, if it has any. `centres` are the centres of its mallets, m, the robots' base frames.
+#[cold]
+#[inline(never)]
+pub fn solve_contacts<T: Lanes, A>(
+    arms: &ArmLanes<T>,
+    lane_world: &mut LaneWorld<'_, A>,
+    dynamics: &ArmDynamics<T>,
+    centres: &[[f64; 3]; 2],
+    scalar: &mut ScalarSolutions,
+) {
+    let world = &mut *lane_world.world;
+    let kinematics = &dynamics.kinematics;
+    let lane_of = |robot: usize| (lane_world.first_lane + robot).min(T::COUNT - 1);
+    let mallets: [MalletPose; 2] = std::array::from_fn(|robot| MalletPose {
+        centre: centres[robot],
+        axis: kinematics.mallet_axis.lane(lane_of(robot)),
+    });
+    let motion = |robot: usize| {
+        let lane = lane_of(robot);
+        let vector = |v: &Vec3<T>| {
+            let [x, y, z] = v.lane(lane);
+            Vec3::new(x, y, z)
+        };
+        let axes = std::array::from_fn(|i| Motion {
+            angular: vector(&kinematics.axes[i].angular),
+            linear: vector(&kinematics.axes[i].linear),
+        });
+        (axes, row(&arms.motion.dq, lane))
+    };
+    let robots = world.arms.len();
+    let contacts = find_contacts(&mallets[..robots], motion, &world.puck);
+    let touching = contacts.as_ref().map_or(0, Contacts::touching);
+    world.impacts.record_touching(touching, world.substep, &world.puck);
+    let Some(contacts) = contacts else {
+        return;
+    };
+    let free = world
+        .puck
+        .free_acceleration(&world.puck_damping, world.air_n);
+    let pushed = contacts.pushed();
+    if pushed == [false; 2] {
+        lane_world.puck_force = Some(contacts.solve_puck(&free));
+        return;
+    }
+    world.pushed = pushed;
+    for (robot, arm) in world.arms.iter_mut().enumerate() {
+        let lane = lane_of(robot);
+        arms.friction.store(lane, &mut arm.constraints);
+        let (q, dq) = (row(&arms.motion.q, lane), row(&arms.motion.dq, lane));
+        arm.constraints.prepare_stops(&world.plant, &q, &dq);
+    }
+    let problems = [0, 1].map(|robot| dynamics.problem(lane_of(robot)));
+    let (accelerations, forces) =
+        accelerations_in_contact(&mut world.arms, &problems, &contacts, &free);
+    for (robot, arm) in world.arms.iter().enumerate() {
+        let lane = lane_of(robot);
+        scalar.lanes |= 1 << lane;
+        scalar.pushed |= 1 << lane;
+        scalar.solutions[lane] = ArmSolution {
+            acceleration: accelerations[robot],
+            contact: forces.arms[robot],
+            constraint: arm.constraints.torques(&accelerations[robot]),
+        };
+    }
+    lane_world.puck_force = Some(forces.puck);
+}
+
+/// Solves the arms of a world that have, or had in the previous substep, a joint at its stop. `beyond` has the
+/// bits of the lanes with a joint beyond its stop.
+#[cold]
+#[inline(never)]
+pub fn solve_stops<T: Lanes, A>(
+    arms: &ArmLanes<T>,
+    lane_world: &mut LaneWorld<'_, A>,
+    dynamics: &ArmDynamics<T>,
+    beyond: u32,
+    scalar: &mut ScalarSolutions,
+) {
+    let world = &mut *lane_world.world;
+    for (robot, arm) in world.arms.iter_mut().enumerate() {
+        let lane = lane_world.first_lane + robot;
+        let contains = |lanes: u32| lanes >> lane & 1 == 1;
+        let constraints = &mut arm.constraints;
+        if contains(scalar.lanes) || !(contains(beyond) || constraints.any_stop()) {
+            continue;
+        }
+        arms.friction.store(lane, constraints);
+        let (q, dq) = (row(&arms.motion.q, lane), row(&arms.motion.dq, lane));
+        constraints.prepare_stops(&world.plant, &q, &dq);
+        let acceleration = accelerations(constraints, &dynamics.problem(lane));
+        scalar.lanes |= 1 << lane;
+        scalar.solutions[lane] = ArmSolution {
+            acceleration,
+            contact: [0.0; DOFS],
+            constraint: constraints.torques(&acceleration),
+        };
+    }
+}

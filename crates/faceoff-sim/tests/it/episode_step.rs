@@ -1,0 +1,204 @@
+//! Episodes stepped at once have the same bits as alone, with every instruction set.
+
+use faceoff_sim::{
+    Bounds, Episode, Interpolation, JOINTS, LanePath, PerturbationSettings, Plant, StepOutcome,
+    golden::strike, model::INITIAL_Q, step_episodes, step_episodes_on,
+};
+use faceoff_types::{ACTION_LIMIT, EpisodeEnd, Factor, Factors, Seed, Task};
+
+/// All instruction sets of this machine.
+fn paths() -> Vec<LanePath> {
+    [Some(LanePath::PLAIN), LanePath::avx()]
+        .into_iter()
+        .flatten()
+        .collect()
+}
+
+/// Narrow bounds, so that worlds diverge. The ruleset's bounds are ten times as wide.
+const NARROW: Bounds = Bounds {
+    joint_rad_s: 100.0,
+    ..Bounds::WIDE
+};
+
+/// Behaviour of an agent.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Habit {
+    Strikes,
+    Holds,
+    /// Drives its joints against their stops.
+    Leans,
+    /// Makes the world diverge, from a step on.
+    Diverges(u32),
+}
+
+/// An episode with its agent.
+#[derive(Clone)]
+struct Play {
+    episode: Episode,
+    habit: Habit,
+    interpolation: Interpolation,
+}
+
+impl Play {
+    fn new(task: Task, number: u32, factors: Factors, habit: Habit) -> Self {
+        let settings = PerturbationSettings::default();
+        let seed = Seed::from_number(u64::from(number));
+        let plant = Plant::for_factors(factors, &settings, seed.model_mismatch());
+        let interpolation = match habit {
+            Habit::Strikes => Interpolation::Cubic,
+            Habit::Holds => Interpolation::Quintic,
+            Habit::Leans => Interpolation::Linear,
+            Habit::Diverges(_) => Interpolation::Trajectory,
+        };
+        let seed = seed.episode(task, number);
+        let episode = Episode::new(task, interpolation, factors, &settings, &plant, seed);
+        Self {
+            episode: episode.with_bounds(NARROW),
+            habit,
+            interpolation,
+        }
+    }
+
+    fn action(&self) -> Vec<f64> {
+        let step = self.episode.steps();
+        let held = self.interpolation.hold_position(&INITIAL_Q);
+        let held = held[..self.interpolation.len()].to_vec();
+        match self.habit {
+            Habit::Strikes => strike(self.episode.observation(), step).to_vec(),
+            Habit::Leans => held
+                .iter()
+                .enumerate()
+                .map(|(i, q)| {
+                    if i < JOINTS {
+                        q + 0.2 * f64::from(step)
+                    } else {
+                        *q
+                    }
+                })
+                .collect(),
+            Habit::Diverges(from) if step >= from => {
+                let velocities = &self.episode.observation()[13..20];
+                let pushed = |i: usize| ACTION_LIMIT.copysign(velocities[i % JOINTS]);
+                (0..held.len()).map(pushed).collect()
+            }
+            Habit::Holds | Habit::Diverges(_) => held,
+        }
+    }
+}
+
+/// The whole visible state of an episode, numbers as bits.
+fn snapshot(episode: &Episode) -> (Vec<u64>, String) {
+    let state = episode.state();
+    let world = episode.world();
+    let mut numbers = episode.observation().to_vec();
+    numbers.extend(state.puck);
+    numbers.extend(state.q.iter().chain(&state.dq).chain(&state.dq_filtered));
+    numbers.extend(state.universal.iter().chain(&state.ee));
+    for robot in 0..world.robots() {
+        numbers.extend(world.torques(robot));
+        numbers.extend(world.universal(robot));
+        numbers.extend(world.joint_velocities(robot));
+        numbers.extend(world.end_effector_before(robot));
+    }
+    let rest = format!("{:?} {:?}", episode.divergence(), episode.violations());
+    (numbers.iter().map(|x| x.to_bits()).collect(), rest)
+}
+
+/// Runs all to their ends, at once and each alone; returns the reasons of their ends.
+fn compare(path: LanePath, plays: Vec<Play>) -> Vec<EpisodeEnd> {
+    let mut ends = vec![];
+    let mut pairs: Vec<(Play, Play)> = plays.into_iter().map(|p| (p.clone(), p)).collect();
+    while !pairs.is_empty() {
+        let actions: Vec<Vec<f64>> = pairs.iter().map(|(play, _)| play.action()).collect();
+        let actions: Vec<&[f64]> = actions.iter().map(Vec::as_slice).collect();
+        let alone: Vec<StepOutcome> = pairs
+            .iter_mut()
+            .zip(&actions)
+            .map(|((_, play), action)| play.episode.step(action))
+            .collect();
+        let mut at_once = alone.clone();
+        at_once.rotate_left(1);
+        let mut episodes: Vec<&mut Episode> = pairs
+            .iter_mut()
+            .map(|(play, _)| &mut play.episode)
+            .collect();
+        step_episodes_on(path, &mut episodes, &actions, &mut at_once);
+        for ((stepped, reference), (a, b)) in pairs.iter().zip(at_once.iter().zip(&alone)) {
+            let label = format!(
+                "{path:?}, {:?}, step {}",
+                stepped.habit,
+                stepped.episode.steps()
+            );
+            assert_eq!(a, b, "{label}");
+            assert!(snapshot(&stepped.episode) == snapshot(&reference.episode), "{label}");
+        }
+        let mut ended = alone.iter().map(|outcome| outcome.end);
+        pairs.retain(|_| match ended.next().flatten() {
+            Some(end) => {
+                ends.push(end);
+                false
+            }
+            None => true,
+        });
+    }
+    ends
+}
+
+#[test]
+fn episodes_with_contacts_are_the_same_at_once() {
+    let singles = Factor::ALL.map(|factor| Factors::NONE.with(factor));
+    for path in paths() {
+        for factors in [Factors::NONE, Factors::ALL].into_iter().chain(singles) {
+            // Both full and partly filled groups of lanes.
+            let plays = (0..13).map(|number| {
+                let task = Task::ALL[number as usize % 3];
+                Play::new(task, number, factors, Habit::Strikes)
+            });
+            let ends = compare(path, plays.collect());
+            let some = |end: EpisodeEnd| ends.contains(&end);
+            assert!(some(EpisodeEnd::CrossedMiddle), "{factors:?}: {ends:?}");
+        }
+    }
+}
+
+#[test]
+fn diverging_world_does_not_change_the_others() {
+    for path in paths() {
+        let habits = [
+            Habit::Holds,
+            Habit::Diverges(7),
+            Habit::Leans,
+            Habit::Diverges(3),
+            Habit::Strikes,
+        ];
+        let plays = (0..15).map(|number| {
+            let habit = habits[number as usize % habits.len()];
+            let task = Task::ALL[number as usize / habits.len()];
+            Play::new(task, number, Factors::ALL, habit)
+        });
+        let ends = compare(path, plays.collect());
+        assert!(ends.contains(&EpisodeEnd::AgentFault), "{ends:?}");
+        assert!(ends.contains(&EpisodeEnd::Horizon), "{ends:?}");
+    }
+}
+
+#[test]
+fn step_accepts_any_number_of_worlds() {
+    for count in 0..6 {
+        let held = Interpolation::Quintic.hold_position(&INITIAL_Q);
+        let action = &held[..Interpolation::Quintic.len()];
+        let play = |number| Play::new(Task::Prepare, number, Factors::NONE, Habit::Holds).episode;
+        let mut episodes: Vec<Episode> = (0..count).map(play).collect();
+        let mut outcomes = vec![play(0).step(action); count as usize];
+        let mut all: Vec<&mut Episode> = episodes.iter_mut().collect();
+        step_episodes(&mut all, &vec![action; count as usize], &mut outcomes);
+        assert!(episodes.iter().all(|episode| episode.steps() == 1));
+    }
+}
+
+#[test]
+#[should_panic(expected = "expected an action for each episode")]
+fn missing_action_panics() {
+    let mut episode = Play::new(Task::Defend, 0, Factors::NONE, Habit::Holds).episode;
+    step_episodes(&mut [&mut episode], &[], &mut []);
+}

@@ -1,0 +1,198 @@
+//! Requests about users, their teams and their tokens.
+
+use super::Client;
+use faceoff_api::{
+    requests::{
+        Confirmation, JoinRequest, NewAnnouncement, NewAnswer, NewInvitation, NewPassword, NewQuestion,
+        NewTerms, NewToken, Reason, RegistrationRequest, SeasonChange, TeamChange,
+    },
+    views::{
+        announcement::{AnnouncementView, QuestionView, TermsView},
+        invitation::{InvitationView, NewInvitationView, NewRegistrationView, RegistrationView},
+        user::{NewAccountView, UserView, CallerView},
+        season::SeasonView,
+        team::TeamView,
+        token::{NewTokenView, TokenView},
+    },
+};
+use faceoff_types::{InvitationId, UserId, QuestionId, RegistrationId, TeamId, TokenId};
+use reqwest::Method;
+
+impl Client {
+    pub async fn whoami(&self) -> anyhow::Result<CallerView> {
+        self.get("/whoami").await
+    }
+
+    /// The tokens and sessions that the caller may manage, the newest first.
+    pub async fn tokens(&self) -> anyhow::Result<Vec<TokenView>> {
+        self.list(self.request(Method::GET, "/tokens")).await
+    }
+
+    /// Creates a token; only this response has its text.
+    pub async fn create_token(&self, new: &NewToken) -> anyhow::Result<NewTokenView> {
+        self.call_with_body(Method::POST, "/tokens", new).await
+    }
+
+    /// Replaces the secret of a token; only this response has the new one.
+    pub async fn rotate_token(&self, id: TokenId) -> anyhow::Result<NewTokenView> {
+        self.call(Method::POST, &format!("/tokens/{id}/rotate"))
+            .await
+    }
+
+    pub async fn revoke_token(&self, id: TokenId) -> anyhow::Result<TokenView> {
+        self.call(Method::DELETE, &format!("/tokens/{id}")).await
+    }
+
+    /// The users that the caller may see.
+    pub async fn users(&self) -> anyhow::Result<Vec<UserView>> {
+        self.list(self.request(Method::GET, "/people")).await
+    }
+
+    /// Removes a user; `confirm` is their name.
+    pub async fn remove_user(
+        &self,
+        id: UserId,
+        confirm: Option<String>,
+    ) -> anyhow::Result<UserView> {
+        let path = format!("/people/{id}/remove");
+        self.call_with_body(Method::POST, &path, &Confirmation { confirm })
+            .await
+    }
+
+    /// Sets the caller's password and revokes all their other tokens and sessions.
+    pub async fn set_password(
+        &self,
+        id: UserId,
+        new: &NewPassword,
+    ) -> anyhow::Result<UserView> {
+        self.call_with_body(Method::PUT, &format!("/people/{id}/password"), new)
+            .await
+    }
+
+    /// Registers a team; only this response has its link.
+    pub async fn register(&self, new: &RegistrationRequest) -> anyhow::Result<NewRegistrationView> {
+        self.call_with_body(Method::POST, "/registrations", new).await
+    }
+
+    /// Creates an invitation; only this response has its link.
+    pub async fn invite(&self, new: &NewInvitation) -> anyhow::Result<NewInvitationView> {
+        self.call_with_body(Method::POST, "/invitations", new).await
+    }
+
+    /// The invitations that the caller may manage, the newest first.
+    pub async fn invitations(&self) -> anyhow::Result<Vec<InvitationView>> {
+        self.list(self.request(Method::GET, "/invitations")).await
+    }
+
+    /// Revokes an invitation.
+    pub async fn revoke_invitation(&self, id: InvitationId) -> anyhow::Result<InvitationView> {
+        self.call(Method::DELETE, &format!("/invitations/{id}"))
+            .await
+    }
+
+    /// Accepts an invitation; only this response has the token.
+    pub async fn join(&self, join: &JoinRequest) -> anyhow::Result<NewAccountView> {
+        self.call_with_body(Method::POST, "/invitations/accept", join).await
+    }
+
+    pub async fn team(&self, id: TeamId) -> anyhow::Result<TeamView> {
+        self.get(&format!("/teams/{id}")).await
+    }
+
+    /// Changes a team's name or its description.
+    pub async fn change_team(&self, id: TeamId, change: &TeamChange) -> anyhow::Result<TeamView> {
+        self.call_with_body(Method::PATCH, &format!("/teams/{id}"), change)
+            .await
+    }
+
+    /// Retires a team from all future evaluation days; `confirm` is its name.
+    pub async fn retire_team(
+        &self,
+        id: TeamId,
+        confirm: Option<String>,
+    ) -> anyhow::Result<TeamView> {
+        let path = format!("/teams/{id}/retire");
+        self.call_with_body(Method::POST, &path, &Confirmation { confirm })
+            .await
+    }
+
+    /// Returns a retired team to the competition.
+    pub async fn return_team(&self, id: TeamId) -> anyhow::Result<TeamView> {
+        self.call(Method::POST, &format!("/teams/{id}/return")).await
+    }
+
+    /// All versions of the terms, the newest first.
+    pub async fn terms(&self) -> anyhow::Result<Vec<TermsView>> {
+        self.get("/terms").await
+    }
+
+    /// Organiser: publishes a new version of the terms.
+    pub async fn publish_terms(&self, text: String) -> anyhow::Result<TermsView> {
+        self.call_with_body(Method::POST, "/terms", &NewTerms { text }).await
+    }
+
+    /// Accepts the terms.
+    pub async fn accept_terms(&self, version: u32) -> anyhow::Result<UserView> {
+        self.call(Method::POST, &format!("/terms/{version}/accept"))
+            .await
+    }
+
+    /// All announcements, the newest first.
+    pub async fn announcements(&self) -> anyhow::Result<Vec<AnnouncementView>> {
+        self.list(self.request(Method::GET, "/announcements")).await
+    }
+
+    pub async fn announce(&self, title: String, text: String) -> anyhow::Result<AnnouncementView> {
+        let new = NewAnnouncement { title, text };
+        self.call_with_body(Method::POST, "/announcements", &new).await
+    }
+
+    /// The questions that the caller may read, the newest first.
+    pub async fn questions(&self) -> anyhow::Result<Vec<QuestionView>> {
+        self.list(self.request(Method::GET, "/questions")).await
+    }
+
+    /// Team: asks the organisers.
+    pub async fn ask(&self, text: String) -> anyhow::Result<QuestionView> {
+        self.call_with_body(Method::POST, "/questions", &NewQuestion { text })
+            .await
+    }
+
+    /// Organiser: answers a question.
+    pub async fn answer(
+        &self,
+        id: QuestionId,
+        text: String,
+        public: bool,
+    ) -> anyhow::Result<QuestionView> {
+        let new = NewAnswer { text, public };
+        self.call_with_body(Method::PUT, &format!("/questions/{id}/answer"), &new)
+            .await
+    }
+
+    /// Organiser: all registrations, the newest first.
+    pub async fn registrations(&self) -> anyhow::Result<Vec<RegistrationView>> {
+        self.list(self.request(Method::GET, "/registrations")).await
+    }
+
+    /// Organiser: approves a registration.
+    pub async fn approve(&self, id: RegistrationId) -> anyhow::Result<RegistrationView> {
+        self.call(Method::POST, &format!("/registrations/{id}/approve"))
+            .await
+    }
+
+    /// Organiser: refuses a registration.
+    pub async fn refuse(
+        &self,
+        id: RegistrationId,
+        reason: String,
+    ) -> anyhow::Result<RegistrationView> {
+        let path = format!("/registrations/{id}/refuse");
+        self.call_with_body(Method::POST, &path, &Reason { reason }).await
+    }
+
+    /// Organiser: opens or closes registration, or sets the divisions.
+    pub async fn change_season(&self, change: &SeasonChange) -> anyhow::Result<SeasonView> {
+        self.call_with_body(Method::PATCH, "/season", change).await
+    }
+}
