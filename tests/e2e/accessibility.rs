@@ -70,7 +70,10 @@ fn dashboards_follow_accessibility_rules() {
     let axe = axe();
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
     let (server, evaluation) = released_evaluation(scratch.path());
-    let id = evaluation.rsplit('/').next().expect("the path ends with the id");
+    let id = evaluation
+        .rsplit('/')
+        .next()
+        .expect("the path ends with the id");
     let view: Value = server
         .get(
             &format!("/api/v1/evaluations/{id}"),

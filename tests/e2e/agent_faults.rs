@@ -70,7 +70,10 @@ fn faulty_agent_gets_reason_and_log_without_affecting_others() {
         let log = verdict["log"].as_str().expect("an invalid agent has a log");
         assert!(log.contains(&format!("{name} speaks")), "{name}: {log:?}");
     }
-    assert_eq!(good.wait_until_finished(&server, &evaluation)["state"], "finished");
+    assert_eq!(
+        good.wait_until_finished(&server, &evaluation)["state"],
+        "finished"
+    );
 }
 
 #[test]

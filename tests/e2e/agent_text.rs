@@ -134,7 +134,10 @@ fn command_path_reveals_nothing_about_host_files() {
                 format!("name = \"x\"\ncommand = [\"{directory}{name}\"]\nruntime = \"python3\"\n");
             fs::write(folder.join("agent.toml"), manifest).expect("a scratch file");
             let verdict = team.submit(&server, &folder);
-            assert_eq!(verdict["state"], "invalid", "{directory}{name}: {verdict:#}");
+            assert_eq!(
+                verdict["state"], "invalid",
+                "{directory}{name}: {verdict:#}"
+            );
             format!("{} {}", verdict["reason"], verdict["log"]).replace(name, "NAME")
         });
         assert_eq!(answers[0], answers[2], "{directory}");

@@ -219,12 +219,20 @@ fn damaged_backup_is_neither_restored_nor_reported_intact() {
     // The backup of a data folder with a lost file is made, and reports the missing file.
     let lost = files(&at("data").join("artifacts/datasets")).remove(0);
     fs::remove_file(&lost).expect("a scratch file");
-    let errors =
-        backup(&["backup", text(&at("incomplete")), "--data-dir", text(&at("data"))]).expect_failure(FAILED);
+    let errors = backup(&[
+        "backup",
+        text(&at("incomplete")),
+        "--data-dir",
+        text(&at("data")),
+    ])
+    .expect_failure(FAILED);
     assert!(errors.contains("missing: artifacts/datasets/"), "{errors}");
     assert!(at("incomplete").join("backup.json").exists());
     let errors = backup(&["restore", text(&at("incomplete")), "--check"]).expect_failure(FAILED);
-    assert!(errors.contains("lacks 1 files that its database refers to"), "{errors}");
+    assert!(
+        errors.contains("lacks 1 files that its database refers to"),
+        "{errors}"
+    );
 
     // Each file of the backup is damaged in turn.
     let all = files(&at("backup"));
@@ -289,7 +297,8 @@ fn database_of_later_version_is_refused_with_reason() {
         assert!(errors.contains(message), "{errors}");
     }
     let target = scratch.path().join("backup-of-later");
-    faceoff(&["backup", text(&target), "--data-dir", text(&data)], "").expect_refusal(FAILED, &messages);
+    faceoff(&["backup", text(&target), "--data-dir", text(&data)], "")
+        .expect_refusal(FAILED, &messages);
     assert!(!target.exists());
     // The backup from before the upgrade can be restored.
     faceoff(
@@ -306,7 +315,8 @@ fn first_release_data_folder_is_backed_up_before_upgrade() {
     unpack("data-folder-e67a08c.tar.gz", scratch.path());
     let (data, back) = (scratch.path().join("data"), scratch.path().join("backup"));
     // The fixture lacks Delta's bundle: the backup has the rest, and reports the missing file.
-    let errors = faceoff(&["backup", text(&back), "--data-dir", text(&data)], "").expect_failure(FAILED);
+    let errors =
+        faceoff(&["backup", text(&back), "--data-dir", text(&data)], "").expect_failure(FAILED);
     assert_eq!(
         errors.matches("missing: artifacts/bundles/").count(),
         1,

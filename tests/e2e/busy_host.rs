@@ -131,7 +131,11 @@ impl Load {
 }
 
 /// Evaluates a day of the season in `data`, from uploads to results, beside a load.
-fn evaluate_day(data: &Path, scratch: &Path, start_load: impl FnOnce(&mut Load, &Server)) -> Vec<Value> {
+fn evaluate_day(
+    data: &Path,
+    scratch: &Path,
+    start_load: impl FnOnce(&mut Load, &Server),
+) -> Vec<Value> {
     let server = Server::start(data, CONFIG);
     let mut load = Load::default();
     start_load(&mut load, &server);
@@ -232,7 +236,8 @@ fn threads_of(server: &Server) -> (Vec<ThreadCpus>, Vec<ThreadCpus>) {
     for task in tasks.flatten() {
         // A thread that has just ended has no files.
         let read = |file: &str| fs::read_to_string(task.path().join(file)).ok();
-        let (Some(name), Some(stat), Some(status)) = (read("comm"), read("stat"), read("status")) else {
+        let (Some(name), Some(stat), Some(status)) = (read("comm"), read("stat"), read("status"))
+        else {
             continue;
         };
         let after_name = stat.rsplit_once(") ").expect("a name in brackets").1;
@@ -279,7 +284,10 @@ fn http_threads_yield_and_avoid_agent_cpus() {
     let slot = cpus_of(&ordinary, "faceoff-slot");
     assert_eq!(slot.len(), 1, "{ordinary:?}");
     for name in ["http", "sqlx-sqlite", "service"] {
-        assert!(!cpus_of(&low_priority, name).is_empty(), "{name}: {low_priority:?}");
+        assert!(
+            !cpus_of(&low_priority, name).is_empty(),
+            "{name}: {low_priority:?}"
+        );
     }
     // A thread that was just started for a slot's request lowers its priority first of all.
     let has_service_thread = |threads: &[ThreadCpus]| {

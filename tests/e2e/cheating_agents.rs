@@ -227,7 +227,9 @@ fn slow_answers_report_agent_and_host_time() {
         .expect("the API speaks JSON");
     let (mut computed, mut slept) = (0, 0);
     for (task, task_violations) in violations["tasks"].as_object().expect("there are tasks") {
-        let slow = task_violations["computation_time"].as_array().expect("a list");
+        let slow = task_violations["computation_time"]
+            .as_array()
+            .expect("a list");
         assert_eq!(slow.len(), 8, "{task}: {task_violations:#}");
         for episode in slow {
             let slowest = &episode["slowest"];

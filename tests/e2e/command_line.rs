@@ -2,7 +2,7 @@
 
 use crate::{
     CONFIG, Team,
-    commands::{FAILED, USAGE_ERROR, NOT_ALLOWED, REFUSED, UNREACHABLE, admin, faceoff_with_home},
+    commands::{FAILED, NOT_ALLOWED, REFUSED, UNREACHABLE, USAGE_ERROR, admin, faceoff_with_home},
     start_day,
 };
 use faceoff_tests::{
@@ -43,7 +43,10 @@ fn sign_in_and_sign_out_never_print_the_token() {
         "fo_person_x\n",
     )
     .expect_refusal(UNREACHABLE, &["talking to http://127.0.0.1:1"]);
-    assert!(!file.exists(), "a token that cannot be verified is not stored");
+    assert!(
+        !file.exists(),
+        "a token that cannot be verified is not stored"
+    );
 
     // Joining with --sign-in stores the token.
     let link = team_invitation_link(&server);
@@ -85,7 +88,9 @@ fn sign_in_and_sign_out_never_print_the_token() {
 
     // Sign out without revoking the token.
     let credentials = fs::read_to_string(&file).expect("the file can be read");
-    let stored = credentials.split('"').find(|word| word.starts_with("fo_person_"));
+    let stored = credentials
+        .split('"')
+        .find(|word| word.starts_with("fo_person_"));
     let token = stored.expect("the token is in the file").to_owned();
     let output = ada(&["logout", "--keep-token"], "").expect_success();
     assert!(output.contains("still valid"), "{output}");
@@ -223,16 +228,27 @@ fn submitted_folder_is_evaluated_and_dataset_downloaded() {
     ada(&["activate", &second]).expect_success();
     let board = ada(&["board", "--json"]).json();
     assert_eq!(board["rows"], serde_json::json!([]));
-    assert!(ada(&["board", "hit"]).expect_success().contains("no results yet"));
+    assert!(
+        ada(&["board", "hit"])
+            .expect_success()
+            .contains("no results yet")
+    );
     let offered = ada(&["runtimes", "--json"]).json();
     assert_eq!(offered["network"], "none", "{offered:#}");
     let output = ada(&["runtimes"]).expect_success();
-    assert!(output.contains("python3") && output.contains("glibc"), "{output}");
+    assert!(
+        output.contains("python3") && output.contains("glibc"),
+        "{output}"
+    );
     let season = ada(&["season", "--json"]).json();
     assert_eq!(season["closed_at"], Value::Null, "{season:#}");
     assert!(ada(&["season"]).expect_success().contains("commitment "));
     assert_eq!(ada(&["health", "--json"]).json()["status"], "ok");
-    assert!(ada(&["health"]).expect_success().starts_with("ok, version "));
+    assert!(
+        ada(&["health"])
+            .expect_success()
+            .starts_with("ok, version ")
+    );
     ada(&["board", "--division", "Open"]).expect_refusal(REFUSED, &["404"]);
     ada(&["board", "--stage", "Final"]).expect_refusal(FAILED, &["there is no stage"]);
 
@@ -241,7 +257,8 @@ fn submitted_folder_is_evaluated_and_dataset_downloaded() {
         .as_str()
         .expect("the active submission is evaluated")
         .to_owned();
-    let token = fs::read_to_string(home.join("faceoff/credentials.toml")).expect("the login is stored");
+    let token =
+        fs::read_to_string(home.join("faceoff/credentials.toml")).expect("the login is stored");
     let token = token
         .split('"')
         .find(|word| word.starts_with("fo_person_"))
@@ -346,7 +363,12 @@ fn status_watch_prints_each_change() {
     });
     let first = views.next().expect("it prints the team's state first");
     assert_eq!(first["me"]["active_submission"], id, "{first:#}");
-    faceoff_with_home(scratch.path(), &[&["withdraw", id][..], &options].concat(), "").expect_success();
+    faceoff_with_home(
+        scratch.path(),
+        &[&["withdraw", id][..], &options].concat(),
+        "",
+    )
+    .expect_success();
     let changed = views.find(|view| view["me"]["active_submission"].is_null());
     assert!(changed.is_some(), "a change is printed");
     watching.kill().expect("a child can be killed");

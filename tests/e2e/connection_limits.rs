@@ -6,7 +6,7 @@ use crate::{
 };
 use faceoff_tests::{
     repository,
-    server::{TIMEOUT, Server, http},
+    server::{Server, TIMEOUT, http},
 };
 use rustix::{
     net::{AddressFamily, SocketType, bind, connect, socket, sockopt::set_socket_recv_buffer_size},
@@ -215,9 +215,12 @@ fn connection_waits_while_server_lacks_descriptors() {
             maximum: getrlimit(Resource::Nofile).maximum,
         },
     );
-    let mut stream = TcpStream::connect(server.address()).expect("the system accepts the connection");
+    let mut stream =
+        TcpStream::connect(server.address()).expect("the system accepts the connection");
     let request = b"GET /api/v1/health/live HTTP/1.1\r\nHost: faceoff\r\nConnection: close\r\n\r\n";
-    stream.write_all(request).expect("the system buffers the request");
+    stream
+        .write_all(request)
+        .expect("the system buffers the request");
     server.wait_for_log("no connection can be accepted", 1);
 
     limit_descriptors(&server, before);

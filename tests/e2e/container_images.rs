@@ -1,9 +1,9 @@
 //! Container images as bundles: an image is uploaded, validated and scored like any other bundle.
 
 use crate::{
-    Team,
+    Team, evaluation_path,
     kills::{assert_same, outcome},
-    evaluation_path, start_day,
+    start_day,
 };
 use faceoff_tests::{bundle, program, server::Server};
 use flate2::{Compression, write::GzEncoder};
@@ -60,7 +60,9 @@ fn sha256(bytes: &[u8]) -> String {
 /// An image with these files in its layers, as `docker save` writes it.
 fn image_archive(layers: &[Vec<(String, Vec<u8>)>]) -> Vec<u8> {
     let mut image = tar::Builder::new(GzEncoder::new(Vec::new(), Compression::fast()));
-    let mut add = |name: &str, bytes: &[u8]| append(&mut image, name, bytes).expect("writing to memory does not fail");
+    let mut add = |name: &str, bytes: &[u8]| {
+        append(&mut image, name, bytes).expect("writing to memory does not fail")
+    };
     let (mut names, mut diff_ids) = (Vec::new(), Vec::new());
     for (number, files) in layers.iter().enumerate() {
         let mut layer = tar::Builder::new(Vec::new());

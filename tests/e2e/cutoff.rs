@@ -94,7 +94,8 @@ fn variants_after_release_get_no_evaluation_of_the_day() {
     let first = greedy.submit(&server, &holding_agent(scratch.path(), "first"));
     let entered = stopped.submit(&server, &holding_agent(scratch.path(), "entered"));
     let day = start_day(&server);
-    let [finished, cancelled] = [&first, &entered].map(|submission| evaluation_path(&day, submission));
+    let [finished, cancelled] =
+        [&first, &entered].map(|submission| evaluation_path(&day, submission));
     let reason = json!({ "reason": "power cut" });
     let cancel = server.post(&format!("{cancelled}/cancel"), &server.admin_token, &reason);
     assert_eq!(cancel.status(), 200);
@@ -217,7 +218,8 @@ fn pending_rerun_delays_release_and_locks_out_no_team() {
     fs::rename(&bundles, &lost).expect("it was uploaded");
     let server = Server::start(&data_dir, &config);
     let day = start_day(&server);
-    let [finished, failed, lost_bundle] = [0, 1, 2].map(|index| evaluation_path(&day, &submissions[index]));
+    let [finished, failed, lost_bundle] =
+        [0, 1, 2].map(|index| evaluation_path(&day, &submissions[index]));
     let done = early.wait_until_finished(&server, &finished);
     assert_eq!(done["state"], "finished", "{done:#}");
     assert!(done["result"]["score"].is_number(), "{done:#}");

@@ -33,11 +33,7 @@ impl<'a> InvitedUser<'a> {
 
 /// A page of a user who has accepted an invitation.
 pub fn sign_in<'a>(browser: &'a Browser, server: &Server, user: InvitedUser<'_>) -> Page<'a> {
-    let invited = server.post(
-        "/api/v1/invitations",
-        &server.admin_token,
-        &user.invitation,
-    );
+    let invited = server.post("/api/v1/invitations", &server.admin_token, &user.invitation);
     let invited: Value = invited.json().expect("the API speaks JSON");
     let code = invited["code"].as_str().expect("an invitation has a code");
     let page = browser.open(&format!("{}/join/{code}", server.url));
@@ -93,7 +89,10 @@ fn dashboards_suffice_to_join_upload_and_start_a_day() {
         "{}",
         ada.text(".refused")
     );
-    assert_eq!(ada.text("form[data-upload] [role=status]"), "Upload failed.");
+    assert_eq!(
+        ada.text("form[data-upload] [role=status]"),
+        "Upload failed."
+    );
     let hold = bundle::pack(&repository().join("agents/hold"));
     drop_file(&ada, "hold.tar.gz", &hold);
     ada.wait_for(".done");

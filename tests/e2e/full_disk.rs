@@ -7,7 +7,7 @@
 use crate::{Team, dataset, entry, score_locally, upgrade, without_times};
 use faceoff_tests::{
     bundle::{pack, python_bundle},
-    server::{TIMEOUT, Server, http},
+    server::{Server, TIMEOUT, http},
     small_disk::{FilledDisk, LogTo, SmallDisk},
 };
 use reqwest::blocking::Body;
@@ -134,10 +134,7 @@ fn exhaust_database(server: &Server) -> u32 {
         if refused > 0 && health(server).1["database"] == "not writable" {
             return refused;
         }
-        assert!(
-            started.elapsed() < TIMEOUT,
-            "{number} teams on a full disk"
-        );
+        assert!(started.elapsed() < TIMEOUT, "{number} teams on a full disk");
     }
 }
 
@@ -300,7 +297,9 @@ fn upload_on_disk_that_fills_up_leaves_no_files() {
     let body = HalfwayReader {
         bytes: io::Cursor::new(archive.clone()),
         at_half: Some(move || {
-            sender.send(FilledDisk::fill(&root)).expect("the test waits");
+            sender
+                .send(FilledDisk::fill(&root))
+                .expect("the test waits");
         }),
     };
     let refused = http()
@@ -437,7 +436,11 @@ fn block_database_writes(log: LogTo, min_free_bytes: u64) {
     let refused = exhaust_database(server);
     // waits longer than a lease of 5 s
     while since.elapsed() < Duration::from_secs(8) {
-        assert_eq!(try_create_team(server, "Refused"), 507, "after {refused} refusals");
+        assert_eq!(
+            try_create_team(server, "Refused"),
+            507,
+            "after {refused} refusals"
+        );
     }
     assert_eq!(server.get("/api/v1/health/live", None).status(), 200);
     // requests that need no space are answered

@@ -125,7 +125,11 @@ fn board_and_evaluation_pages_follow_day_without_reload() {
                     2
                 );
             }
-            assert_eq!(page.evaluate(CLIPPED_TEXTS), serde_json::json!([]), "{path}");
+            assert_eq!(
+                page.evaluate(CLIPPED_TEXTS),
+                serde_json::json!([]),
+                "{path}"
+            );
             assert_eq!(page.console_errors(), [""; 0], "{path}");
         }
     }
@@ -195,10 +199,14 @@ fn hidden_page_closes_stream_and_scroll_position_is_kept() {
     mark(&scrolled);
     let _ = scrolled.evaluate("scrollTo(0, document.documentElement.scrollHeight)");
     let footer_top = "document.querySelector('footer a').getBoundingClientRect().top";
-    let [before, height] = [footer_top, "document.body.offsetHeight"].map(|expression| scrolled.evaluate(expression));
+    let [before, height] =
+        [footer_top, "document.body.offsetHeight"].map(|expression| scrolled.evaluate(expression));
     assert!(
-        scrolled.evaluate("document.querySelector('#result')").is_null()
-            && scrolled.evaluate("document.querySelector('main').getBoundingClientRect().bottom < 0")
+        scrolled
+            .evaluate("document.querySelector('#result')")
+            .is_null()
+            && scrolled
+                .evaluate("document.querySelector('main').getBoundingClientRect().bottom < 0")
                 == true,
         "the part that will change is above the visible part"
     );
@@ -207,7 +215,8 @@ fn hidden_page_closes_stream_and_scroll_position_is_kept() {
     assert!(was_not_reloaded(&scrolled));
     assert_ne!(scrolled.evaluate("document.body.offsetHeight"), height);
     // Browsers scroll by whole pixels.
-    let [before, now] = [before, scrolled.evaluate(footer_top)].map(|top| top.as_f64().unwrap_or(f64::NAN));
+    let [before, now] =
+        [before, scrolled.evaluate(footer_top)].map(|top| top.as_f64().unwrap_or(f64::NAN));
     assert!((now - before).abs() < 1.0, "from {before} to {now}");
 
     // A page that becomes visible again is updated.

@@ -2,7 +2,7 @@
 
 use crate::{
     CONFIG,
-    commands::{CommandOutput, FAILED, USAGE_ERROR, UNREACHABLE, admin, faceoff},
+    commands::{CommandOutput, FAILED, UNREACHABLE, USAGE_ERROR, admin, faceoff},
     python_packages::python3_ml_config,
 };
 use faceoff_tests::{
@@ -24,7 +24,12 @@ fn text(path: &Path) -> &str {
 }
 
 /// Arguments of `faceoff eval --like-server` for one episode.
-fn eval_args<'a>(bundle: &'a Path, url: &'a str, out: &'a Path, options: &[&'a str]) -> Vec<String> {
+fn eval_args<'a>(
+    bundle: &'a Path,
+    url: &'a str,
+    out: &'a Path,
+    options: &[&'a str],
+) -> Vec<String> {
     let args = [
         "eval",
         text(bundle),
@@ -201,7 +206,9 @@ fn fake_server(bodies: Vec<String>) -> String {
                 "HTTP/1.1 200 OK\r\ncontent-type: application/json\r\ncontent-length: {}\r\nconnection: close\r\n\r\n{body}",
                 body.len()
             );
-            client.write_all(answer.as_bytes()).expect("the program reads the answer");
+            client
+                .write_all(answer.as_bytes())
+                .expect("the program reads the answer");
         }
     });
     format!("http://{address}")

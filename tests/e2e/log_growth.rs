@@ -1,6 +1,6 @@
 //! The database's write-ahead log stays bounded, whatever clients read.
 
-use faceoff_tests::server::{TIMEOUT, Server};
+use faceoff_tests::server::{Server, TIMEOUT};
 use serde_json::json;
 use std::{
     fs,

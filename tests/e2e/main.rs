@@ -163,7 +163,11 @@ fn entry(dataset: &mut ZipArchive<Cursor<Bytes>>, name: &str) -> Value {
 /// The result of the local evaluator for a bundle: with the seeds from a dataset's manifest, this number of episodes per
 /// task, and another number of workers than the server.
 fn score_locally(bundle: &Path, manifest: &Value, episodes: u32, out: &Path) -> Value {
-    let seed = |name: &str| manifest[name].as_str().expect("the manifest contains the seeds");
+    let seed = |name: &str| {
+        manifest[name]
+            .as_str()
+            .expect("the manifest contains the seeds")
+    };
     let local = Command::new(program("faceoff"))
         .arg("eval")
         .arg(bundle)

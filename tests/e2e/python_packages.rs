@@ -77,7 +77,10 @@ fn server_and_doctor_report_contents_of_runtimes() {
         (&python["kind"], &ml["kind"]),
         (&json!("python"), &json!("python"))
     );
-    assert_eq!(python["version"], ml["version"], "one is based on the other");
+    assert_eq!(
+        python["version"], ml["version"],
+        "one is based on the other"
+    );
     assert_eq!(
         (&native["kind"], &native["libc"]),
         (&json!("native"), &ml["libc"])

@@ -12,9 +12,9 @@ mod nats_problems;
 mod shutdown;
 
 use crate::{
-    Team,
+    Team, evaluation_path,
     kills::{Archive, assert_same, copy_folder, outcome},
-    evaluation_path, start_day,
+    start_day,
 };
 use faceoff_tests::{bundle, nats::Nats, relay::Relay, server::Server};
 use serde_json::{Value, json};
@@ -104,7 +104,11 @@ impl ReferenceRun {
     }
 
     fn prepare_many_shards(scratch: &Path) -> Self {
-        Self::prepare_with(scratch, &many_shards(&local_config()), 3 * MANY_EPISODES as usize)
+        Self::prepare_with(
+            scratch,
+            &many_shards(&local_config()),
+            3 * MANY_EPISODES as usize,
+        )
     }
 
     fn prepare_with(scratch: &Path, config: &str, episodes: usize) -> Self {
@@ -128,7 +132,9 @@ impl ReferenceRun {
     fn assert_equal_result(&self, server: &Server) {
         let found = outcome(server, &self.team, &self.evaluation);
         let evaluation = server.poll(&self.evaluation, &self.team.token, |_| true);
-        let submission = evaluation["submission"].as_str().expect("an evaluation names its submission");
+        let submission = evaluation["submission"]
+            .as_str()
+            .expect("an evaluation names its submission");
         let submission = self.team.submission(server, submission);
         assert_eq!(submission["state"], "valid", "{submission:#}");
         assert_eq!(assert_same(found, self.expected.clone()), self.episodes);

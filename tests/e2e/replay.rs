@@ -96,7 +96,11 @@ fn replay_shows_recorded_positions_in_3d_and_flat_view() {
     packed.write_all(&bytes).expect("memory can be written");
     let clip = Clip::read(&packed.finish().expect("memory can be written"));
     let positions = clip.expect("it is a clip").puck_positions();
-    assert!(positions.len() > 20, "an episode of {} samples", positions.len());
+    assert!(
+        positions.len() > 20,
+        "an episode of {} samples",
+        positions.len()
+    );
 
     let page = browser.open(&format!("{}{path}", server.url));
     page.wait_for("#replay[data-state=ready]");
@@ -127,7 +131,12 @@ fn replay_shows_recorded_positions_in_3d_and_flat_view() {
     let _ = page.evaluate(
         "document.querySelectorAll('#replay input[type=checkbox]:checked').forEach(box => box.click())",
     );
-    let samples = [0, positions.len() / 3, 2 * positions.len() / 3, positions.len() - 1];
+    let samples = [
+        0,
+        positions.len() / 3,
+        2 * positions.len() / 3,
+        positions.len() - 1,
+    ];
     let seen: Vec<[f64; 3]> = samples
         .iter()
         .map(|sample| {
@@ -285,10 +294,7 @@ const FRAME_MS: f64 = 4.0;
 
 #[test]
 #[ignore = "its verdict depends on the speed of the machine; `make frames` runs it"]
-#[expect(
-    clippy::print_stdout,
-    reason = "it prints its measurements"
-)]
+#[expect(clippy::print_stdout, reason = "it prints its measurements")]
 fn frames_need_little_script_time() {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
     let (server, evaluation) = released_evaluation(scratch.path());

@@ -2,7 +2,7 @@
 
 use crate::{
     CONFIG, Team,
-    commands::{USAGE_ERROR, REFUSED, admin, faceoff, member},
+    commands::{REFUSED, USAGE_ERROR, admin, faceoff, member},
 };
 use faceoff_tests::{
     bundle::{python_agent, python_bundle, reference},
@@ -44,10 +44,7 @@ fn stage_refuses_other_runtimes_and_names_accepted_ones() {
         (&json!("valid"), &json!("python3"))
     );
     let output = change("native").expect_success();
-    assert!(
-        output.contains("runtimes native only"),
-        "{output}"
-    );
+    assert!(output.contains("runtimes native only"), "{output}");
 
     let refused = team.submit(&server, &python);
     assert_eq!(refused["state"], "invalid", "{refused:#}");

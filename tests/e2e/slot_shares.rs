@@ -115,10 +115,7 @@ fn assert_fair_shares(
         ),
         (&other, &one),
     ] {
-        let both: Vec<&LoggedJob> = jobs
-            .iter()
-            .filter(|job| one(job) || other(job))
-            .collect();
+        let both: Vec<&LoggedJob> = jobs.iter().filter(|job| one(job) || other(job)).collect();
         // Before the first and after the last job of the other kind, none of it is pending.
         let opposites = || both.iter().enumerate().filter(|(_, job)| opposite(job));
         let first = opposites().next().expect("there are some").0;
@@ -129,8 +126,10 @@ fn assert_fair_shares(
         for run in both[first..last].chunk_by(|a, b| kind(a) == kind(b)) {
             if kind(run[0]) {
                 // The last of them was started while this kind was not ahead.
-                let before_last: i64 =
-                    run[..run.len() - 1].iter().map(|job| job.duration_ms()).sum();
+                let before_last: i64 = run[..run.len() - 1]
+                    .iter()
+                    .map(|job| job.duration_ms())
+                    .sum();
                 assert!(before_last <= longest, "{run:#?}\nin {jobs:#?}");
             }
         }
@@ -150,8 +149,7 @@ fn quick_bundle(scratch: &Path) -> std::path::PathBuf {
 }
 
 fn shards_of(jobs: &[LoggedJob], evaluation: &str) -> usize {
-    jobs
-        .iter()
+    jobs.iter()
         .filter(|job| job.kind == "shard" && evaluation.ends_with(&job.subject))
         .count()
 }
@@ -234,7 +232,11 @@ fn evaluations_share_slots_and_ablations_run_after_them() {
         &server.admin_token,
         &json!({ "episodes_per_task": 1 }),
     );
-    assert_eq!(requested.status().as_u16() / 100, 2, "requesting an ablation");
+    assert_eq!(
+        requested.status().as_u16() / 100,
+        2,
+        "requesting an ablation"
+    );
     let day = start_day(&server);
     let evaluations = ["Slow", "Quick"].map(|name| evaluation_path(&day, &teams[name].1));
     for (path, name) in evaluations.iter().zip(["Slow", "Quick"]) {
@@ -255,8 +257,14 @@ fn evaluations_share_slots_and_ablations_run_after_them() {
     );
     // Ablations do not delay the day. One job of the ablation may have started before the day.
     let counts = |job: &LoggedJob| is_shard_of(slow, job) || is_shard_of(quick, job);
-    let last = jobs.iter().rposition(counts).expect("both evaluations are finished");
-    let first = jobs.iter().position(counts).expect("both evaluations are finished");
+    let last = jobs
+        .iter()
+        .rposition(counts)
+        .expect("both evaluations are finished");
+    let first = jobs
+        .iter()
+        .position(counts)
+        .expect("both evaluations are finished");
     assert!(
         jobs[first..=last]
             .iter()

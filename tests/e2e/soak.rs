@@ -4,8 +4,8 @@
 #![expect(clippy::print_stdout, reason = "it prints a summary of its run")]
 
 use crate::{
-    Team, dataset, entry, log_growth::LOG_LIMIT_BYTES, kills::draw, evaluation_path, score_locally, start_day,
-    upgrade, without_times,
+    Team, dataset, entry, evaluation_path, kills::draw, log_growth::LOG_LIMIT_BYTES, score_locally,
+    start_day, upgrade, without_times,
 };
 use faceoff_tests::{
     bundle::{pack, python_agent, python_bundle, reference},
@@ -68,7 +68,9 @@ impl Tally {
 }
 
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().expect("no thread panics while it holds the lock")
+    mutex
+        .lock()
+        .expect("no thread panics while it holds the lock")
 }
 
 /// State that all threads share.

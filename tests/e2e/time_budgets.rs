@@ -91,7 +91,9 @@ fn validation_runs_differ_per_upload_and_report_answer_times() {
     let seen: Vec<Value> = (0..3).map(|_| team.submit(&server, &folder)).collect();
     for verdict in &seen {
         assert_eq!(verdict["state"], "valid", "{verdict:#}");
-        let timing = verdict["timing"].as_array().expect("a validation run reports times");
+        let timing = verdict["timing"]
+            .as_array()
+            .expect("a validation run reports times");
         let tasks: Vec<&Value> = timing.iter().map(|timing| &timing["task"]).collect();
         assert_eq!(tasks, ["hit", "defend", "prepare"]);
         for timing in timing {

@@ -4,7 +4,7 @@
 
 use crate::{
     CONFIG, Team,
-    commands::{FAILED, USAGE_ERROR, NOT_ALLOWED, REFUSED, CommandOutput, admin, faceoff, member},
+    commands::{CommandOutput, FAILED, NOT_ALLOWED, REFUSED, USAGE_ERROR, admin, faceoff, member},
     users::invite_and_join,
 };
 use faceoff_tests::{bundle, server::Server};
@@ -105,17 +105,15 @@ fn commands_run_a_tournament_from_opening_to_close() {
     let requested = as_ada("game", &["--json", "test", "Cup"]).json();
     let test_game = id(&requested["queued"][0]).to_owned();
     let watched = as_ada("game", &["watch", &test_game]).expect_success();
-    assert!(
-        watched.contains("over: faceoff game show"),
-        "{watched}"
-    );
+    assert!(watched.contains("over: faceoff game show"), "{watched}");
     let own = as_ada("game", &["list"]).expect_success();
     assert!(
         own.contains(&test_game) && own.contains("  test  "),
         "{own}"
     );
     // A test game is visible to its team alone.
-    member(&server, &teams[1].token, "game", &["show", &test_game]).expect_refusal(REFUSED, &["404"]);
+    member(&server, &teams[1].token, "game", &["show", &test_game])
+        .expect_refusal(REFUSED, &["404"]);
 
     // The round.
     let round = admin(&server, &["tournament", "start-round", "Cup"]).expect_success();
@@ -194,10 +192,7 @@ fn commands_run_a_tournament_from_opening_to_close() {
     let voided = admin(&server, &confirmed).expect_success();
     assert!(voided.contains("void: a camera fell down"), "{voided}");
     let shown = visitor(&server, &["show"]).expect_success();
-    assert!(
-        shown.contains("1 to be repeated"),
-        "{shown}"
-    );
+    assert!(shown.contains("1 to be repeated"), "{shown}");
     admin(&server, &["tournament", "rerun", id(ada_game)]).expect_success();
     wait_for_phase(&server, &cup, "played");
     let repeated = as_organiser(&["show", id(ada_game), "--json"]).json();
@@ -212,7 +207,8 @@ fn commands_run_a_tournament_from_opening_to_close() {
 
     // After the tournament is closed, its games are public.
     admin(&server, &["tournament", "close", "Cup"]).expect_refusal(REFUSED, &["409", "Cup"]);
-    let closed = admin(&server, &["tournament", "close", "Cup", "--confirm", "Cup"]).expect_success();
+    let closed =
+        admin(&server, &["tournament", "close", "Cup", "--confirm", "Cup"]).expect_success();
     assert!(closed.contains("Cup (closed"), "{closed}");
     let public = scratch.path().join("public.zip");
     let download = ["game", "--server", &server.url, "download"];

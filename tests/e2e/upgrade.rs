@@ -25,7 +25,8 @@ struct RecordedAnswers(Value);
 
 impl RecordedAnswers {
     fn read(data_dir: &Path) -> Self {
-        let text = fs::read(data_dir.join("told.json")).expect("the fixture has its server's last answers");
+        let text = fs::read(data_dir.join("told.json"))
+            .expect("the fixture has its server's last answers");
         Self(serde_json::from_slice(&text).expect("it is JSON"))
     }
 
@@ -98,7 +99,9 @@ fn first_release_data_folder_is_upgraded_and_continued() {
             assert!(seed.take().is_string(), "{name}");
         }
         let fields = found.as_object_mut().expect("an answer is an object");
-        let released_at = fields.remove("released_at").expect("an answer has this field");
+        let released_at = fields
+            .remove("released_at")
+            .expect("an answer has this field");
         if name.starts_with("day one") {
             assert!(released_at.is_string(), "{name}");
         }

@@ -8,7 +8,7 @@ use crate::{
 use faceoff_tests::{
     bundle::{pack, python_agent, python_bundle},
     repository,
-    server::{TIMEOUT, Server},
+    server::{Server, TIMEOUT},
 };
 use flate2::{Compression, write::GzEncoder};
 use reqwest::Method;
@@ -100,7 +100,9 @@ impl SlowUpload {
             "POST /api/v1/submissions HTTP/1.1\r\nhost: x\r\nauthorization: Bearer {token}\r\n\
              content-length: {MIB}\r\n\r\n"
         );
-        stream.write_all(head.as_bytes()).expect("the server reads it");
+        stream
+            .write_all(head.as_bytes())
+            .expect("the server reads it");
         if !matches!(slowness, Slowness::NothingAfterHeader) {
             stream.write_all(&GZIP).expect("the server reads it");
         }
@@ -223,7 +225,9 @@ impl Tar {
     fn gz(mut self) -> Vec<u8> {
         self.0.extend_from_slice(&[0; 1024]);
         let mut encoder = GzEncoder::new(Vec::new(), Compression::best());
-        encoder.write_all(&self.0).expect("writing to memory does not fail");
+        encoder
+            .write_all(&self.0)
+            .expect("writing to memory does not fail");
         encoder.finish().expect("writing to memory does not fail")
     }
 }
@@ -245,7 +249,9 @@ fn many_entries(entries: u32) -> Vec<u8> {
         zip.add_directory(format!("f{entry}"), options)
             .expect("writing to memory does not fail");
     }
-    zip.finish().expect("writing to memory does not fail").into_inner()
+    zip.finish()
+        .expect("writing to memory does not fail")
+        .into_inner()
 }
 
 #[test]
@@ -262,12 +268,21 @@ fn oversized_archive_structures_are_refused() {
         tar.gz()
     };
     let empty = GzEncoder::new(Vec::new(), Compression::fast());
-    let mut streams = empty.finish().expect("writing to memory does not fail").repeat(70_000);
+    let mut streams = empty
+        .finish()
+        .expect("writing to memory does not fail")
+        .repeat(70_000);
     streams.extend(Tar::new().gz());
     let overhead = "more bytes than its files explain";
     let archives = [
-        (repeated_entries(EntryType::XHeader, &pax_comment()), overhead),
-        (repeated_entries(EntryType::GNULongName, &vec![b'n'; MIB]), overhead),
+        (
+            repeated_entries(EntryType::XHeader, &pax_comment()),
+            overhead,
+        ),
+        (
+            repeated_entries(EntryType::GNULongName, &vec![b'n'; MIB]),
+            overhead,
+        ),
         (
             Tar::new()
                 .entry(EntryType::Directory, "d", &vec![0; 350 * MIB])
@@ -311,7 +326,9 @@ fn refused_uploads_are_removed_from_disk() {
     let falls = bundle("falls", "sys.stderr.write('I fall\\n')\nsys.exit(9)");
     let no_tar = {
         let mut encoder = GzEncoder::new(Vec::new(), Compression::fast());
-        encoder.write_all(&[7; 5000]).expect("writing to memory does not fail");
+        encoder
+            .write_all(&[7; 5000])
+            .expect("writing to memory does not fail");
         encoder.finish().expect("writing to memory does not fail")
     };
     let bundles = data_dir.join("artifacts/bundles");
@@ -338,7 +355,9 @@ fn refused_uploads_are_removed_from_disk() {
     );
     for slowness in [Slowness::BelowMinRate, Slowness::NothingAfterHeader] {
         let broken = SlowUpload::begin(&server, &team.token, slowness);
-        wait_until("the upload has started", || count_files(&data_dir.join("uploads")) == 1);
+        wait_until("the upload has started", || {
+            count_files(&data_dir.join("uploads")) == 1
+        });
         drop(broken);
         wait_until("its partial file is removed", || {
             count_files(&data_dir.join("uploads")) == 0
@@ -415,7 +434,12 @@ fn upload_quota_is_per_team_and_reported_in_bytes() {
         )))
         .send()
         .expect("the server answers");
-    refused(without_length, 409, "stored-quota-spent", 2 * size + size / 2);
+    refused(
+        without_length,
+        409,
+        "stored-quota-spent",
+        2 * size + size / 2,
+    );
 
     // Refused uploads do not count as stored, but count for the day.
     let mut truncated = bundle.clone();

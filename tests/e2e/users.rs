@@ -3,7 +3,9 @@
 
 use crate::{
     CONFIG,
-    commands::{FAILED, USAGE_ERROR, NOT_ALLOWED, REFUSED, CommandOutput, admin, admin_as, faceoff, member},
+    commands::{
+        CommandOutput, FAILED, NOT_ALLOWED, REFUSED, USAGE_ERROR, admin, admin_as, faceoff, member,
+    },
 };
 use faceoff_tests::server::{Server, http};
 use serde_json::{Value, json};
@@ -21,9 +23,7 @@ fn join(server: &Server, link: &str, args: &[&str]) -> CommandOutput {
 /// The first word of a text that contains this part.
 #[track_caller]
 fn word(text: &str, part: &str) -> String {
-    let found = text
-        .split_whitespace()
-        .find(|word| word.contains(part));
+    let found = text.split_whitespace().find(|word| word.contains(part));
     found
         .unwrap_or_else(|| panic!("no {part} in {text:?}"))
         .to_owned()
@@ -39,7 +39,10 @@ pub fn invite_and_join(server: &Server, invite: &[&str], name: &str) -> String {
     let invited = admin(server, &[&["people"], invite].concat()).expect_success();
     assert!(invited.contains("is not shown again"), "{invited}");
     let link = word(&invited, "/join/fo_invite_");
-    word(&join(server, &link, &["--name", name]).expect_success(), "fo_person_")
+    word(
+        &join(server, &link, &["--name", name]).expect_success(),
+        "fo_person_",
+    )
 }
 
 #[test]
@@ -57,10 +60,12 @@ fn commands_invite_and_remove_users() {
     // An organiser, by a link that is valid once.
     let invited = people(&["invite-organiser", "Grace"]).expect_success();
     let link = word(&invited, "/join/fo_invite_");
-    join(&server, "nonsense", &["--name", "Grace"]).expect_refusal(FAILED, &["expected a link like"]);
+    join(&server, "nonsense", &["--name", "Grace"])
+        .expect_refusal(FAILED, &["expected a link like"]);
     join(&server, &format!("{link}x"), &["--name", "Grace"])
         .expect_refusal(REFUSED, &["the server refused"]);
-    join(&server, &link, &["--name", "<b>"]).expect_refusal(USAGE_ERROR, &["--name", "letters, digits"]);
+    join(&server, &link, &["--name", "<b>"])
+        .expect_refusal(USAGE_ERROR, &["--name", "letters, digits"]);
     join(&server, &link, &[]).expect_refusal(REFUSED, &["name: expected the name"]);
     join(&server, &link, &["--name", "Grace", "--accept-terms", "1"])
         .expect_refusal(REFUSED, &["this season has no terms"]);
@@ -73,7 +78,10 @@ fn commands_invite_and_remove_users() {
     join(&server, &link, &["--name", "Grace again"]).expect_refusal(REFUSED, &["409"]);
     people(&["invite-organiser", ""]).expect_refusal(REFUSED, &["note", "1 to"]);
     let account = member(&server, &grace, "whoami", &[]).expect_success();
-    assert!(account.contains("Grace") && account.contains("organiser"), "{account}");
+    assert!(
+        account.contains("Grace") && account.contains("organiser"),
+        "{account}"
+    );
 
     // A member of a team, with a password.
     let team = admin_as(&server, &grace, &["create-team", "Alpha"]).expect_success();
@@ -114,7 +122,8 @@ fn commands_invite_and_remove_users() {
     ] {
         admin_as(&server, &ada, args).expect_refusal(NOT_ALLOWED, &["403"]);
     }
-    admin_as(&server, "fo_person_unknown", &["people", "list"]).expect_refusal(NOT_ALLOWED, &["401"]);
+    admin_as(&server, "fo_person_unknown", &["people", "list"])
+        .expect_refusal(NOT_ALLOWED, &["401"]);
 
     // The founder of a team.
     let invited = people(&["invite-team", "a founder"]).expect_success();
@@ -199,7 +208,10 @@ fn commands_create_list_rotate_and_revoke_tokens() {
         .expect("it is shown once")
         .to_owned();
     let account = member(&server, &ci, "whoami", &[]).expect_success();
-    assert!(account.contains("API client of the team Alpha"), "{account}");
+    assert!(
+        account.contains("API client of the team Alpha"),
+        "{account}"
+    );
 
     let list = tokens(&["list"]).expect_success();
     let of_laptop = list.lines().find(|line| line.contains("laptop"));
@@ -273,7 +285,11 @@ fn commands_register_teams_and_publish_announcements() {
     fs::write(&terms, b"\xff\xfe").expect("a scratch file can be written");
     publish(&terms).expect_refusal(FAILED, &["reading the terms from"]);
     fs::write(&terms, "Be fair.").expect("a scratch file can be written");
-    assert!(publish(&terms).expect_success().contains("published as version 1"));
+    assert!(
+        publish(&terms)
+            .expect_success()
+            .contains("published as version 1")
+    );
     publish(&terms).expect_refusal(REFUSED, &["the same as the current ones"]);
 
     // Teams can register while registration is open.
@@ -339,7 +355,11 @@ fn commands_register_teams_and_publish_announcements() {
     let of_team = |args: &[&str]| member(&server, &ada, "team", args);
     let upload = || server.upload(&ada, vec![0x1f, 0x8b, 8, 0]).status();
     assert_eq!(upload(), 403);
-    assert!(of_team(&["terms"]).expect_success().contains("Be fair, and quick."));
+    assert!(
+        of_team(&["terms"])
+            .expect_success()
+            .contains("Be fair, and quick.")
+    );
     of_team(&["terms", "--accept", "7"]).expect_refusal(REFUSED, &["expected 2", "got 7"]);
     of_team(&["terms", "--accept", "two"]).expect_refusal(USAGE_ERROR, &["--accept"]);
     of_team(&["terms", "--accept", "2"]).expect_success();

@@ -1,7 +1,7 @@
 //! A real Chromium, controlled by its DevTools protocol over a pair of pipes. It opens no port, and pages need no changes
 //! for it.
 
-use crate::server::{TIMEOUT, Process};
+use crate::server::{Process, TIMEOUT};
 use base64::{Engine, engine::general_purpose::STANDARD};
 use serde_json::{Value, json};
 use std::{
@@ -45,7 +45,7 @@ pub struct View {
 }
 
 impl View {
-        pub const DESKTOP: Self = Self {
+    pub const DESKTOP: Self = Self {
         width: 1280,
         height: 900,
         dark: false,
@@ -127,7 +127,9 @@ impl Browser {
             _process: Process(child),
             _profile: profile,
         };
-        browser.devtools.call(None, "Browser.getVersion", &json!({}));
+        browser
+            .devtools
+            .call(None, "Browser.getVersion", &json!({}));
         browser
     }
 
@@ -481,7 +483,9 @@ impl DevTools {
                     let read = answers.read_until(0, &mut message);
                     let is_end = read.is_err() || message.pop() != Some(0);
                     let (inbox, signal) = &*received;
-                    let mut inbox = inbox.lock().expect("no thread panics while it holds the inbox");
+                    let mut inbox = inbox
+                        .lock()
+                        .expect("no thread panics while it holds the inbox");
                     if is_end {
                         inbox.has_ended = true;
                     } else if let Ok(message) = serde_json::from_slice::<Value>(&message) {
@@ -505,7 +509,10 @@ impl DevTools {
     }
 
     fn inbox(&self) -> MutexGuard<'_, Inbox> {
-        self.received.0.lock().expect("no thread panics while it holds the inbox")
+        self.received
+            .0
+            .lock()
+            .expect("no thread panics while it holds the inbox")
     }
 
     /// Calls a method that must succeed; returns its result.
@@ -515,7 +522,12 @@ impl DevTools {
     }
 
     /// Calls a method; returns its result or its error.
-    fn try_call(&self, session: Option<&str>, method: &str, params: &Value) -> Result<Value, Value> {
+    fn try_call(
+        &self,
+        session: Option<&str>,
+        method: &str,
+        params: &Value,
+    ) -> Result<Value, Value> {
         let id = self.next_id.fetch_add(1, Ordering::Relaxed);
         let mut command = json!({ "id": id, "method": method, "params": params });
         if let Some(session) = session {
@@ -523,7 +535,10 @@ impl DevTools {
         }
         let mut bytes = command.to_string().into_bytes();
         bytes.push(0);
-        let mut pipe = self.commands.lock().expect("no thread panics while it holds the pipe");
+        let mut pipe = self
+            .commands
+            .lock()
+            .expect("no thread panics while it holds the pipe");
         pipe.write_all(&bytes).expect("the browser reads");
         drop(pipe);
         let waiting = |inbox: &mut Inbox| !inbox.has_ended && !inbox.answers.contains_key(&id);

@@ -93,7 +93,9 @@ impl Bucket {
             ("AWS_ACCESS_KEY_ID", "server"),
             ("AWS_SECRET_ACCESS_KEY", "secret"),
         ];
-        variables.map(|(name, value)| (name, value.to_owned())).into()
+        variables
+            .map(|(name, value)| (name, value.to_owned()))
+            .into()
     }
 
     /// The keys of all its objects.

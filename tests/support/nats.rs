@@ -1,6 +1,6 @@
 //! A real `nats-server` with JetStream.
 
-use crate::server::{TIMEOUT, Process};
+use crate::server::{Process, TIMEOUT};
 use std::{
     fs,
     net::{SocketAddr, TcpStream},
@@ -55,7 +55,7 @@ impl Nats {
         }
     }
 
-        #[must_use]
+    #[must_use]
     pub fn process_id(&self) -> u32 {
         self.process.0.id()
     }

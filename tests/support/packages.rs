@@ -76,7 +76,8 @@ pub fn vendor(bundle: &Path, version: &str) {
     };
     if !wheels.exists() {
         fs::create_dir_all(download_cache()).expect("the target folder can be written");
-        let fetched = tempfile::tempdir_in(download_cache()).expect("the target folder can be written");
+        let fetched =
+            tempfile::tempdir_in(download_cache()).expect("the target folder can be written");
         run(&mut pip("download", fetched.path()));
         // A concurrent test may have created the folder.
         let _ = fs::rename(fetched.path(), &wheels);

@@ -116,17 +116,23 @@ impl Relay {
     }
 
     fn link(&self) -> MutexGuard<'_, Link> {
-        self.link.lock().expect("no thread panics while it holds the link")
+        self.link
+            .lock()
+            .expect("no thread panics while it holds the link")
     }
 }
 
 /// Forwards a connection in both directions, or drops it.
 fn forward_connection(link: &Arc<Mutex<Link>>, near: TcpStream) {
     let (target, bytes_until_break) = {
-        let mut link = link.lock().expect("no thread panics while it holds the link");
+        let mut link = link
+            .lock()
+            .expect("no thread panics while it holds the link");
         let connection = link.connections;
         link.connections += 1;
-        let bytes_until_break = link.breaks.map(|breaks| breaks.bytes_until_break(connection));
+        let bytes_until_break = link
+            .breaks
+            .map(|breaks| breaks.bytes_until_break(connection));
         if bytes_until_break == Some(0) {
             link.broken += 1;
             return;
@@ -142,7 +148,9 @@ fn forward_connection(link: &Arc<Mutex<Link>>, near: TcpStream) {
         return;
     };
     {
-        let mut link = link.lock().expect("no thread panics while it holds the link");
+        let mut link = link
+            .lock()
+            .expect("no thread panics while it holds the link");
         link.open.push(near);
         link.open.push(far);
     }
@@ -158,7 +166,10 @@ fn forward(link: &Mutex<Link>, mut from: TcpStream, mut to: TcpStream, left: Opt
     let mut chunk = vec![0; 1 << 16];
     loop {
         let bytes = from.read(&mut chunk).unwrap_or_default();
-        let delay = link.lock().expect("no thread panics while it holds the link").delay;
+        let delay = link
+            .lock()
+            .expect("no thread panics while it holds the link")
+            .delay;
         if !delay.is_zero() {
             thread::sleep(delay);
         }
@@ -169,7 +180,9 @@ fn forward(link: &Mutex<Link>, mut from: TcpStream, mut to: TcpStream, left: Opt
         if forwarded < bytes {
             // The direction that takes the last byte closes both ends.
             if from.shutdown(Shutdown::Both).is_ok() {
-                link.lock().expect("no thread panics while it holds the link").broken += 1;
+                link.lock()
+                    .expect("no thread panics while it holds the link")
+                    .broken += 1;
             }
             // The connection may have ended already.
             let _ = to.shutdown(Shutdown::Both);
@@ -182,7 +195,9 @@ fn forward(link: &Mutex<Link>, mut from: TcpStream, mut to: TcpStream, left: Opt
 
 /// Takes up to this number from the bytes that are left.
 fn take_bytes(left: &Mutex<u64>, bytes: usize) -> usize {
-    let mut left = left.lock().expect("no thread panics while it holds the number");
+    let mut left = left
+        .lock()
+        .expect("no thread panics while it holds the number");
     let taken = usize::try_from(*left).map_or(bytes, |left| left.min(bytes));
     *left -= taken as u64;
     taken

@@ -137,7 +137,7 @@ impl Server {
         }
     }
 
-        #[must_use]
+    #[must_use]
     pub fn process_id(&self) -> u32 {
         self.process.0.id()
     }
@@ -350,7 +350,9 @@ impl Log {
             let text = Arc::clone(&text);
             move || {
                 for line in BufReader::new(stderr).lines().map_while(Result::ok) {
-                    let mut text = text.lock().expect("no thread panics while it holds the log");
+                    let mut text = text
+                        .lock()
+                        .expect("no thread panics while it holds the log");
                     text.push_str(&line);
                     text.push('\n');
                 }
@@ -383,7 +385,9 @@ impl Log {
     fn into_text(self) -> String {
         let Self { text, reader } = self;
         reader.join().expect("the log is read to its end");
-        let text = text.lock().expect("no thread panics while it holds the log");
+        let text = text
+            .lock()
+            .expect("no thread panics while it holds the log");
         text.clone()
     }
 }

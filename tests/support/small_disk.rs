@@ -204,7 +204,9 @@ impl SmallDisk {
     pub fn fill_except(&self, bytes: u64) -> FilledDisk {
         let file = self.data_dir.join(FILLER);
         let free = self.free_bytes();
-        let taken = free.checked_sub(bytes).expect("the disk has this much free space");
+        let taken = free
+            .checked_sub(bytes)
+            .expect("the disk has this much free space");
         let zeros = vec![0; usize::try_from(taken).expect("a small disk")];
         fs::write(&file, zeros).expect("the disk has this much free space");
         FilledDisk {

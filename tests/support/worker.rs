@@ -32,7 +32,12 @@ impl Worker {
     /// # Panics
     /// As [`start`](Self::start).
     #[must_use]
-    pub fn start_with_arguments(scratch: &Path, name: &str, config: &str, arguments: &[&str]) -> Self {
+    pub fn start_with_arguments(
+        scratch: &Path,
+        name: &str,
+        config: &str,
+        arguments: &[&str],
+    ) -> Self {
         let command = Command::new(program("faceoff"));
         Self::start_with_command(command, scratch, name, config, arguments)
     }

@@ -3,7 +3,7 @@
 use striker::arm::Posture;
 use striker::field::Vec2;
 use striker::motion::{Pace, Target};
-use striker::scene::{MalletCommand, Scene, waypoint, lean_side};
+use striker::scene::{MalletCommand, Scene, lean_side, waypoint};
 
 /// Speed of the mallet at the contact, m/s.
 const SPEED: f64 = 0.84;
@@ -92,7 +92,13 @@ impl Hit {
         command
     }
 
-    fn strike(&mut self, scene: &Scene<'_>, contact: f64, mallet: Vec2, velocity: Vec2) -> MalletCommand {
+    fn strike(
+        &mut self,
+        scene: &Scene<'_>,
+        contact: f64,
+        mallet: Vec2,
+        velocity: Vec2,
+    ) -> MalletCommand {
         let left = contact - scene.time;
         if left < 0.5 * scene.dt {
             let pos = scene.mallet.pos + 0.5 * STOP_TIME * scene.mallet.vel;

@@ -114,7 +114,13 @@ impl Prepare {
         MalletCommand::stop(scene, way, if near { Pace::CALM } else { Pace::QUICK })
     }
 
-    fn run(&mut self, scene: &Scene<'_>, normal: Vec2, mallet: Vec2, contact: f64) -> MalletCommand {
+    fn run(
+        &mut self,
+        scene: &Scene<'_>,
+        normal: Vec2,
+        mallet: Vec2,
+        contact: f64,
+    ) -> MalletCommand {
         let left = contact - scene.time;
         if left > 0.5 * scene.dt {
             let target = Target {

@@ -180,7 +180,8 @@ impl Estimator {
     /// A lost puck is reported at its last position, bit for bit, with zero velocity. A puck at rest
     /// without noise looks the same; it may be treated as seen.
     fn is_lost(&self, observed: &PuckObservation) -> bool {
-        let repeated = self.last.is_some_and(|l| l.pose == observed.pose) && observed.velocity == [0.0; 3];
+        let repeated =
+            self.last.is_some_and(|l| l.pose == observed.pose) && observed.velocity == [0.0; 3];
         repeated && self.lost < LOSS_MAX && self.estimate().vel.norm() > 0.005
     }
 

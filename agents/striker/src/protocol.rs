@@ -2,7 +2,7 @@
 
 use std::process::ExitCode;
 
-use faceoff_agent::{AgentInfo, Action, Agent, Failure, Interpolation, Observation};
+use faceoff_agent::{Action, Agent, AgentInfo, Failure, Interpolation, Observation};
 
 use crate::{Env, Policy, Task};
 
@@ -32,5 +32,7 @@ pub fn run<P: Policy>(
         version,
         interpolation: Interpolation::Cubic,
     };
-    faceoff_agent::run(info, |hello| PolicyAgent(make_policy(hello.task, &hello.env)))
+    faceoff_agent::run(info, |hello| {
+        PolicyAgent(make_policy(hello.task, &hello.env))
+    })
 }

@@ -55,7 +55,11 @@ pub fn least_peak(
 }
 
 /// `C Jᵀ (J C Jᵀ)⁻¹ delta` with the diagonal compliance C.
-pub fn weighted_least_squares(jacobian: &Jacobian, delta: &Vector3<f64>, compliance: &Joints) -> Joints {
+pub fn weighted_least_squares(
+    jacobian: &Jacobian,
+    delta: &Vector3<f64>,
+    compliance: &Joints,
+) -> Joints {
     let cjt = SMatrix::<f64, JOINTS, 3>::from_fn(|i, k| compliance[i] * jacobian[(k, i)]);
     let square: Matrix3<f64> = jacobian * cjt;
     // Singular only for a stretched arm, outside of the workspace; the damping keeps the result finite

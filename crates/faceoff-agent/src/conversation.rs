@@ -188,11 +188,15 @@ pub fn serve<A: Agent>(
             }
             Message::Reset { episode } => {
                 let agent = agent.as_mut();
-                agent.ok_or(ConversationError::HelloMissing("reset"))?.reset();
+                agent
+                    .ok_or(ConversationError::HelloMissing("reset"))?
+                    .reset();
                 Answer::Ready(Ready::Reset { episode })
             }
             Message::Step { step, obs } => {
-                let agent = agent.as_mut().ok_or(ConversationError::HelloMissing("step"))?;
+                let agent = agent
+                    .as_mut()
+                    .ok_or(ConversationError::HelloMissing("step"))?;
                 let action = agent
                     .act(&obs)
                     .map_err(|failure| ConversationError::ActFailed { step, failure })?;

@@ -33,6 +33,6 @@ mod env;
 mod observation;
 
 pub use action::{Action, Interpolation};
-pub use conversation::{AgentInfo, Agent, ConversationError, Failure, Hello, Task, run, serve};
+pub use conversation::{Agent, AgentInfo, ConversationError, Failure, Hello, Task, run, serve};
 pub use env::{BaseFrame, Env, JOINTS, RadiusInfo, RobotInfo, TableInfo};
 pub use observation::{Observation, WrongLength};

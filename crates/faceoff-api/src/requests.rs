@@ -1,30 +1,30 @@
 //! Request bodies and query parameters of the API.
 
 mod boards;
-mod episodes;
-mod merge_patch;
 mod double_option;
+mod episodes;
 mod links;
-mod users;
+mod merge_patch;
 mod tournaments;
+mod users;
 mod webhooks;
 
 pub use boards::*;
 pub use episodes::*;
 pub use links::*;
-pub use users::*;
 pub use tournaments::*;
+pub use users::*;
 pub use webhooks::*;
 
 use crate::objects_only;
+use double_option::{deserialize_some, serialize_option};
 use faceoff_archive::Edition;
 use faceoff_types::{
-    DayDeadline, EvaluationId, PerturbationSettings, Profile, Publication, Retention, Runtimes,
-    Schedule, StageId, StageLimits, StageUploadLimits, CountingResult, SubmissionId, Task, TaskWeights,
-    TeamId, TierBounds, Zone,
+    CountingResult, DayDeadline, EvaluationId, PerturbationSettings, Profile, Publication,
+    Retention, Runtimes, Schedule, StageId, StageLimits, StageUploadLimits, SubmissionId, Task,
+    TaskWeights, TeamId, TierBounds, Zone,
 };
 use jiff::{Timestamp, civil::Date};
-use double_option::{deserialize_some, serialize_option};
 use serde::{Deserialize, Deserializer, Serialize};
 use utoipa::{
     IntoParams, ToSchema,

@@ -121,7 +121,11 @@ fn read(
             }
             accept(&manifest)?;
             let overhead = OVERHEAD_BYTES.saturating_mul(manifest.files.len() as u64);
-            allowed.set(total_bytes.saturating_add(overhead).saturating_add(END_BYTES));
+            allowed.set(
+                total_bytes
+                    .saturating_add(overhead)
+                    .saturating_add(END_BYTES),
+            );
             missing = manifest
                 .files
                 .iter()
@@ -154,7 +158,10 @@ fn read(
 }
 
 /// Reads the manifest from the first entry.
-fn read_manifest(entry: &mut tar::Entry<'_, impl Read>, path: &str) -> Result<Manifest, ArchiveError> {
+fn read_manifest(
+    entry: &mut tar::Entry<'_, impl Read>,
+    path: &str,
+) -> Result<Manifest, ArchiveError> {
     if path != MANIFEST_NAME {
         let shown: String = path.chars().take(200).collect();
         return Err(ArchiveError::Refused(format!(

@@ -1,11 +1,11 @@
 //! Reads a dataset: the archive, an unpacked folder, or the folder that `faceoff eval` writes.
 
-mod random_access;
 mod container;
 mod episodes;
 mod file_range;
 mod footer;
 mod layout;
+mod random_access;
 mod seal;
 mod steps;
 

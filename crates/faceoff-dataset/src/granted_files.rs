@@ -1,7 +1,7 @@
 //! Files that a grant allows its holder to write.
 
 use crate::{files::CLIPS_FILE, game::GAME_FILES, shard_folder::SHARD_FILES};
-use faceoff_wire::grant::{Grant, ExpectedRecording, WriteScope};
+use faceoff_wire::grant::{ExpectedRecording, Grant, WriteScope};
 
 /// Names of the files that may be written under a grant.
 #[must_use]

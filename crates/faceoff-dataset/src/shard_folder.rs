@@ -153,7 +153,8 @@ impl ShardRecording {
             // An I/O error does not mean that the recording is damaged.
             _ => error.into(),
         })?;
-        let shard: ShardFile = serde_json::from_slice(&text).map_err(|e| unreadable(SHARD_FILE)(&e))?;
+        let shard: ShardFile =
+            serde_json::from_slice(&text).map_err(|e| unreadable(SHARD_FILE)(&e))?;
         let table = match &*shard.schema {
             SHARD_SCHEMA | WITHOUT_CLIPS_SCHEMA => ShardTable::Current,
             old if OLD_SHARD_SCHEMAS.contains(&old) => ShardTable::Earlier,

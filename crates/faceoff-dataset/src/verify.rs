@@ -7,8 +7,8 @@
 
 pub(crate) mod compare;
 mod difference;
-mod error;
 mod episode_reader;
+mod error;
 mod replay;
 mod season;
 mod shard;
@@ -25,14 +25,14 @@ use crate::{
     score::{ScoredEvaluation, Tally, json_file, score},
     simulator::simulator_id,
 };
+use episode_reader::{EpisodeReader, RecordedEpisode};
 use faceoff_episode::Arena;
 use faceoff_types::{EvaluationResult, Ruleset, Task, UnknownRuleset};
-use episode_reader::{EpisodeReader, RecordedEpisode};
 use rayon::{
     ThreadPoolBuilder,
     iter::{IntoParallelRefIterator, ParallelIterator},
 };
-use replay::{Replayer, ReplayedEpisode};
+use replay::{ReplayedEpisode, Replayer};
 use std::{collections::BTreeMap, num::NonZero};
 
 /// Episodes per thread that are read ahead.
@@ -194,7 +194,9 @@ impl Totals {
             (RESULTS_FILE, json_file(&result)),
         ] {
             let expected = expected.map_err(DatasetError::unreadable(name))?;
-            if let Some(difference) = compare::json_difference(name, &dataset.bytes(name)?, &expected) {
+            if let Some(difference) =
+                compare::json_difference(name, &dataset.bytes(name)?, &expected)
+            {
                 return Err(difference.into());
             }
         }

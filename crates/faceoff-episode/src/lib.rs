@@ -4,21 +4,21 @@
 //! This crate starts no process, opens no file and reads no clock.
 
 mod arena;
+mod end_description;
+mod game_record;
+mod record;
 mod running_episode;
 mod running_game;
-mod game_record;
 mod running_side;
-mod record;
 mod time_sum;
-mod end_description;
 
 pub use arena::Arena;
-pub use running_episode::{RunningEpisode, NonFiniteObservation, Question};
-pub use running_game::{FinishedGame, RunningGame};
+pub use end_description::describe_end;
 pub use game_record::{
-    Effect, RallyEntry, GameSink, GameStepRow, RallyEnding, RallyRow, RallyStart, Response, SideFault,
-    SideStep,
+    Effect, GameSink, GameStepRow, RallyEnding, RallyEntry, RallyRow, RallyStart, Response,
+    SideFault, SideStep,
 };
 pub use record::{AnswerTiming, EpisodeStart, NullSink, RecordError, StepRow, StepSink};
+pub use running_episode::{NonFiniteObservation, Question, RunningEpisode};
+pub use running_game::{FinishedGame, RunningGame};
 pub use time_sum::TimeSum;
-pub use end_description::describe_end;

@@ -1,12 +1,12 @@
 use crate::{
     arena::Arena,
-    running_episode::{NonFiniteObservation, Question, are_finite},
     game_record::{
-        Effect, RallyEntry, GameSink, GameStepRow, RallyEnding, RallyRow, RallyStart, Response,
+        Effect, GameSink, GameStepRow, RallyEnding, RallyEntry, RallyRow, RallyStart, Response,
         SideFault, SideStep,
     },
-    running_side::RunningSide,
     record::RecordError,
+    running_episode::{NonFiniteObservation, Question, are_finite},
+    running_side::RunningSide,
 };
 use faceoff_sim::{Command, Divergence, Game};
 use faceoff_types::{
@@ -181,7 +181,8 @@ impl<S: GameSink> RunningGame<S> {
         let (number, step) = (self.rally(), self.rally_steps());
         let game_step = self.game.steps();
         debug_assert!(self.rally.is_some() && self.end.is_none());
-        let effects = [0, 1].map(|side| self.apply_response(side, &responses[side], step, game_step));
+        let effects =
+            [0, 1].map(|side| self.apply_response(side, &responses[side], step, game_step));
         let commands = [0, 1].map(|side| match (&responses[side], effects[side]) {
             (Response::Answer { action, .. }, Effect::InTime) => Command::Act(action),
             _ => Command::Late,
@@ -206,9 +207,7 @@ impl<S: GameSink> RunningGame<S> {
                 Response::Fault { .. } | Response::Held => None,
             },
             timing: match &responses[side] {
-                Response::Answer { timing, .. } | Response::Fault { timing, .. } => {
-                    Some(*timing)
-                }
+                Response::Answer { timing, .. } | Response::Fault { timing, .. } => Some(*timing),
                 Response::Held => None,
             },
             constraints: played.constraints[side],
@@ -229,7 +228,13 @@ impl<S: GameSink> RunningGame<S> {
     }
 
     /// Applies a side's response; its effect.
-    fn apply_response(&mut self, side: usize, response: &Response<'_>, step: u32, game_step: u32) -> Effect {
+    fn apply_response(
+        &mut self,
+        side: usize,
+        response: &Response<'_>,
+        step: u32,
+        game_step: u32,
+    ) -> Effect {
         let rally = self.rally();
         let side_state = &mut self.sides[side];
         match response {
@@ -270,7 +275,10 @@ impl<S: GameSink> RunningGame<S> {
     /// Ends the rally if it is over, and the game if it is over.
     fn end_if_over(&mut self, ending: Option<RallyEnding>) -> Result<(), RecordError> {
         let [first, second] = &self.sides;
-        let causes = [first.forfeit_cause(&self.limits), second.forfeit_cause(&self.limits)];
+        let causes = [
+            first.forfeit_cause(&self.limits),
+            second.forfeit_cause(&self.limits),
+        ];
         self.end = match causes {
             [Some(a), Some(b)] => Some(GameEnd::BothForfeit { causes: [a, b] }),
             [Some(cause), None] => Some(GameEnd::Forfeit {

@@ -5,7 +5,8 @@ use crate::{
 };
 use faceoff_sim::ConstraintValues;
 use faceoff_types::{
-    AgentFault, AgentTask, ForfeitCause, GameFault, GameLimits, GameWindow, Phase, Side, SideOutcome,
+    AgentFault, AgentTask, ForfeitCause, GameFault, GameLimits, GameWindow, Phase, Side,
+    SideOutcome,
 };
 
 /// The state of one side of a running game.

@@ -14,9 +14,9 @@ use axum::{
 };
 use faceoff_pages::Embeddable;
 use faceoff_service::{
+    answer_cache,
     app::AppState,
     conditions::Conditions,
-    answer_cache,
     problem::Problem,
     request_log::{REQUEST_ID, log_request},
 };
@@ -36,7 +36,10 @@ pub(crate) fn wrap(site: Router, app: &Arc<AppState>) -> Router {
     let compressible = SizeAbove::new(MIN_COMPRESSED_BYTES).and(is_compressible);
     site.layer(CatchPanicLayer::custom(panic_response))
         .layer(CompressionLayer::new().compress_when(compressible))
-        .layer(middleware::from_fn_with_state(Arc::clone(app), serve_cached))
+        .layer(middleware::from_fn_with_state(
+            Arc::clone(app),
+            serve_cached,
+        ))
         .layer(middleware::from_fn(revalidate))
         .layer(middleware::from_fn_with_state(
             InFlight::new(app),

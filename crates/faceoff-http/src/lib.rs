@@ -17,12 +17,12 @@ pub use axum::Router;
 pub use capacity_monitor::{CapacityMonitor, CapacityWarning};
 
 pub use faceoff_service::{
+    agent_resources::{AgentResources, InventoryPublisher},
     config::{Capacity, HttpConfig, HttpLimits},
     link_key::LinkKey,
-    agent_resources::{InventoryPublisher, AgentResources},
-    transfer_rate::MinTransferRate,
     problem,
     rate_limits::{RateLimit, RateLimits},
+    transfer_rate::MinTransferRate,
 };
 pub use serve::{ConnectionLimits, serve};
 

@@ -18,7 +18,8 @@ impl Peer {
     /// The address of the client: the peer, or the one that a trusted proxy forwards for. `None` if the request comes from the
     /// proxy's own host, or if the proxy names no client.
     pub(crate) fn client_address(&self, headers: &HeaderMap) -> Option<IpAddr> {
-        let is_trusted_proxy = |address: &IpAddr| self.trusted_proxies.contains(&address.to_canonical());
+        let is_trusted_proxy =
+            |address: &IpAddr| self.trusted_proxies.contains(&address.to_canonical());
         if !is_trusted_proxy(&self.address) {
             return Some(self.address);
         }
@@ -63,16 +64,23 @@ mod tests {
             let value = HeaderValue::from_bytes(value.as_bytes()).unwrap();
             headers.append(FORWARDED_FOR, value);
         }
-        peer.client_address(&headers).map(|address| address.to_string())
+        peer.client_address(&headers)
+            .map(|address| address.to_string())
     }
 
     #[test]
     fn only_trusted_proxies_are_believed() {
         let found = |address: &str| Some(address.to_owned());
         assert_eq!(client_address("192.0.2.1", &[]), found("192.0.2.1"));
-        assert_eq!(client_address("192.0.2.1", &["192.0.2.7"]), found("192.0.2.1"));
+        assert_eq!(
+            client_address("192.0.2.1", &["192.0.2.7"]),
+            found("192.0.2.1")
+        );
         assert_eq!(client_address("127.0.0.1", &[]), None);
-        assert_eq!(client_address("::ffff:127.0.0.1", &["192.0.2.7"]), found("192.0.2.7"));
+        assert_eq!(
+            client_address("::ffff:127.0.0.1", &["192.0.2.7"]),
+            found("192.0.2.7")
+        );
         // 192.0.2.7 comes from the client, and is not believed.
         assert_eq!(
             client_address("127.0.0.1", &["192.0.2.7, 192.0.2.8"]),

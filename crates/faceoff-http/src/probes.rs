@@ -7,7 +7,7 @@ use faceoff_api::{
     paths::LIVE_PATH,
     views::health::{HealthView, LiveView},
 };
-use faceoff_metrics::{Disk, MEDIA_TYPE, Queue, GaugeValues};
+use faceoff_metrics::{Disk, GaugeValues, MEDIA_TYPE, Queue};
 use faceoff_service::{
     app::{App, AppState},
     auth::Organiser,
@@ -24,14 +24,17 @@ pub(crate) fn router(timeout: Duration) -> Router<App> {
 
 /// For an address that only the operators reach: all of it without a token.
 pub(crate) fn unauthenticated_router(timeout: Duration) -> Router<App> {
-    with_probes(Router::new().route("/metrics", get(unauthenticated_metrics)), timeout)
+    with_probes(
+        Router::new().route("/metrics", get(unauthenticated_metrics)),
+        timeout,
+    )
 }
 
 fn with_probes(router: Router<App>, timeout: Duration) -> Router<App> {
     router
         .route(LIVE_PATH, get(live))
         .route("/readyz", get(ready))
-        .layer(middleware::from_fn_with_state(timeout,  timeouts::time_out))
+        .layer(middleware::from_fn_with_state(timeout, timeouts::time_out))
 }
 
 async fn live() -> Json<LiveView> {

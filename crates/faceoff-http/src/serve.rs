@@ -8,12 +8,12 @@ mod connection_quota;
 mod min_rate_stream;
 
 use crate::peer::Peer;
-use connection_quota::ConnectionQuota;
 use axum::{Extension, Router};
+use connection_quota::ConnectionQuota;
 use faceoff_service::{
+    problem::{Problem, ProblemKind},
     shutdown::Shutdown,
     transfer_rate::MinTransferRate,
-    problem::{Problem, ProblemKind},
 };
 use hyper::server::conn::http1;
 use hyper_util::{

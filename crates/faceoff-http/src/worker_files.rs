@@ -12,10 +12,10 @@ use axum::{
 };
 use faceoff_dataset::writable_files;
 use faceoff_service::{
-    services::bundle_stream,
     app::App,
-    problem::{Problem, ProblemKind},
     free_space,
+    problem::{Problem, ProblemKind},
+    services::bundle_stream,
 };
 use faceoff_store::{Store, WorkerName};
 use faceoff_wire::grant::Grant;

@@ -206,8 +206,12 @@ impl Gauges {
             .set(i64::try_from(*long_remote_jobs).unwrap_or(i64::MAX));
         for disk in disks {
             let labels = DiskLabels { disk: disk.name };
-            self.free.get_or_create(&labels).set(clamped(disk.free_bytes));
-            self.size.get_or_create(&labels).set(clamped(disk.size_bytes));
+            self.free
+                .get_or_create(&labels)
+                .set(clamped(disk.free_bytes));
+            self.size
+                .get_or_create(&labels)
+                .set(clamped(disk.size_bytes));
         }
         self.resident.set(clamped(process.resident_bytes));
         self.fds.set(clamped(process.open_fds));

@@ -6,20 +6,20 @@
 //! counters start at 0 with the process, as Prometheus expects.
 
 mod float_gauge;
-mod slots;
 mod gauges;
+mod slots;
 mod web;
 
-pub use slots::{BusySlot, Slots, JobEnd};
-pub use gauges::{Disk, Process, Queue, GaugeValues};
+pub use gauges::{Disk, GaugeValues, Process, Queue};
+pub use slots::{BusySlot, JobEnd, Slots};
 pub use web::Web;
 
+use gauges::Gauges;
 use prometheus_client::{
     encoding::{EncodeLabelSet, text},
     metrics::{counter::Counter, family::Family, info::Info},
     registry::Registry,
 };
-use gauges::Gauges;
 use std::{fmt, sync::Arc};
 
 /// The media type of [`Metrics::text`].
@@ -88,7 +88,9 @@ impl Metrics {
     /// Counts events that were missed because they came faster than they could be processed.
     pub fn record_missed_events(&self, count: u64) {
         let kind = "untold".to_owned();
-        self.events.get_or_create(&EventLabels { kind }).inc_by(count);
+        self.events
+            .get_or_create(&EventLabels { kind })
+            .inc_by(count);
     }
 
     /// All metrics as text ([`MEDIA_TYPE`]), with the current gauge values.
@@ -120,7 +122,9 @@ mod tests {
         metrics.record_event("evaluation_finished");
         metrics.record_event("evaluation_finished");
         let took = Duration::from_millis(3);
-        metrics.web().record_response("GET", Some("/board"), 200, took);
+        metrics
+            .web()
+            .record_response("GET", Some("/board"), 200, took);
         metrics.web().record_response("PUT", None, 404, took);
         let text = metrics.text(&GaugeValues::default()).unwrap();
         for line in [

@@ -101,11 +101,7 @@ impl Slots {
             stuck_count: Gauge::default(),
             stuck_names: Arc::default(),
         };
-        all.register(
-            "slots_busy",
-            "Slots that run a job",
-            slots.busy.clone(),
-        );
+        all.register("slots_busy", "Slots that run a job", slots.busy.clone());
         all.register(
             "slots_standing_still",
             "Slots that are stuck although their agent was ended",
@@ -230,7 +226,10 @@ impl BusySlot {
     pub fn end(self, end: JobEnd, took: Duration) {
         let work = self.work;
         let end = end.as_str();
-        self.slots.jobs.get_or_create(&JobEndLabels { work, end }).inc();
+        self.slots
+            .jobs
+            .get_or_create(&JobEndLabels { work, end })
+            .inc();
         self.slots
             .durations
             .get_or_create(&JobLabels { work })

@@ -149,7 +149,8 @@ impl WebhookRules {
         }
         if !url.username().is_empty() || url.password().is_some() {
             return Err(
-                "expected no name and password in the URL: the signature identifies the sender".into(),
+                "expected no name and password in the URL: the signature identifies the sender"
+                    .into(),
             );
         }
         if url.fragment().is_some() {

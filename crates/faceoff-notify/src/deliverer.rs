@@ -1,11 +1,11 @@
 //! Delivery to webhooks: turns events of the log into deliveries and sends those that are due.
 
 use crate::{
-    notice_filter::NoticeFilter,
     address::WebhookRules,
     boxed,
     feed::Feed,
-    notice::{Notice, Audience},
+    notice::{Audience, Notice},
+    notice_filter::NoticeFilter,
     sender::Sender,
 };
 use faceoff_store::{Change, Delivery, PlannedDeliveries, Store, StoreError, Subject, Webhook};
@@ -60,7 +60,10 @@ struct ActiveDeliveries {
 
 impl ActiveDeliveries {
     fn can_start(&self, webhook: &Webhook) -> bool {
-        let same_owner = self.webhooks.values().filter(|(_, team)| *team == webhook.team);
+        let same_owner = self
+            .webhooks
+            .values()
+            .filter(|(_, team)| *team == webhook.team);
         self.webhooks.len() < MAX_CONCURRENT
             && same_owner.count() < MAX_CONCURRENT_PER_OWNER
             && self.webhooks.values().all(|(id, _)| *id != webhook.id)
@@ -191,10 +194,7 @@ impl Deliverer {
     async fn plan(&self) -> Result<bool, StoreError> {
         let mut by_position: BTreeMap<i64, Vec<Webhook>> = BTreeMap::new();
         for webhook in self.store.webhooks_with_new_events().await? {
-            by_position
-                .entry(webhook.seen)
-                .or_default()
-                .push(webhook);
+            by_position.entry(webhook.seen).or_default().push(webhook);
         }
         let mut planned = Vec::new();
         for (after, webhooks) in by_position {

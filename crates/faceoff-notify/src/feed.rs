@@ -1,7 +1,7 @@
 //! The feed of the log: each page is read once for all followers.
 
 use crate::{boxed, notice::Notice, stage_visibility::StageVisibility};
-use faceoff_store::{SubjectContext, Store, StoreError, Subject};
+use faceoff_store::{Store, StoreError, Subject, SubjectContext};
 use std::{
     collections::{HashMap, VecDeque},
     sync::Arc,

@@ -7,11 +7,11 @@
 //! This crate handles no requests and changes nothing in a season. It does not trust the addresses of webhooks: names
 //! are resolved here, and only public addresses on the Internet are connected to.
 
-mod notice_filter;
 mod address;
 mod deliverer;
 mod feed;
 mod notice;
+mod notice_filter;
 mod resolver;
 mod secret;
 mod sender;
@@ -21,11 +21,11 @@ mod topic;
 /// Boxes public async functions, so that they are compiled once here and not by each crate that awaits them.
 pub(crate) use async_recursion::async_recursion as boxed;
 
-pub use notice_filter::{NoticeFilter, MAX_FILTER_ITEMS, ParseNoticeFilterError};
 pub use address::{NotPublic, WebhookRules};
 pub use deliverer::{Deliverer, message};
 pub use feed::{Feed, Page};
-pub use notice::{Notice, Audience};
+pub use notice::{Audience, Notice};
+pub use notice_filter::{MAX_FILTER_ITEMS, NoticeFilter, ParseNoticeFilterError};
 pub use secret::WebhookSecret;
 pub use stage_visibility::StageVisibility;
 pub use topic::Topic;

@@ -1,7 +1,7 @@
 //! Notices of events, and their visibility.
 
 use crate::stage_visibility::StageVisibility;
-use faceoff_store::{SubjectContext, Event, EventRecord, Subject};
+use faceoff_store::{Event, EventRecord, Subject, SubjectContext};
 use faceoff_types::TeamId;
 use jiff::Timestamp;
 use serde_json::{Map, Value, json};
@@ -98,10 +98,13 @@ impl Notice {
             SubjectContext::Game { is_public, .. } => {
                 is_public && !matches!(self.event, Event::UnitGivenBack { .. })
             }
-            SubjectContext::Question { .. } => matches!(self.event, Event::Answered { public: true }),
-            SubjectContext::Season | SubjectContext::Stage { .. } | SubjectContext::Tournament(_) | SubjectContext::Team(_) => {
-                self.event.is_public()
+            SubjectContext::Question { .. } => {
+                matches!(self.event, Event::Answered { public: true })
             }
+            SubjectContext::Season
+            | SubjectContext::Stage { .. }
+            | SubjectContext::Tournament(_)
+            | SubjectContext::Team(_) => self.event.is_public(),
             SubjectContext::Submission { .. }
             | SubjectContext::Ablation { .. }
             | SubjectContext::User { .. }
@@ -119,7 +122,9 @@ impl Notice {
                 (other.stage, other.date) == (stage, day)
             }
             (Subject::Submission(id), SubjectContext::Evaluation { submission, .. })
-            | (Subject::Submission(id), SubjectContext::Ablation { submission, .. }) => id == submission,
+            | (Subject::Submission(id), SubjectContext::Ablation { submission, .. }) => {
+                id == submission
+            }
             (Subject::Tournament(id), SubjectContext::Game { tournament, .. }) => id == tournament,
             _ => false,
         };
@@ -178,7 +183,8 @@ impl Notice {
                 put("day", json!(day));
                 put("submission", json!(submission));
             }
-            SubjectContext::Submission { submission, .. } | SubjectContext::Ablation { submission, .. } => {
+            SubjectContext::Submission { submission, .. }
+            | SubjectContext::Ablation { submission, .. } => {
                 put("submission", json!(submission));
             }
             SubjectContext::Tournament(tournament) | SubjectContext::Game { tournament, .. } => {

@@ -125,6 +125,9 @@ mod tests {
             assert!(error.contains("board, queue"), "{error}");
         }
         let many = vec!["board".to_owned(); MAX_FILTER_ITEMS + 1];
-        assert_eq!(NoticeFilter::parse(&many), Err(ParseNoticeFilterError::TooMany(51)));
+        assert_eq!(
+            NoticeFilter::parse(&many),
+            Err(ParseNoticeFilterError::TooMany(51))
+        );
     }
 }

@@ -5,7 +5,7 @@ use crate::{
     resolver::{CheckedResolver, ResolveError},
     secret::signatures,
 };
-use faceoff_store::{DeliveryOutcome, Delivery, DeliveryAttempt, WebhookSecrets};
+use faceoff_store::{Delivery, DeliveryAttempt, DeliveryOutcome, WebhookSecrets};
 use faceoff_types::DeliveryId;
 use jiff::{SignedDuration, Timestamp};
 use reqwest::{StatusCode, header, redirect};
@@ -106,7 +106,9 @@ fn status_error(status: StatusCode) -> Option<String> {
     }
     let code = status.as_u16();
     Some(if status.is_redirection() {
-        format!("it answered {code}: redirects are not followed, use the address that it redirects to")
+        format!(
+            "it answered {code}: redirects are not followed, use the address that it redirects to"
+        )
     } else {
         format!("it answered {code}, expected 200 to 299")
     })
@@ -134,7 +136,8 @@ fn describe_error(error: &reqwest::Error) -> String {
 fn retry_at(id: DeliveryId, attempts: u32, now: Timestamp) -> Option<Timestamp> {
     let pause = *RETRY_PAUSES_S.get(usize::try_from(attempts).ok()?)?;
     // Derived from the id, so that the same log gives the same times.
-    let mut hasher = blake3::Hasher::new_derive_key("Faceoff: pauses between attempts of a webhook");
+    let mut hasher =
+        blake3::Hasher::new_derive_key("Faceoff: pauses between attempts of a webhook");
     hasher.update(id.as_uuid().as_bytes());
     hasher.update(&attempts.to_le_bytes());
     let [first, second, ..] = *hasher.finalize().as_bytes();
@@ -157,7 +160,11 @@ mod tests {
                 let waits = at.duration_since(now).as_secs_f64();
                 let pause = pause as f64;
                 assert!((pause..=pause * (1.0 + JITTER)).contains(&waits));
-                assert_eq!(Some(at), retry_at(id, attempts, now), "the time is deterministic");
+                assert_eq!(
+                    Some(at),
+                    retry_at(id, attempts, now),
+                    "the time is deterministic"
+                );
             }
             assert_ne!(
                 retry_at(ids[0], attempts, now),

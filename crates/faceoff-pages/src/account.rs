@@ -10,14 +10,14 @@ use axum::{
     response::{IntoResponse, Redirect, Response},
 };
 use faceoff_api::views::{
-    user::{UserView, CallerView},
     token::TokenView,
+    user::{CallerView, UserView},
 };
 use faceoff_service::{
     app::App,
     auth::OptionalCaller,
     problem::Problem,
-    views::{user, season::SeasonHead, token},
+    views::{season::SeasonHead, token, user},
 };
 use faceoff_store::TokenOwner;
 use jiff::Timestamp;

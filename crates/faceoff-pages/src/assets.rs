@@ -28,24 +28,36 @@ pub(super) static STYLE: Asset = Asset::new(
     compressed_text!("web/static/faceoff.css"),
 );
 /// Loaded by all pages: live updates, and times in the visitor's time zone.
-pub(super) static SCRIPT: Asset =
-    Asset::new("/static/live.js", JAVASCRIPT, compressed_text!("web/static/live.js"));
+pub(super) static SCRIPT: Asset = Asset::new(
+    "/static/live.js",
+    JAVASCRIPT,
+    compressed_text!("web/static/live.js"),
+);
 pub(super) static ICON: Asset = Asset::new(
     "/static/faceoff.svg",
     "image/svg+xml",
     compressed_text!("web/static/faceoff.svg"),
 );
-pub(super) static DASHBOARD_STYLE: Asset =
-    Asset::new("/static/dashboard.css", CSS, compressed_text!("web/static/dashboard.css"));
-pub(super) static DASHBOARD_SCRIPT: Asset =
-    Asset::new("/static/dashboard.js", JAVASCRIPT, compressed_text!("web/static/dashboard.js"));
+pub(super) static DASHBOARD_STYLE: Asset = Asset::new(
+    "/static/dashboard.css",
+    CSS,
+    compressed_text!("web/static/dashboard.css"),
+);
+pub(super) static DASHBOARD_SCRIPT: Asset = Asset::new(
+    "/static/dashboard.js",
+    JAVASCRIPT,
+    compressed_text!("web/static/dashboard.js"),
+);
 pub(super) static EPISODES_STYLE: Asset = Asset::new(
     "/static/episodes.css",
     CSS,
     compressed_text!("web/static/episodes.css"),
 );
-pub(super) static REPLAY_STYLE: Asset =
-    Asset::new("/static/replay.css", CSS, compressed_text!("web/static/replay.css"));
+pub(super) static REPLAY_STYLE: Asset = Asset::new(
+    "/static/replay.css",
+    CSS,
+    compressed_text!("web/static/replay.css"),
+);
 /// Built from `web/client` by `make web`.
 pub(super) static REPLAY_SCRIPT: Asset = Asset::new(
     "/static/replay.js",

@@ -1,11 +1,11 @@
 //! The boards: `/` in tiers as in the paper's qualifying table, `/tasks/{task}` by task.
 
 mod address;
+mod day_progress;
 mod days;
 mod heading;
-mod sort;
 mod rows;
-mod day_progress;
+mod sort;
 
 use super::{
     baselines::{self, Baseline},
@@ -14,6 +14,7 @@ use super::{
 use address::Address;
 use askama::Template;
 use axum::{extract::State, response::Response};
+use day_progress::DayProgress;
 use days::Days;
 use faceoff_api::{requests::BoardPageQuery, views::team::TeamView};
 use faceoff_service::{
@@ -21,13 +22,12 @@ use faceoff_service::{
     extract::{PathParam, QueryParams},
     problem::Problem,
     viewer::Viewer,
-    views::{board, season::SeasonHead, visibility::Visibility, board_timeline::BoardTimeline},
+    views::{board, board_timeline::BoardTimeline, season::SeasonHead, visibility::Visibility},
 };
 use faceoff_types::Task;
 use heading::Heading;
-use sort::Sort;
 use rows::{Context, Group, OverallRow, TaskRow, common_setting};
-use day_progress::DayProgress;
+use sort::Sort;
 
 /// Interval at which `live.js` reloads the progress of running evaluations.
 const POLL_SECONDS: u32 = 10;

@@ -39,9 +39,8 @@ fn counting_rule(board: &BoardView) -> String {
 
 /// Notice that only the final day counts, while the board shows other results.
 pub(super) fn final_day_notice(board: &BoardView) -> Option<&'static str> {
-    (board.standings == CountingResult::Final && board.rows_by != CountingResult::Final).then_some(
-        "Only the final day counts. The organisers start it after the stage has closed.",
-    )
+    (board.standings == CountingResult::Final && board.rows_by != CountingResult::Final)
+        .then_some("Only the final day counts. The organisers start it after the stage has closed.")
 }
 
 /// Who sees a blind board; `None` if the board is not blind.
@@ -57,8 +56,9 @@ pub(super) fn blind_notice(board: &BoardView, is_hidden: bool) -> Option<&'stati
 
 pub(super) fn result_status(board: &BoardView) -> String {
     match &board.finalised {
-        None => "The result is provisional: it may change until the organisers sign it off."
-            .to_owned(),
+        None => {
+            "The result is provisional: it may change until the organisers sign it off.".to_owned()
+        }
         Some(done) => format!(
             "The result was signed off on {} by {} and is final.",
             utc_minute(done.at),

@@ -2,14 +2,14 @@
 //! the same values.
 
 mod bars;
-mod score_chart;
 mod histogram;
 mod panel;
 mod scale;
+mod score_chart;
 mod strip;
 
 pub(super) use bars::{Bars, LabelledRate};
-pub(super) use score_chart::ScoreChart;
 pub(super) use histogram::{Bins, Histogram};
-pub(super) use panel::{Bound, Panel, DayValue};
-pub(super) use strip::{TimeBin, TimeSummary, Strip};
+pub(super) use panel::{Bound, DayValue, Panel};
+pub(super) use score_chart::ScoreChart;
+pub(super) use strip::{Strip, TimeBin, TimeSummary};

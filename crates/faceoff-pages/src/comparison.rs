@@ -100,7 +100,8 @@ pub(super) async fn page(
 ) -> Result<Response, PageProblem> {
     let PathParams(ids) = ids?;
     let visibility = Visibility::load(&app, viewer?).await?;
-    let view = comparison::compare(&app, &visibility, ids, ComparisonQuery { episodes: true }).await?;
+    let view =
+        comparison::compare(&app, &visibility, ids, ComparisonQuery { episodes: true }).await?;
     let mut has_replays = true;
     for id in ids {
         has_replays &= Clips::find(&app, &visibility, id).await.is_ok();

@@ -66,7 +66,10 @@ pub(super) async fn episodes(
         row.push(or_empty(line.longest_s));
         row.push(or_empty(line.longest_s.map(|_| line.late)));
         for group in Group::ALL {
-            let violation = line.broken.iter().find(|violation| violation.group == group);
+            let violation = line
+                .broken
+                .iter()
+                .find(|violation| violation.group == group);
             row.extend([
                 or_empty(violation.map(|violation| violation.from)),
                 or_empty(violation.map(|violation| violation.samples)),

@@ -1,8 +1,8 @@
 //! `/desk`: the team dashboard: submissions, questions, members and tokens.
 
 pub(super) mod access;
-mod overview;
 mod evaluations;
+mod overview;
 mod questions;
 mod submission;
 mod upload;

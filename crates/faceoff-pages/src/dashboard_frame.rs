@@ -106,10 +106,7 @@ const DONE_TEXTS: &[(&str, &str)] = &[
     ("described", "Saved."),
     ("terms", "Terms accepted."),
     ("revoked", "Revoked. It no longer works."),
-    (
-        "uninvited",
-        "Invitation revoked. The link no longer works.",
-    ),
+    ("uninvited", "Invitation revoked. The link no longer works."),
     (
         "removed",
         "User removed. All tokens and sessions are revoked.",
@@ -203,7 +200,10 @@ impl From<Notice<'_>> for NoticeText {
 }
 
 /// Renders a page of a dashboard; a refusal sets the status and headers of the response.
-pub(super) fn render_dashboard(page: &impl Template, notice: Notice<'_>) -> Result<Response, PageProblem> {
+pub(super) fn render_dashboard(
+    page: &impl Template,
+    notice: Notice<'_>,
+) -> Result<Response, PageProblem> {
     let mut response = render(page)?;
     if let Notice::Refused(problem) = notice {
         response

@@ -38,10 +38,7 @@ const NEWCOMERS: [(&str, &str); 4] = [
     ("start", "An agent on the board within an hour"),
     ("rules", "What counts and what costs points"),
     ("robot", "What the agent controls and observes"),
-    (
-        "protocol",
-        "Messages between agent and evaluator",
-    ),
+    ("protocol", "Messages between agent and evaluator"),
 ];
 
 /// Content of the documentation, built on first use.
@@ -269,8 +266,7 @@ async fn find(
     let QueryParams(SearchQuery { q: question }) = query?;
     let chars = question.chars().count();
     if chars > MAX_QUERY_CHARS {
-        let detail =
-            format!("q: expected at most {MAX_QUERY_CHARS} characters, got {chars}");
+        let detail = format!("q: expected at most {MAX_QUERY_CHARS} characters, got {chars}");
         return Err(Problem::new(ProblemKind::InvalidRequest, detail).into());
     }
     let question = question.trim().to_owned();
@@ -300,7 +296,10 @@ fn respond(conditions: &Conditions, page: &impl Template) -> Result<Response, Pa
     let tag = ETag::new("docs", &[&html]);
     let headers = [
         (header::ETAG, tag.header()),
-        (header::CACHE_CONTROL, HeaderValue::from_static(CACHE_CONTROL)),
+        (
+            header::CACHE_CONTROL,
+            HeaderValue::from_static(CACHE_CONTROL),
+        ),
     ];
     Ok(match conditions.not_modified(&tag) {
         Some(not_modified) => (headers, not_modified).into_response(),

@@ -1,6 +1,6 @@
 //! Outcomes and violations of episodes as text.
 
-use faceoff_replay::{ViolationSummary, Group};
+use faceoff_replay::{Group, ViolationSummary};
 use faceoff_types::EpisodeEnd;
 
 pub(super) const fn end_label(end: EpisodeEnd) -> &'static str {

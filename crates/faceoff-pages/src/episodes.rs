@@ -129,7 +129,9 @@ pub(super) async fn page(
         ("joint_pos", "joint position"),
         ("joint_vel", "joint velocity"),
     ];
-    let late = clips.can_see_observations.then_some(("late", "a late answer"));
+    let late = clips
+        .can_see_observations
+        .then_some(("late", "a late answer"));
     let ends = [
         EpisodeEnd::Horizon,
         EpisodeEnd::LeftTable,

@@ -4,7 +4,7 @@
 mod slow_answers;
 
 use super::{
-    chart::{TimeBin, TimeSummary, Strip},
+    chart::{Strip, TimeBin, TimeSummary},
     figures,
     frame::{Frame, PageProblem, render},
 };
@@ -26,7 +26,9 @@ use faceoff_service::{
     extract::PathParam,
     problem::Problem,
     viewer::Viewer,
-    views::{ablation, clips::Clips, evaluation, season::SeasonHead, visibility::Visibility, submission},
+    views::{
+        ablation, clips::Clips, evaluation, season::SeasonHead, submission, visibility::Visibility,
+    },
 };
 use faceoff_types::{
     EvaluationId, Profile, RoundTrips, Seed, SlotTiming, StageDay, Task, ViolationCounts,
@@ -310,7 +312,9 @@ const fn state_text(view: &EvaluationView) -> &'static str {
         }
         EvaluationStatus::Queued => "Waiting for a free slot.",
         EvaluationStatus::Running => "Running.",
-        EvaluationStatus::Finalising => "All episodes have been played; the score is being computed.",
+        EvaluationStatus::Finalising => {
+            "All episodes have been played; the score is being computed."
+        }
         EvaluationStatus::Finished { .. } => "",
         EvaluationStatus::AgentFailed { .. } => {
             "The agent was stopped because it violated the protocol or a limit too often. There is no score. The team sees \

@@ -54,7 +54,10 @@ pub(super) async fn feed(State(app): State<App>, headers: HeaderMap) -> Result<R
     let response_headers = [
         (header::ETAG, value(&tag)?),
         (header::LAST_MODIFIED, value(&modified)?),
-        (header::CACHE_CONTROL, HeaderValue::from_static(CACHE_CONTROL)),
+        (
+            header::CACHE_CONTROL,
+            HeaderValue::from_static(CACHE_CONTROL),
+        ),
     ];
     if is_not_modified(&headers, &tag, updated) {
         return Ok((StatusCode::NOT_MODIFIED, response_headers).into_response());

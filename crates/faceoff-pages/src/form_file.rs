@@ -7,8 +7,8 @@ use axum::{
     http::{HeaderMap, header},
 };
 use faceoff_service::{
-    transfer_rate::MinTransferRate,
     problem::{Problem, ProblemKind},
+    transfer_rate::MinTransferRate,
 };
 use futures::{StreamExt, stream};
 use std::io;
@@ -52,7 +52,9 @@ impl FormFile {
                 break at + 4;
             }
             if head.len() > MAX_ENVELOPE_BYTES {
-                return Err(malformed_form("the head of the file is missing or too long"));
+                return Err(malformed_form(
+                    "the head of the file is missing or too long",
+                ));
             }
             match tokio::time::timeout_at(deadline, stream.next()).await {
                 Ok(Some(Ok(chunk))) => head.extend_from_slice(&chunk),
@@ -71,7 +73,8 @@ impl FormFile {
         let Some(lines) = lines.strip_prefix(&format!("--{boundary}\r\n")) else {
             return Err(malformed_form("it does not start with its boundary"));
         };
-        let name = file_name(lines).ok_or_else(|| malformed_form("its first field is not a file"))?;
+        let name =
+            file_name(lines).ok_or_else(|| malformed_form("its first field is not a file"))?;
         let delimiter = format!("\r\n--{boundary}");
         let content_length = headers
             .get(header::CONTENT_LENGTH)

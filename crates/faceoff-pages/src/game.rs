@@ -1,8 +1,8 @@
 //! `/games/{id}`: a game: live view, result, course, analysis and replay.
 
-mod score_timeline;
-mod live;
 mod analysis;
+mod live;
+mod score_timeline;
 
 use super::{
     assets, figures,
@@ -10,9 +10,9 @@ use super::{
     spoilers::Spoilers,
     table_drawing::TableOutline,
 };
+use analysis::{Possession, Shots, Speeds, Violations};
 use askama::Template;
 use axum::{extract::State, response::Response};
-use score_timeline::ScoreTimeline;
 use faceoff_api::{
     paths,
     views::game::{GameResultView, GameStatus, PurposeView},
@@ -27,7 +27,7 @@ use faceoff_service::{
 };
 use faceoff_types::{GameId, Side, SubmissionId, TeamId, TournamentId};
 use live::LiveGame;
-use analysis::{Possession, Shots, Speeds, Violations};
+use score_timeline::ScoreTimeline;
 
 /// A row of the table of statistics.
 struct Statistic {
@@ -93,7 +93,8 @@ struct Page {
 impl Page {
     /// Address of the live stream, unless results are hidden.
     fn stream(&self) -> Option<String> {
-        (self.is_open && !self.spoilers.hides_results()).then(|| format!("{}/live", paths::game(self.id)))
+        (self.is_open && !self.spoilers.hides_results())
+            .then(|| format!("{}/live", paths::game(self.id)))
     }
 
     /// Text for screen readers after a live update.
@@ -101,7 +102,7 @@ impl Page {
         self.live
             .as_ref()
             .map(LiveGame::live_text)
-           .unwrap_or_default()
+            .unwrap_or_default()
     }
 }
 
@@ -121,7 +122,8 @@ pub(super) async fn page(
     match &view.status {
         GameStatus::Running { since, .. } if !is_hidden => {
             let now = app.config.clock.now();
-            live = LiveGameView::find(&app, id).map(|live| LiveGame::new(&live, &teams, *since, now));
+            live =
+                LiveGameView::find(&app, id).map(|live| LiveGame::new(&live, &teams, *since, now));
         }
         GameStatus::Played { result, .. } => {
             let clips = GameClips::find(&app, viewer, id).await.ok();
@@ -130,7 +132,9 @@ pub(super) async fn page(
                 true => full_game_steps(&app, view.tournament).await?,
                 false => result.steps,
             };
-            replay = clips.as_ref().map(|clips| ReplayChunks::new(id, clips, steps));
+            replay = clips
+                .as_ref()
+                .map(|clips| ReplayChunks::new(id, clips, steps));
             if !is_hidden {
                 shown_result = Some(GameResult::new(result));
                 if let Some(clips) = &clips {
@@ -179,10 +183,13 @@ async fn full_game_steps(app: &App, tournament: TournamentId) -> Result<u32, Pro
 impl ReplayChunks {
     fn new(id: GameId, clips: &GameClips, steps: u32) -> Self {
         let api = paths::game(id);
-        let visible_side = Side::BOTH.into_iter().find(|side| clips.can_see_observations[side.index()]);
+        let visible_side = Side::BOTH
+            .into_iter()
+            .find(|side| clips.can_see_observations[side.index()]);
         Self {
             motion: format!("{api}/motion/{{chunk}}"),
-            observed: visible_side.map(|side| format!("{api}/sides/{}/observed/{{chunk}}", side.number())),
+            observed: visible_side
+                .map(|side| format!("{api}/sides/{}/observed/{{chunk}}", side.number())),
             samples: steps.saturating_add(1),
         }
     }
@@ -209,7 +216,10 @@ impl GameResult {
         let statistics = vec![
             counts("Goals on the table", result.goals),
             counts("Fouls", result.fouls),
-            statistic("Penalty points", result.penalty_points.map(figures::one_decimal)),
+            statistic(
+                "Penalty points",
+                result.penalty_points.map(figures::one_decimal),
+            ),
             statistic(
                 "Tier",
                 result.tiers.each_ref().map(|tier| tier.title().to_owned()),
@@ -267,7 +277,9 @@ fn state_text(status: &GameStatus, is_hidden: bool) -> String {
         GameStatus::Played { finished_at, .. } => {
             format!("Played on {}.", finished_at.strftime("%Y-%m-%d, %H:%M UTC"))
         }
-        GameStatus::Broken { reason, .. } => format!("Failed because of a platform fault: {reason}"),
+        GameStatus::Broken { reason, .. } => {
+            format!("Failed because of a platform fault: {reason}")
+        }
         // The reason is free text and may reveal the result.
         GameStatus::Void { .. } if is_hidden => "The result was voided.".to_owned(),
         GameStatus::Cancelled { .. } if is_hidden => "Not played.".to_owned(),

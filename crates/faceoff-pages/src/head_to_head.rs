@@ -148,10 +148,7 @@ pub(super) async fn page(
 }
 
 /// Statistics of both teams over the games that count.
-fn statistics(
-    played: &[(&GameRow, &GameResultView)],
-    names: &[TeamName; 2],
-) -> Vec<Statistic> {
+fn statistics(played: &[(&GameRow, &GameResultView)], names: &[TeamName; 2]) -> Vec<Statistic> {
     if played.is_empty() {
         return Vec::new();
     }

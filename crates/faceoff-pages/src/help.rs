@@ -30,9 +30,7 @@ impl Page {
             (name, values.collect())
         };
         vec![
-            row("CPUs", |limits| {
-                limits.resources.cpus.to_string()
-            }),
+            row("CPUs", |limits| limits.resources.cpus.to_string()),
             row("Memory, including caches and scratch files", |limits| {
                 mebibytes(limits.resources.memory_bytes)
             }),
@@ -54,17 +52,18 @@ impl Page {
             row("Bundle, unpacked", |limits| {
                 mebibytes(limits.bundle.unpacked_bytes)
             }),
-            row("Time to start", |limits| format!("{} s", limits.time.startup_s)),
+            row("Time to start", |limits| {
+                format!("{} s", limits.time.startup_s)
+            }),
             row("Time to answer a reset", |limits| {
                 format!("{} s", limits.time.reset_s)
             }),
             row("Time to answer a step, maximum", |limits| {
                 format!("{} s", limits.time.step_s)
             }),
-            row(
-                "Time to answer a step, mean in validation",
-                |limits| format!("{} s", limits.time.mean_s),
-            ),
+            row("Time to answer a step, mean in validation", |limits| {
+                format!("{} s", limits.time.mean_s)
+            }),
         ]
     }
 }

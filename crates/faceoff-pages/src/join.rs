@@ -15,10 +15,10 @@ use faceoff_api::{
     views::announcement::TermsView,
 };
 use faceoff_service::{
-    services::{accounts::join, sessions::session_expiry},
     app::App,
     extract::{PageForm, PathParam},
     problem::{Problem, ProblemKind},
+    services::{accounts::join, sessions::session_expiry},
     views::{announcement, season::SeasonHead},
 };
 use faceoff_store::{CodeStatus, InvitationRole, RegistrationState, TokenKind};

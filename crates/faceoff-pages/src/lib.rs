@@ -8,14 +8,15 @@ mod announcements;
 mod assets;
 mod baselines;
 mod board;
-mod violation_map;
+mod board_status;
 mod chart;
 mod comparison;
+mod compressed_text;
+mod csv_downloads;
 mod dashboard;
 mod dashboard_frame;
 mod docs;
 mod embeddable;
-mod submission_row;
 mod episode_text;
 mod episodes;
 mod evaluation;
@@ -28,8 +29,9 @@ mod game_row;
 mod head_to_head;
 mod help;
 mod join;
+mod not_found;
 mod organiser;
-mod compressed_text;
+mod page_auth;
 mod problems;
 mod query;
 mod register;
@@ -39,20 +41,18 @@ mod robots;
 mod season;
 mod side_by_side;
 mod sign_in;
-mod page_auth;
 mod spoilers;
-mod board_status;
+mod submission_row;
 mod table_drawing;
-mod csv_downloads;
 mod team;
 mod tournament;
 mod tournament_text;
 mod tournaments;
-mod not_found;
+mod violation_map;
 
 pub use embeddable::Embeddable;
+pub use not_found::{method_not_allowed, path_not_found, problem_response};
 pub use spoilers::SPOILERS_PATH;
-pub use not_found::{problem_response, method_not_allowed, path_not_found};
 
 use axum::{
     Router,
@@ -77,12 +77,18 @@ pub fn router(patience: Duration, api: Arc<Value>) -> Router<App> {
             get(comparison::pair::page),
         )
         .route("/evaluations/{id}/episodes", get(episodes::page))
-        .route("/evaluations/{id}/episodes.csv", get(csv_downloads::episodes))
+        .route(
+            "/evaluations/{id}/episodes.csv",
+            get(csv_downloads::episodes),
+        )
         .route(
             "/evaluations/{id}/answer-times.csv",
             get(csv_downloads::answer_times),
         )
-        .route("/submissions/{id}/ablation.csv", get(csv_downloads::ablation))
+        .route(
+            "/submissions/{id}/ablation.csv",
+            get(csv_downloads::ablation),
+        )
         .route(
             "/evaluations/{id}/episodes/{task}/{episode}",
             get(replay::page),

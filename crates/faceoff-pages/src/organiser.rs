@@ -2,10 +2,10 @@
 
 mod attention;
 mod day;
+mod decision;
 mod decision_page;
 mod log;
 mod messages;
-mod decision;
 mod stage;
 mod stage_form;
 mod stages;

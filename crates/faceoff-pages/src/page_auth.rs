@@ -9,7 +9,7 @@ use axum::{
 };
 use faceoff_service::{
     app::App,
-    auth::{OptionalCaller, Caller, Organiser, TeamCaller},
+    auth::{Caller, OptionalCaller, Organiser, TeamCaller},
     problem::{Problem, ProblemKind},
 };
 

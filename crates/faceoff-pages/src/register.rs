@@ -15,10 +15,10 @@ use faceoff_api::{
     views::{announcement::TermsView, invitation::NewRegistrationView},
 };
 use faceoff_service::{
-    services::registrations,
     app::App,
     extract::PageForm,
     problem::Problem,
+    services::registrations,
     views::{announcement, season::SeasonHead},
 };
 use faceoff_types::DivisionName;
@@ -79,7 +79,8 @@ async fn register_team(app: &App, form: &Form) -> Result<NewRegistrationView, Pr
         &form.division,
     )?;
     let request = RegistrationRequest {
-        team: team.ok_or_else(|| Problem::invalid("the team's name", "expected a name, got none"))?,
+        team: team
+            .ok_or_else(|| Problem::invalid("the team's name", "expected a name, got none"))?,
         contact: form.contact.clone(),
         accepted_terms: parse_accepted_terms(&form.accepted_terms)?,
     };

@@ -77,8 +77,9 @@ impl Still {
             puck_path: table_drawing::path(&puck),
             mallet_path: table_drawing::path(&mallet),
             opponent_path: table_drawing::path(&motion.mallet_positions(1)),
-            observed: observed
-                .map_or_else(String::new, |clip| table_drawing::dots(&clip.observed_puck_positions())),
+            observed: observed.map_or_else(String::new, |clip| {
+                table_drawing::dots(&clip.observed_puck_positions())
+            }),
             contacts: table_drawing::squares(&contacts),
             puck_radius: millimetres(PUCK.radius_m),
             mallet_radius: millimetres(TOOL.cylinder_radius_m),

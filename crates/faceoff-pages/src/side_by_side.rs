@@ -18,7 +18,12 @@ pub(super) struct Side {
 
 impl Side {
     /// `api`: address of the clips. `element_id`: id of the HTML element.
-    pub(super) fn new(element_id: &'static str, episode: &Episode, api: &str, name: String) -> Self {
+    pub(super) fn new(
+        element_id: &'static str,
+        episode: &Episode,
+        api: &str,
+        name: String,
+    ) -> Self {
         let line = &episode.line;
         let label = format!("{}, episode {}, {name}", line.task, line.episode);
         let title = format!("{name}, {} {}", line.task, line.episode);

@@ -11,7 +11,7 @@ use axum::{
     response::{AppendHeaders, IntoResponse, Redirect, Response},
 };
 use faceoff_service::{
-    services::sessions::sign_in, app::App, auth::Caller, extract::PageForm, problem::ProblemKind,
+    app::App, auth::Caller, extract::PageForm, problem::ProblemKind, services::sessions::sign_in,
     session, views::season::SeasonHead,
 };
 use serde::Deserialize;

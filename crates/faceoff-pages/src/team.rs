@@ -4,8 +4,8 @@ mod days;
 
 use super::{
     chart::Panel,
-    submission_row::SubmissionRow,
     frame::{Frame, PageProblem, render},
+    submission_row::SubmissionRow,
 };
 use askama::Template;
 use axum::{extract::State, response::Response};
@@ -20,8 +20,8 @@ use faceoff_service::{
     problem::Problem,
     viewer::Viewer,
     views::{
-        evaluation, history, season::SeasonHead, visibility::Visibility, stage, submission, team,
-        tournament::entered_tournaments,
+        evaluation, history, season::SeasonHead, stage, submission, team,
+        tournament::entered_tournaments, visibility::Visibility,
     },
 };
 use faceoff_types::{StageDay, StageName, TeamId, TournamentId};

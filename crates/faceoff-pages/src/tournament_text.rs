@@ -32,9 +32,7 @@ pub(super) fn describe_format(rules: &TournamentRules) -> String {
             "{groups} groups drawn at random, in which each team plays every other team, then a final round of the first {advance} of each group"
         ),
         TournamentFormat::Swiss { rounds } => {
-            format!(
-                "{rounds} rounds by the Swiss system: opponents have about the same points"
-            )
+            format!("{rounds} rounds by the Swiss system: opponents have about the same points")
         }
     };
     let mirrored = if rules.mirrored {

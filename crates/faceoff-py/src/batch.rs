@@ -1,6 +1,6 @@
 //! The simulator's batch, as the reference for benchmarks of the environments.
 
-use crate::errors::{argument_error, simulator_error, catch_panic};
+use crate::errors::{argument_error, catch_panic, simulator_error};
 use faceoff_sim::{
     Batch as SimBatch, BatchSetup, Interpolation, JOINTS, PerturbationSettings, Plant,
     model::INITIAL_Q,

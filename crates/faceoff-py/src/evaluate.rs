@@ -2,9 +2,9 @@
 
 use crate::{
     actions::{ActionMode, Actions},
-    errors::{OrderError, argument_error, simulator_error, catch_panic},
+    errors::{OrderError, argument_error, catch_panic, simulator_error},
 };
-use faceoff_episode::{AnswerTiming, Arena, RunningEpisode, NullSink};
+use faceoff_episode::{AnswerTiming, Arena, NullSink, RunningEpisode};
 use faceoff_scoring::{StepTimes, score_evaluation, score_task};
 use faceoff_sim::{Interpolation, JOINTS, PerturbationSettings, model::INITIAL_Q};
 use faceoff_types::{EpisodeOutcome, Phase, Profile, Ruleset, Seed, Task, TaskResult, Variation};
@@ -45,7 +45,9 @@ impl Evaluation {
             .map_err(|error| argument_error("profile", "a profile", error))?;
         let read = |name, text: &str| -> PyResult<Seed> {
             text.parse()
-                .map_err(|error: faceoff_types::ParseSeedError| argument_error(name, "a seed", error))
+                .map_err(|error: faceoff_types::ParseSeedError| {
+                    argument_error(name, "a seed", error)
+                })
         };
         let seed = read("seed", seed)?;
         let season = match mismatch_seed {
@@ -60,7 +62,13 @@ impl Evaluation {
         let arena = py.detach(|| {
             catch_panic(|| {
                 let ruleset = Ruleset::CURRENT;
-                Ok(Arena::with_ruleset(ruleset, profile, &magnitudes, seed, season))
+                Ok(Arena::with_ruleset(
+                    ruleset,
+                    profile,
+                    &magnitudes,
+                    seed,
+                    season,
+                ))
             })
         })?;
         Ok(Self {
@@ -83,13 +91,20 @@ impl Evaluation {
         action_mode: &str,
         clip_actions: bool,
     ) -> PyResult<PolicyEpisode> {
-        let interpolation = Interpolation::from_code(interpolation)
-            .map_err(|error| argument_error("interpolation", "1, 2, 3, 4, 5, -1 or None", error.0))?;
+        let interpolation = Interpolation::from_code(interpolation).map_err(|error| {
+            argument_error("interpolation", "1, 2, 3, 4, 5, -1 or None", error.0)
+        })?;
         let mode = match action_mode {
             "delta" => ActionMode::Delta,
             "absolute" => ActionMode::Absolute,
             "raw" => ActionMode::Raw,
-            other => return Err(argument_error("action_mode", "delta, absolute or raw", other)),
+            other => {
+                return Err(argument_error(
+                    "action_mode",
+                    "delta, absolute or raw",
+                    other,
+                ));
+            }
         };
         let actions = Actions {
             mode,

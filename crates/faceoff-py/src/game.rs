@@ -2,7 +2,7 @@
 
 use crate::{
     actions::{ActionMode, Actions},
-    errors::{ClosedError, OrderError, argument_error, simulator_error, catch_panic},
+    errors::{ClosedError, OrderError, argument_error, catch_panic, simulator_error},
     observation,
 };
 use faceoff_sim::{
@@ -180,7 +180,10 @@ fn closed_error() -> PyErr {
     ClosedError::new_err("expected an open environment, got one that was closed: make a new one")
 }
 
-fn write_observations(game: &faceoff_sim::Game, observations: &mut PyReadwriteArray2<'_, f32>) -> PyResult<()> {
+fn write_observations(
+    game: &faceoff_sim::Game,
+    observations: &mut PyReadwriteArray2<'_, f32>,
+) -> PyResult<()> {
     const LEN: usize = OBSERVATION_WITH_OPPONENT_LEN;
     if observations.shape() != [2, LEN] {
         let got = format!("one of shape {:?}", observations.shape());
@@ -217,7 +220,11 @@ fn step_dict<'py>(
     result.set_item("rally_end", kind)?;
     result.set_item("by", by)?;
     result.set_item("constraints", constraints)?;
-    result.set_item("diverged", step.divergence.map_or([false; 2], |divergence| divergence.by))?;
+    result.set_item(
+        "diverged",
+        step.divergence
+            .map_or([false; 2], |divergence| divergence.by),
+    )?;
     result.set_item("goals", game.referee().goals)?;
     result.set_item("fouls", game.referee().fouls)?;
     result.set_item("score", game.referee().score())?;

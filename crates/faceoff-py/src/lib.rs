@@ -43,8 +43,8 @@ mod _native {
         evaluate::{Evaluation, PolicyEpisode},
         game::Game,
         kinematics::{
-            arm_constraints, arm_forward, arm_frames, arm_heights, arm_inverse, arm_jacobian,
-            arm_constants, arm_posture_velocities, arm_velocities,
+            arm_constants, arm_constraints, arm_forward, arm_frames, arm_heights, arm_inverse,
+            arm_jacobian, arm_posture_velocities, arm_velocities,
         },
         snapshot::{Snapshot, load_snapshot},
         worlds::Worlds,
@@ -76,8 +76,9 @@ mod _native {
     #[pyfunction]
     fn action_shape(interpolation: Option<i64>) -> PyResult<Vec<usize>> {
         let interpolation = faceoff_types::Interpolation::from_code(interpolation);
-        let interpolation = interpolation
-            .map_err(|error| argument_error("interpolation", "1, 2, 3, 4, 5, -1 or None", error.0))?;
+        let interpolation = interpolation.map_err(|error| {
+            argument_error("interpolation", "1, 2, 3, 4, 5, -1 or None", error.0)
+        })?;
         Ok(interpolation.shape().to_vec())
     }
 

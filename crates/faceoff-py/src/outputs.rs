@@ -115,11 +115,12 @@ pub fn write_facts(world: &World, constraints: &[f64; 4], facts: &mut [f64]) {
     facts[2] = f64::from(world.origin.number);
     facts[3] = f64::from(world.episode.steps());
     facts[4..8].copy_from_slice(constraints);
-    for (fact, is_violated) in
-        facts[8..]
-            .iter_mut()
-            .zip([violations.ee, violations.link, violations.joint_pos, violations.joint_vel])
-    {
+    for (fact, is_violated) in facts[8..].iter_mut().zip([
+        violations.ee,
+        violations.link,
+        violations.joint_pos,
+        violations.joint_vel,
+    ]) {
         *fact = f64::from(u8::from(is_violated));
     }
 }
@@ -196,5 +197,7 @@ pub fn chunks_with_worlds<'a, 'w>(
     chunk_size: usize,
 ) -> impl IndexedParallelIterator<Item = (&'w mut [World], Outputs<'a>)> {
     let chunks = outputs.split(chunk_size);
-    worlds.par_chunks_mut(chunk_size).zip(chunks.into_par_iter())
+    worlds
+        .par_chunks_mut(chunk_size)
+        .zip(chunks.into_par_iter())
 }

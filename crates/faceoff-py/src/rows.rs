@@ -42,7 +42,11 @@ impl Rows<'_> {
                 return Ok(());
             }
             let expected = format!("an array of length {worlds}");
-            Err(argument_error(name, expected, format!("one of length {len}")))
+            Err(argument_error(
+                name,
+                expected,
+                format!("one of length {len}"),
+            ))
         };
         wide("observations", self.0.shape(), observation_len, false)?;
         wide("final observations", self.1.shape(), observation_len, true)?;

@@ -108,9 +108,15 @@ impl Setup {
         let seed = seed.episode(task, number);
         match puck {
             None => Episode::new(task, interpolation, factors, settings, plant, seed),
-            Some(puck) => {
-                Episode::with_initial_puck(task, interpolation, factors, settings, plant, seed, puck)
-            }
+            Some(puck) => Episode::with_initial_puck(
+                task,
+                interpolation,
+                factors,
+                settings,
+                plant,
+                seed,
+                puck,
+            ),
         }
     }
 }

@@ -54,7 +54,9 @@ impl World {
     pub fn start(setup: &Setup, origin: Origin, previous: Option<&Self>) -> Self {
         let seed = Seed::from_number(origin.seed);
         let plant = match previous {
-            Some(previous) if previous.origin.seed == origin.seed || setup.mismatch_seed.is_some() => {
+            Some(previous)
+                if previous.origin.seed == origin.seed || setup.mismatch_seed.is_some() =>
+            {
                 Arc::clone(&previous.plant)
             }
             _ => Arc::new(setup.plant(seed)),

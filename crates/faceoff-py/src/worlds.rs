@@ -1,7 +1,9 @@
 //! The worlds of an environment, driven by the Python half.
 
 use crate::{
-    errors::{ClosedError, OrderError, argument_error, simulator_error, catch_panic, panic_message},
+    errors::{
+        ClosedError, OrderError, argument_error, catch_panic, panic_message, simulator_error,
+    },
     outputs::{OwnedRows, chunks_with_worlds},
     pool::Pool,
     rows::Rows,

@@ -4,7 +4,7 @@ use crate::{
     clip::Clip,
     error::ReplayError,
     group::Group,
-    header::{RallyEndEvent, RallyEndKind, Contact, ContactWith},
+    header::{Contact, ContactWith, RallyEndEvent, RallyEndKind},
 };
 use std::collections::VecDeque;
 
@@ -174,7 +174,10 @@ impl Analyzer {
         self.analysis.steps += 1;
         self.analysis.halves[half] += 1;
         let Self {
-            analysis, touch, open, ..
+            analysis,
+            touch,
+            open,
+            ..
         } = self;
         // The puck is back in the half from which it was shot.
         if open.is_some_and(|shot| analysis.shots[shot].side == half) {

@@ -82,8 +82,13 @@ impl Clip {
             let bytes = usize::try_from(column_header.bytes).map_err(|error| wrong(&error))?;
             let (column_bytes, rest) = payload.split_at_checked(bytes).ok_or_else(cut)?;
             payload = rest;
-            let mut column = Column::new(column_header.name.as_str(), &column_header.unit, column_header.scale, column_header.order)
-                .beginning_at(column_header.first);
+            let mut column = Column::new(
+                column_header.name.as_str(),
+                &column_header.unit,
+                column_header.scale,
+                column_header.order,
+            )
+            .beginning_at(column_header.first);
             let count = usize::try_from(column_header.count).map_err(|error| wrong(&error))?;
             column.read(column_bytes, count)?;
             columns.push(column);

@@ -72,7 +72,8 @@ impl Column {
 
     /// Reads `count` numbers written by [`Column::write`], which must be all of `bytes`.
     pub(crate) fn read(&mut self, bytes: &[u8], count: usize) -> Result<(), ReplayError> {
-        let wrong = |reason: &str| ReplayError::unreadable(format!("the column {:?}", self.name), reason);
+        let wrong =
+            |reason: &str| ReplayError::unreadable(format!("the column {:?}", self.name), reason);
         // A number takes at least a byte, so a wrong count in a header cannot cause a large allocation.
         if count > bytes.len() {
             return Err(wrong("it is cut off"));

@@ -1,14 +1,14 @@
 //! Records an episode as two clips and a line of the index.
 
 use crate::{
+    agent_view::AgentView,
     clip::Clip,
+    clip_index::{EpisodeLine, TimeBins, ViolationSummary},
     error::ReplayError,
     group::Group,
     gzip::Gzip,
     header::{CLIP_FORMAT, ClipKind, EpisodeEndSummary, Header},
     motion::Motion,
-    agent_view::AgentView,
-    clip_index::{ViolationSummary, EpisodeLine, TimeBins},
     violations::ViolationTracker,
 };
 use faceoff_episode::{EpisodeStart, StepRow, describe_end};
@@ -82,7 +82,11 @@ impl Recording {
     }
 
     fn add_violation(&mut self, group: Group, sample: u32, value: f64, state: &EpisodeState) {
-        if let Some(violation) = self.violations.iter_mut().find(|violation| violation.group == group) {
+        if let Some(violation) = self
+            .violations
+            .iter_mut()
+            .find(|violation| violation.group == group)
+        {
             violation.samples += 1;
             violation.worst = violation.worst.max(value);
             return;

@@ -1,12 +1,12 @@
 //! Records the clips of a game while it is played, 500 control steps each.
 
 use crate::{
+    agent_view::AgentView,
     clip::Clip,
     error::ReplayError,
     gzip::Gzip,
-    header::{RallyEndEvent, RallyEndKind, CLIP_FORMAT, ClipKind, Header},
+    header::{CLIP_FORMAT, ClipKind, Header, RallyEndEvent, RallyEndKind},
     motion::Motion,
-    agent_view::AgentView,
     pack::{Key, PackWriter},
     violations::ViolationTracker,
 };
@@ -135,7 +135,11 @@ impl Chunk {
         };
         let sides = [view_clip(0, home), view_clip(1, away)];
         let (columns, contacts) = self.motion.take();
-        let mut violations: Vec<_> = self.trackers.iter_mut().flat_map(ViolationTracker::take).collect();
+        let mut violations: Vec<_> = self
+            .trackers
+            .iter_mut()
+            .flat_map(ViolationTracker::take)
+            .collect();
         violations.sort_by_key(|span| (span.from, span.side, span.group));
         let motion = Clip {
             header: Header {

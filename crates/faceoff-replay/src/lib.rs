@@ -5,8 +5,10 @@
 //! another. A [`Pack`] is a file of clips with an index, written while a shard or a game is played. Its [`ClipIndex`] has a
 //! line for each episode: how it started and ended, and its violations. `docs/replay.md` describes the format.
 
+mod agent_view;
 mod analysis;
 mod clip;
+mod clip_index;
 mod column;
 mod episode;
 mod error;
@@ -15,28 +17,26 @@ mod group;
 mod gzip;
 mod header;
 mod motion;
-mod agent_view;
 mod pack;
 mod positions;
 mod recorder;
-mod clip_index;
 #[cfg(test)]
 mod viewer_model;
 mod violations;
 
-pub use analysis::{LocatedViolation, GOAL_PATH_STEPS, GameAnalysis, GoalPath, Shot};
+pub use analysis::{GOAL_PATH_STEPS, GameAnalysis, GoalPath, LocatedViolation, Shot};
 pub use clip::Clip;
+pub use clip_index::{ClipIndex, EpisodeLine, TimeBins, ViolationSummary};
 pub use column::Column;
 pub use error::ReplayError;
 pub use game::{CHUNK_STEPS, GameClipRecorder};
 pub use group::Group;
 pub use header::{
-    RallyEndEvent, RallyEndKind, ClipKind, ColumnHeader, Contact, ContactWith, EpisodeEndSummary, Header, TrackingGap,
-    ViolationSpan,
+    ClipKind, ColumnHeader, Contact, ContactWith, EpisodeEndSummary, Header, RallyEndEvent,
+    RallyEndKind, TrackingGap, ViolationSpan,
 };
-pub use pack::{Key, Pack, PackWriter, join_packs, select_episodes, merged_index};
+pub use pack::{Key, Pack, PackWriter, join_packs, merged_index, select_episodes};
 pub use recorder::ClipRecorder;
-pub use clip_index::{ViolationSummary, EpisodeLine, ClipIndex, TimeBins};
 
 /// Constants of the model that are needed to draw a clip.
 pub mod model {

@@ -4,7 +4,7 @@ use crate::{
     column::Column,
     header::{Contact, ContactWith},
 };
-use faceoff_sim::{EpisodeState, GameState, Impact, JOINTS, ContactBody, model::CONTROL_STEP_S};
+use faceoff_sim::{ContactBody, EpisodeState, GameState, Impact, JOINTS, model::CONTROL_STEP_S};
 
 /// m: a tenth of a pixel in the largest picture.
 const POSITION: f64 = 1e-4;
@@ -115,7 +115,8 @@ impl Motion {
                 ContactBody::Mallet(0) => ContactWith::Mallet,
                 ContactBody::Mallet(_) => ContactWith::OpponentMallet,
             };
-            let is_same_bounce = |earlier: &Contact| earlier.what == what && t - earlier.t < BOUNCE_S;
+            let is_same_bounce =
+                |earlier: &Contact| earlier.what == what && t - earlier.t < BOUNCE_S;
             if !self.contacts.iter().rev().any(is_same_bounce) {
                 let [x, y] = impact.puck;
                 self.contacts.push(Contact {

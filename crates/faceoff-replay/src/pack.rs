@@ -8,7 +8,7 @@
 //! 16 bytes   offset of the index u64 · clips u32 · "clip"
 //! ```
 
-use crate::{error::ReplayError, clip_index::ClipIndex};
+use crate::{clip_index::ClipIndex, error::ReplayError};
 use faceoff_types::{Side, Task};
 use fs_err::File;
 use std::{

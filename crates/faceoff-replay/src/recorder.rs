@@ -1,11 +1,11 @@
 //! Records the clips of a shard while it is played.
 
 use crate::{
+    clip_index::ClipIndex,
     episode::Recording,
     error::ReplayError,
     gzip::Gzip,
     pack::{Key, PackWriter},
-    clip_index::ClipIndex,
 };
 use faceoff_episode::{EpisodeStart, RecordError, StepRow, StepSink};
 use faceoff_types::{EpisodeOutcome, Task};

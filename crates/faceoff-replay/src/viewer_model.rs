@@ -38,7 +38,10 @@ fn viewer_model_matches_the_simulator() {
     assert_eq!(links.len(), LINKS.len());
     for (link_model, link) in links.iter().zip(&LINKS) {
         assert_same(&link_model["range_rad"], link.range_rad);
-        let limit = link_model["velocity_limit_deg_s"].as_f64().unwrap().to_radians();
+        let limit = link_model["velocity_limit_deg_s"]
+            .as_f64()
+            .unwrap()
+            .to_radians();
         assert_same(&limit.into(), link.velocity_limit_rad_s);
         let position = match link.offset {
             Offset::Y(y) => [0.0, y, 0.0],

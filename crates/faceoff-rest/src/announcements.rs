@@ -7,11 +7,11 @@ use faceoff_api::{
     views::announcement::{AnnouncementView, QuestionView},
 };
 use faceoff_service::{
-    services::announcements,
     app::App,
     auth::{OptionalCaller, Organiser, TeamCaller},
     extract::{Json as Body, PathParam},
     problem::Problem,
+    services::announcements,
     views::announcement,
 };
 use faceoff_types::{AnnouncementId, QuestionId};

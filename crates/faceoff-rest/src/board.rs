@@ -92,7 +92,12 @@ pub(crate) async fn board_history(
     let tag = tag(&app, change, viewer, format, &("history", &query))?;
     let Some(mut response) = conditions.not_modified(&tag) else {
         let history = history::query(&app, &visibility, query).await?;
-        return Ok(build_response(&tag, format, &history, board_csv::history_table));
+        return Ok(build_response(
+            &tag,
+            format,
+            &history,
+            board_csv::history_table,
+        ));
     };
     require_revalidation(response.headers_mut());
     Ok(response)

@@ -3,11 +3,11 @@
 use axum::{Json, extract::State};
 use faceoff_api::{requests::Reason, views::stage::StageView};
 use faceoff_service::{
-    services::stage_results,
     app::App,
     auth::Organiser,
     extract::{Json as Body, PathParam},
     problem::Problem,
+    services::stage_results,
 };
 use faceoff_types::StageId;
 

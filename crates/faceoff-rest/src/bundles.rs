@@ -12,13 +12,13 @@ use faceoff_api::{
     views::{link::LinkView, submission::SubmissionView},
 };
 use faceoff_service::{
-    services::decisions::checked_reason,
     app::App,
     archive_contents,
     auth::Caller,
     conditions::Conditions,
     extract::{OptionalJson, PathParam},
     problem::Problem,
+    services::decisions::checked_reason,
     views::submission,
 };
 use faceoff_store::{StoreError, Submission};

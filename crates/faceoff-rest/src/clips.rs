@@ -46,7 +46,11 @@ pub(crate) async fn episodes(
 ) -> Result<Response, Problem> {
     let visibility = Visibility::load(&app, viewer).await?;
     let clips = Clips::find(&app, &visibility, id).await?;
-    let detail = if clips.can_see_observations { "all" } else { "public" };
+    let detail = if clips.can_see_observations {
+        "all"
+    } else {
+        "public"
+    };
     let tag = ETag::new(
         "episodes",
         &[&clips.file.key, detail, env!("CARGO_PKG_VERSION")],

@@ -29,5 +29,7 @@ pub(crate) async fn compare(
     QueryParams(query): QueryParams<ComparisonQuery>,
 ) -> Result<Json<ComparisonView>, Problem> {
     let visibility = Visibility::load(&app, viewer).await?;
-    comparison::compare(&app, &visibility, ids, query).await.map(Json)
+    comparison::compare(&app, &visibility, ids, query)
+        .await
+        .map(Json)
 }

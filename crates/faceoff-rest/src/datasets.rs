@@ -27,7 +27,7 @@ use faceoff_service::{
     problem::{Problem, ProblemKind},
     release::check_released,
     viewer::Viewer,
-    views::{evaluation, visibility::Visibility, violations},
+    views::{evaluation, violations, visibility::Visibility},
 };
 use faceoff_store::{EvaluationState, StoreError};
 use faceoff_types::EvaluationId;
@@ -60,7 +60,11 @@ pub(crate) async fn dataset(
         key: &stored.dataset,
         blake3: stored.blake3.as_deref(),
         media_type: "application/zip",
-        name: &format!("faceoff-{}-{}.zip", file_stem(team.name.as_str()), stored.day),
+        name: &format!(
+            "faceoff-{}-{}.zip",
+            file_stem(team.name.as_str()),
+            stored.day
+        ),
     };
     match download(&app, &conditions, file).await {
         Err(StoreError::NotFound(_)) => {
@@ -173,11 +177,17 @@ pub(crate) async fn publish_evaluation(
         .publish_evaluation(caller.actor(), id, now)
         .await?;
     tracing::info!(evaluation = %id, team = %team.name, "evaluation published by its team");
-    evaluation::build(&app, &visibility, published).await.map(Json)
+    evaluation::build(&app, &visibility, published)
+        .await
+        .map(Json)
 }
 
 /// The dataset of an evaluation, if the viewer may download it now.
-async fn find_dataset(viewer: Viewer, app: &App, id: EvaluationId) -> Result<StoredDataset, Problem> {
+async fn find_dataset(
+    viewer: Viewer,
+    app: &App,
+    id: EvaluationId,
+) -> Result<StoredDataset, Problem> {
     match proposals::dataset(viewer, app, id).await? {
         Some(proposed) => {
             archive_contents::check_included(app, &proposed.dataset, "dataset").await?;
@@ -188,7 +198,11 @@ async fn find_dataset(viewer: Viewer, app: &App, id: EvaluationId) -> Result<Sto
 }
 
 /// The dataset of a finished evaluation whose day is released.
-async fn find_released(viewer: Viewer, app: &App, id: EvaluationId) -> Result<StoredDataset, Problem> {
+async fn find_released(
+    viewer: Viewer,
+    app: &App,
+    id: EvaluationId,
+) -> Result<StoredDataset, Problem> {
     let visibility = Visibility::load(app, viewer).await?;
     let evaluation = visibility.readable(app.store.evaluation(id).await)?;
     visibility.check_not_blind(evaluation.stage_day.stage)?;

@@ -7,7 +7,7 @@ use axum::{
 };
 use faceoff_service::{
     app::App,
-    conditions::{Conditions, ETag, ByteRange},
+    conditions::{ByteRange, Conditions, ETag},
     problem::{Problem, ProblemKind},
 };
 use faceoff_store::StoreError;

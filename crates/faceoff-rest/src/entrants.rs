@@ -6,14 +6,14 @@ use faceoff_api::{
     views::tournament::TournamentView,
 };
 use faceoff_service::{
-    services::{decisions::checked_reason, entrants},
     app::App,
     auth::{Caller, Organiser},
     extract::{Json as Body, PathParam},
     problem::{Problem, ProblemKind},
+    services::{decisions::checked_reason, entrants},
     views::{tournament, tournament_state::TournamentState},
 };
-use faceoff_store::{Actor, GameState, DepartureRequest};
+use faceoff_store::{Actor, DepartureRequest, GameState};
 use faceoff_types::{DepartureKind, TournamentId};
 use std::slice;
 

@@ -3,7 +3,7 @@
 use axum::{Json, extract::State};
 use faceoff_api::{requests::StartDay, views::day::DayView};
 use faceoff_service::{
-    services::evaluations, app::App, auth::Organiser, extract::OptionalJson, problem::Problem,
+    app::App, auth::Organiser, extract::OptionalJson, problem::Problem, services::evaluations,
 };
 
 /// Starts a stage's evaluation day: the cutoff is now, and each team's active submission is evaluated.

@@ -9,13 +9,13 @@ use axum::{
 };
 use faceoff_api::{paths, requests::Cancellation, views::evaluation::EvaluationView};
 use faceoff_service::{
-    services::evaluations,
     app::App,
     auth::{Caller, Organiser},
     extract::{Json as Body, PathParam},
     problem::Problem,
+    services::evaluations,
     viewer::Viewer,
-    views::{evaluation, visibility::Visibility, stage},
+    views::{evaluation, stage, visibility::Visibility},
 };
 use faceoff_store::EvaluationFilter;
 use faceoff_types::EvaluationId;
@@ -80,7 +80,9 @@ pub(crate) async fn evaluation(
 ) -> Result<Json<EvaluationView>, Problem> {
     let visibility = Visibility::load(&app, viewer).await?;
     let evaluation = visibility.readable(app.store.evaluation(id).await)?;
-    evaluation::build(&app, &visibility, evaluation).await.map(Json)
+    evaluation::build(&app, &visibility, evaluation)
+        .await
+        .map(Json)
 }
 
 /// Cancels an evaluation that has not ended. It can be rerun. If it was the last one of its day, the day is released.

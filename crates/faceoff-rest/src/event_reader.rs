@@ -1,8 +1,8 @@
 //! A reader of the event stream: which events it gets next, and when. Its only state is its position in the log.
 
 use axum::response::sse::Event;
-use faceoff_notify::{NoticeFilter, Notice, Page, Audience};
-use faceoff_service::{app::App, shutdown::Shutdown, problem::Problem};
+use faceoff_notify::{Audience, Notice, NoticeFilter, Page};
+use faceoff_service::{app::App, problem::Problem, shutdown::Shutdown};
 use faceoff_store::{Change, StoreError};
 use faceoff_types::TokenId;
 use std::time::Duration;

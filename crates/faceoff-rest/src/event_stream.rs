@@ -8,9 +8,9 @@ use faceoff_notify::NoticeFilter;
 use faceoff_service::{
     app::App,
     auth::OptionalCaller,
-    shutdown::Shutdown,
     extract::QueryParams,
     problem::{Problem, ProblemKind},
+    shutdown::Shutdown,
     viewer::Viewer,
 };
 use futures::stream;

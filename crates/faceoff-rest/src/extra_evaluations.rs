@@ -8,15 +8,15 @@ use axum::{
 };
 use faceoff_api::{
     paths,
-    requests::{NewExtraEvaluation, MissedDay},
+    requests::{MissedDay, NewExtraEvaluation},
     views::{day::DayView, evaluation::EvaluationView},
 };
 use faceoff_service::{
-    services::evaluations,
     app::App,
     auth::Organiser,
     extract::{Json as Body, PathParam, PathParams},
     problem::Problem,
+    services::evaluations,
 };
 use faceoff_types::{StageDay, StageId};
 
@@ -71,7 +71,8 @@ pub(crate) async fn grant_extra_evaluation(
     let stage_day: StageDay = format!("{stage}/{day}")
         .parse()
         .map_err(|_| Problem::not_found("day"))?;
-    let view = evaluations::grant_extra_evaluation(&app, organiser.actor(), stage_day, &wanted).await?;
+    let view =
+        evaluations::grant_extra_evaluation(&app, organiser.actor(), stage_day, &wanted).await?;
     let location = [(header::LOCATION, paths::evaluation(view.id))];
     Ok((StatusCode::CREATED, AppendHeaders(location), Json(view)))
 }

@@ -14,11 +14,11 @@ use faceoff_api::{
     views::game::{GameView, SkippedTestGame, TestGamesView},
 };
 use faceoff_service::{
-    services::entrants,
     app::App,
     auth::{Caller, TeamCaller},
     extract::{Json as Body, OptionalJson, PathParam},
     problem::{Problem, ProblemKind},
+    services::entrants,
     viewer::Viewer,
     views::{game, tournament_state::TournamentState},
 };
@@ -51,7 +51,8 @@ pub(crate) async fn order_test_games(
     let teams = match (requested_by, wanted.teams) {
         (None, None) => {
             let entrants = state.entrants.iter();
-            let tested = entrants.filter(|entrant| entrant.departure.is_none() && Some(entrant.team) != baseline);
+            let tested = entrants
+                .filter(|entrant| entrant.departure.is_none() && Some(entrant.team) != baseline);
             tested.map(|entrant| entrant.team).collect()
         }
         (None, Some(names)) => entrants::find_by_names(&app, "teams", &names).await?,
@@ -105,10 +106,7 @@ pub(crate) async fn order_test_games(
         return Err(Problem::new(ProblemKind::Conflict, detail));
     }
     tracing::info!(tournament = %id, actor = %caller.actor(), games = queued.len(), "test games queued");
-    let view = TestGamesView {
-        queued,
-        skipped,
-    };
+    let view = TestGamesView { queued, skipped };
     Ok((StatusCode::CREATED, Json(view)))
 }
 

@@ -161,7 +161,11 @@ pub(crate) async fn side_log(
         return Err(no_result(&game));
     };
     let media_type = [(header::CONTENT_TYPE, "text/plain; charset=utf-8")];
-    Ok((media_type, faceoff_types::escape_unprintable(&log).into_owned()).into_response())
+    Ok((
+        media_type,
+        faceoff_types::escape_unprintable(&log).into_owned(),
+    )
+        .into_response())
 }
 
 pub(super) fn parse_game(id: &str) -> Result<GameId, Problem> {
@@ -176,12 +180,8 @@ pub(super) fn parse_side([id, side]: &[String; 2]) -> Result<(GameId, Side), Pro
         .parse::<u32>()
         .ok()
         .and_then(|number| Side::BOTH.into_iter().find(|side| side.number() == number));
-    let side = side.ok_or_else(|| {
-        Problem::new(
-            ProblemKind::NotFound,
-            "expected side 1 (home) or 2 (away)",
-        )
-    })?;
+    let side = side
+        .ok_or_else(|| Problem::new(ProblemKind::NotFound, "expected side 1 (home) or 2 (away)"))?;
     Ok((id, side))
 }
 

@@ -7,11 +7,11 @@ use faceoff_api::{
     views::{attempt::GameAttemptView, game::GameView},
 };
 use faceoff_service::{
-    services::decisions::checked_reason,
     app::App,
     auth::{Caller, Organiser},
     extract::{Json as Body, PathParam},
     problem::{Problem, ProblemKind},
+    services::decisions::checked_reason,
     viewer::Viewer,
     views::{attempt, game, tournament_state::TournamentState},
 };

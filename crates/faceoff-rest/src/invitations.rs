@@ -10,14 +10,14 @@ use faceoff_api::{
     },
 };
 use faceoff_service::{
-    services::{invitations, accounts::join},
     app::App,
     auth::Caller,
     extract::{Json as Body, PathParam},
     problem::Problem,
-    views::{invitation, user, token},
+    services::{accounts::join, invitations},
+    views::{invitation, token, user},
 };
-use faceoff_store::{TokenKind, Principal};
+use faceoff_store::{Principal, TokenKind};
 use faceoff_types::InvitationId;
 
 /// Creates an invitation; its link is returned only once. Organisers invite to any role, members to their team.

@@ -18,7 +18,7 @@ use faceoff_service::{
     problem::{Problem, ProblemKind},
     request_log,
 };
-use faceoff_store::{VerifiedToken, TokenRejection, StoreError};
+use faceoff_store::{StoreError, TokenRejection, VerifiedToken};
 use faceoff_types::TokenId;
 use jiff::{SignedDuration, Timestamp};
 use serde::Deserialize;
@@ -165,11 +165,14 @@ async fn verify(
             request_log::record_actor(&creator.actor());
             Ok(creator)
         }
-        Err(TokenRejection::Revoked(_) | TokenRejection::Expired(_) | TokenRejection::Unknown | TokenRejection::WrongKind) => {
-            Err(Problem::new(
-                ProblemKind::LinkInvalid,
-                "the token of the link's creator was revoked or has expired, and its links with it; ask for a new one",
-            ))
-        }
+        Err(
+            TokenRejection::Revoked(_)
+            | TokenRejection::Expired(_)
+            | TokenRejection::Unknown
+            | TokenRejection::WrongKind,
+        ) => Err(Problem::new(
+            ProblemKind::LinkInvalid,
+            "the token of the link's creator was revoked or has expired, and its links with it; ask for a new one",
+        )),
     }
 }

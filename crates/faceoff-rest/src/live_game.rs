@@ -5,9 +5,9 @@ use crate::live_reader::{LiveReader, parse_cursor};
 use axum::{Extension, extract::State, http::HeaderMap, response::IntoResponse};
 use faceoff_service::{
     app::App,
-    shutdown::Shutdown,
     extract::PathParam,
     problem::{Problem, ProblemKind},
+    shutdown::Shutdown,
     viewer::Viewer,
     views::game,
 };

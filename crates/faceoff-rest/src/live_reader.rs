@@ -4,11 +4,11 @@ use axum::response::sse::Event;
 use faceoff_api::views::live::{LiveEnd, LiveEndState, LiveWait};
 use faceoff_service::{
     app::App,
-    shutdown::Shutdown,
     problem::{Problem, ProblemKind},
+    shutdown::Shutdown,
 };
-use faceoff_store::{GameState, LiveCursor, LiveUpdate, LiveSubscription, StoreError};
-use faceoff_types::{GameEvent, GameId, LiveGame, LiveEvent};
+use faceoff_store::{GameState, LiveCursor, LiveSubscription, LiveUpdate, StoreError};
+use faceoff_types::{GameEvent, GameId, LiveEvent, LiveGame};
 use serde::Serialize;
 use std::time::Duration;
 use tokio::{
@@ -154,7 +154,11 @@ impl LiveReader {
     }
 
     /// Adds the attempt's snapshot, unless it was sent, and all game events since.
-    fn push_game_events(&mut self, update: &LiveUpdate, events: &mut Vec<Event>) -> Result<(), Problem> {
+    fn push_game_events(
+        &mut self,
+        update: &LiveUpdate,
+        events: &mut Vec<Event>,
+    ) -> Result<(), Problem> {
         let attempt = update.state.attempt;
         if self.sent_attempt != Some(attempt) {
             self.sent_attempt = Some(attempt);

@@ -8,15 +8,15 @@ use faceoff_api::{
     views::proposal::{ProposalStateView, ProposalView},
 };
 use faceoff_service::{
-    services::decisions::checked_reason,
     app::App,
     auth::Organiser,
     extract::{Json as Body, OptionalJson, PathParam},
     problem::{Problem, ProblemKind},
+    services::decisions::checked_reason,
     viewer::Viewer,
     views::proposal,
 };
-use faceoff_store::{EvaluationState, Reevaluation, ProposalOutcome, StoreError};
+use faceoff_store::{EvaluationState, ProposalOutcome, Reevaluation, StoreError};
 use faceoff_types::{EvaluationId, ProposalId, StageDay, StageId};
 
 /// Lists all trials and proposals, newest first, without their evaluations.
@@ -110,8 +110,7 @@ pub(crate) async fn propose(
         (None, Some(day), false) => Reevaluation::Day(stage_day(day)),
         (None, Some(day), true) => Reevaluation::Rules(stage_day(day)),
         (Some(_), _, true) => {
-            let detail =
-                "expected “day” with new rules, got “evaluation”; name the “day”, and leave out “evaluation”";
+            let detail = "expected “day” with new rules, got “evaluation”; name the “day”, and leave out “evaluation”";
             return Err(Problem::invalid("new_rules", detail));
         }
         _ => {
@@ -150,9 +149,10 @@ pub(crate) async fn apply_proposal(
     if let (Some(day), ProposalStateView::Played, Some(outcome)) =
         (view.day, view.state, &view.outcome)
     {
-        let ranks = outcome.changes.iter().filter(|change| {
-            change.old.map(|old| old.rank) != change.new.map(|new| new.rank)
-        });
+        let ranks = outcome
+            .changes
+            .iter()
+            .filter(|change| change.old.map(|old| old.rank) != change.new.map(|new| new.rank));
         let effect = format!(
             "{} evaluations of {day} would replace those that they repeat; {} teams would have another row and {} another \
              rank; the reason {:?} would be public",

@@ -7,11 +7,11 @@ use faceoff_api::{
     views::invitation::{NewRegistrationView, RegistrationView},
 };
 use faceoff_service::{
-    services::registrations,
     app::App,
     auth::Organiser,
     extract::{Json as Body, PathParam},
     problem::Problem,
+    services::registrations,
     views::invitation,
 };
 use faceoff_types::RegistrationId;

@@ -3,11 +3,11 @@
 use axum::{Json, extract::State, http::StatusCode};
 use faceoff_api::views::tournament::RoundView;
 use faceoff_service::{
-    services::tournament_rounds,
     app::App,
     auth::Organiser,
     extract::PathParam,
     problem::Problem,
+    services::tournament_rounds,
     views::{tournament, tournament_state::TournamentState},
 };
 use faceoff_types::TournamentId;

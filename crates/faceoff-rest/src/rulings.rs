@@ -7,11 +7,11 @@ use faceoff_api::{
     views::{day::DayView, evaluation::EvaluationView, team::TeamView},
 };
 use faceoff_service::{
-    services::rulings,
     app::App,
     auth::Organiser,
     extract::{Json as Body, PathParam, PathParams},
     problem::Problem,
+    services::rulings,
 };
 use faceoff_types::{EvaluationId, StageDay, StageId, TeamId};
 

@@ -6,11 +6,11 @@ use faceoff_api::{
     views::season::SeasonView,
 };
 use faceoff_service::{
-    services::teams,
     app::App,
     auth::Organiser,
     extract::Json as Body,
     problem::Problem,
+    services::teams,
     viewer::Viewer,
     views::season::{self, SeasonHead},
 };

@@ -8,7 +8,7 @@ use axum::{
 };
 use faceoff_api::{requests::SignInRequest, views::user::UserView};
 use faceoff_service::{
-    services::sessions::sign_in, app::App, auth::Caller, extract::Json as Body, problem::Problem,
+    app::App, auth::Caller, extract::Json as Body, problem::Problem, services::sessions::sign_in,
     session, views::user,
 };
 

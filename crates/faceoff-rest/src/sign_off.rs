@@ -6,11 +6,11 @@ use faceoff_api::{
     views::{day::DayView, stage::StageView},
 };
 use faceoff_service::{
-    services::stage_results,
     app::App,
     auth::Organiser,
     extract::{OptionalJson, PathParam},
     problem::Problem,
+    services::stage_results,
 };
 use faceoff_types::StageId;
 

@@ -16,7 +16,9 @@ pub(super) const LAST_EVENT_ID: &str = "last-event-id";
 const KEEP_ALIVE: Duration = Duration::from_secs(15);
 
 /// A streaming response that ends with the batches.
-pub(super) fn sse_response(batches: impl Stream<Item = Vec<Event>> + Send + 'static) -> impl IntoResponse {
+pub(super) fn sse_response(
+    batches: impl Stream<Item = Vec<Event>> + Send + 'static,
+) -> impl IntoResponse {
     let events = batches.flat_map(stream::iter).map(Ok::<_, Infallible>);
     let events = Sse::new(events).keep_alive(KeepAlive::new().interval(KEEP_ALIVE));
     // Keeps proxies from buffering the stream.

@@ -6,11 +6,11 @@ use faceoff_api::{
     views::stage::StageView,
 };
 use faceoff_service::{
-    services::stages,
     app::App,
     auth::Organiser,
     extract::{Json as Body, PathParam},
     problem::Problem,
+    services::stages,
     viewer::Viewer,
     views::stage,
 };

@@ -4,11 +4,11 @@ use crate::paging::{Page, PageQuery, Paged};
 use axum::{Json, extract::State};
 use faceoff_api::{requests::SubmissionChange, views::submission::SubmissionView};
 use faceoff_service::{
-    services::submissions,
     app::App,
     auth::{Caller, TeamCaller},
     extract::{Json as Body, PathParam},
     problem::{Problem, ProblemKind},
+    services::submissions,
     views::submission,
 };
 use faceoff_types::SubmissionId;

@@ -8,11 +8,11 @@ use faceoff_api::{
     views::team::{TeamView, TeamWithToken},
 };
 use faceoff_service::{
-    services::teams,
     app::App,
     auth::{Caller, Organiser},
     extract::{Json as Body, PathParam},
     problem::Problem,
+    services::teams,
     views::team,
 };
 use faceoff_types::{TeamId, TeamName};

@@ -6,11 +6,11 @@ use faceoff_api::{
     views::{announcement::TermsView, user::UserView},
 };
 use faceoff_service::{
-    services::{users, announcements},
     app::App,
     auth::{Caller, Organiser},
     extract::{Json as Body, PathParam},
     problem::Problem,
+    services::{announcements, users},
     views::{announcement, user},
 };
 

@@ -5,17 +5,17 @@ use axum::{Json, extract::State, http::StatusCode};
 use faceoff_api::{
     requests,
     views::{
-        user::CallerView,
         token::{NewTokenView, TokenView},
+        user::CallerView,
     },
 };
 use faceoff_service::{
-    services::tokens,
     app::App,
     auth::Caller,
     extract::{Json as Body, PathParam},
     problem::Problem,
-    views::{user, token},
+    services::tokens,
+    views::{token, user},
 };
 use faceoff_types::TokenId;
 

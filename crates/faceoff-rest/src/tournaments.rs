@@ -12,15 +12,15 @@ use faceoff_api::{
     views::tournament::{TournamentHead, TournamentView},
 };
 use faceoff_service::{
+    app::App,
+    auth::Organiser,
+    extract::{Json as Body, PathParam},
+    problem::Problem,
     services::{
         decisions::checked_reason,
         entrants,
         stages::{check_offered, check_robot},
     },
-    app::App,
-    auth::Organiser,
-    extract::{Json as Body, PathParam},
-    problem::Problem,
     views::{stage, tournament},
 };
 use faceoff_store::Stage;
@@ -252,7 +252,9 @@ fn apply_patch<T: Serialize + DeserializeOwned>(
 ) -> Result<T, Problem> {
     let value = serde_json::to_value(current).map_err(Problem::internal)?;
     let Value::Object(mut all) = value else {
-        return Err(Problem::internal(format_args!("{name} are not a JSON object")));
+        return Err(Problem::internal(format_args!(
+            "{name} are not a JSON object"
+        )));
     };
     for (field, value) in fields.unwrap_or_default() {
         match value {

@@ -10,11 +10,11 @@ use axum::{
 };
 use faceoff_api::{paths, views::submission::SubmissionView};
 use faceoff_service::{
-    services::uploads::{IncomingBundle, upload},
     app::App,
     auth::TeamCaller,
     extract::QueryParams,
     problem::{Problem, ProblemKind},
+    services::uploads::{IncomingBundle, upload},
     views::submission,
 };
 use serde::Deserialize;

@@ -7,11 +7,11 @@ use faceoff_api::{
     views::user::UserView,
 };
 use faceoff_service::{
-    services::users,
     app::App,
     auth::Caller,
     extract::{Json as Body, PathParam},
     problem::{Problem, ProblemKind},
+    services::users,
     views::user,
 };
 use faceoff_types::UserId;

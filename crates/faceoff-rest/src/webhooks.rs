@@ -14,7 +14,7 @@ use faceoff_service::{
     text,
     views::webhook,
 };
-use faceoff_store::{NewWebhook, StoreError, Webhook, WebhookChange, Principal};
+use faceoff_store::{NewWebhook, Principal, StoreError, Webhook, WebhookChange};
 use faceoff_types::WebhookId;
 use serde_json::json;
 

@@ -3,11 +3,11 @@
 use axum::{Json, extract::State, http::StatusCode};
 use faceoff_api::{requests::Reason, views::workers::WorkersView};
 use faceoff_service::{
-    services::workers,
     app::App,
     auth::Organiser,
     extract::{Json as Body, PathParam},
     problem::Problem,
+    services::workers,
     views,
 };
 use faceoff_store::WorkerName;

@@ -9,7 +9,7 @@
 mod instant;
 
 use faceoff_runner::{
-    AgentEnvironment, LiveFeed, LiveFeedSink, GameObserver, GameSpec, POSITION_INTERVAL, run_game,
+    AgentEnvironment, GameObserver, GameSpec, LiveFeed, LiveFeedSink, POSITION_INTERVAL, run_game,
 };
 use faceoff_sandbox::{Isolation, affinity};
 use faceoff_types::{
@@ -90,7 +90,13 @@ fn main() {
             let mut feed = LiveFeed::new(sink, POSITION_INTERVAL);
             run_game(&spec, bundles, envs.each_ref(), out.path(), &mut feed)
         }
-        None => run_game(&spec, bundles, envs.each_ref(), out.path(), &mut NullObserver),
+        None => run_game(
+            &spec,
+            bundles,
+            envs.each_ref(),
+            out.path(),
+            &mut NullObserver,
+        ),
     }
     .unwrap();
     let (wall_s, cpu_s) = (

@@ -16,7 +16,7 @@ pub use error::BundleError;
 pub use faceoff_types::BundleLimits;
 pub use image::Image;
 
-use budget::{Budget, MultiStreamReader, CancellableReader};
+use budget::{Budget, CancellableReader, MultiStreamReader};
 use faceoff_types::{ArchiveFormat, IMAGE_RUNTIME};
 use faceoff_wire::{MANIFEST_MAX_BYTES, Manifest};
 use fs_err::File;
@@ -145,8 +145,9 @@ fn read_into<'a>(
     budget: &'a Budget<'a>,
 ) -> Result<ArchiveFormat, BundleError> {
     let buffered = 64 << 10;
-    let watched =
-        |file: File| BufReader::with_capacity(buffered, CancellableReader::new(file.into_file(), budget));
+    let watched = |file: File| {
+        BufReader::with_capacity(buffered, CancellableReader::new(file.into_file(), budget))
+    };
     let format = format.ok_or_else(|| {
         BundleError::Invalid(
             "the bundle is no archive that is accepted: expected .tar.gz, .tar.zst or .zip, or the .tar of a \

@@ -37,7 +37,11 @@ impl CpuUsage {
 
     /// Records a question at `asked`. Returns the CPU time since the last answer, capped at the maximum that the agent
     /// can have used until `asked`. `read` reads the CPU clock; the call may be later than `asked`.
-    pub fn record_question(&mut self, asked: Instant, read: impl FnOnce() -> Option<f64>) -> Duration {
+    pub fn record_question(
+        &mut self,
+        asked: Instant,
+        read: impl FnOnce() -> Option<f64>,
+    ) -> Duration {
         let gap = asked.saturating_duration_since(self.answered_at);
         self.before_s = self.answered_s;
         let Some(cpus) = self.cpus.filter(|_| gap >= MIN_GAP) else {
@@ -106,7 +110,10 @@ mod tests {
     fn short_gaps_and_unknown_clocks_count_as_zero() {
         let mut cpu = cpu_usage(Some(2.0));
         let soon = cpu.answered_at + Duration::from_micros(50);
-        assert_eq!(cpu.record_question(soon, || panic!("not read")), Duration::ZERO);
+        assert_eq!(
+            cpu.record_question(soon, || panic!("not read")),
+            Duration::ZERO
+        );
         let later = cpu.answered_at + MS(10);
         assert_eq!(cpu.record_question(later, || None), Duration::ZERO);
         assert_eq!(

@@ -6,13 +6,15 @@ use crate::{
     config::AgentEnvironment,
     cpu_usage::CpuUsage,
     fault::{PlatformFault, SessionError},
-    host_interference::{WaitCounters, BASELINE_MAX_AGE, InterferenceMonitor, MAX_EXTENSION, Extension, AnswerWait},
+    host_interference::{
+        AnswerWait, BASELINE_MAX_AGE, Extension, InterferenceMonitor, MAX_EXTENSION, WaitCounters,
+    },
     supervisor::{BusyGuard, KillReason, SupervisedAgent},
     wait_breakdown::WaitBreakdown,
 };
 use faceoff_sandbox::{
-    AgentProcess, AnswerState, Baseline, Layer, ReadLine, Runtime, SpawnError, SpawnSpec, WriteError,
-    affinity,
+    AgentProcess, AnswerState, Baseline, Layer, ReadLine, Runtime, SpawnError, SpawnSpec,
+    WriteError, affinity,
 };
 use faceoff_types::{AgentFaultKind, Phase, TimeLimits};
 use faceoff_wire::{MAX_LINE_BYTES, Message, answer, quote_line};
@@ -153,7 +155,9 @@ impl<'w> Exchange<'w> {
         if phase != Phase::StartUp && self.process.has_pending_output()? {
             return Err(self.early_output_error(phase));
         }
-        let early_cpu_time = self.cpu.record_question(asked, || self.process.cpu_time_s());
+        let early_cpu_time = self
+            .cpu
+            .record_question(asked, || self.process.cpu_time_s());
         match self.process.send_line(&self.line) {
             Ok(()) => Ok(early_cpu_time),
             Err(WriteError::Closed) => Err(self.closed_error()),
@@ -217,7 +221,11 @@ impl<'w> Exchange<'w> {
 
     /// Waits for the answer until `until`, which may have passed, or until its limit has passed. `None` if the answer
     /// is still pending.
-    pub fn poll(&mut self, question: &mut PendingQuestion, until: Instant) -> Result<Option<Answer>, SessionError> {
+    pub fn poll(
+        &mut self,
+        question: &mut PendingQuestion,
+        until: Instant,
+    ) -> Result<Option<Answer>, SessionError> {
         let (phase, limit_s, asked) = (question.phase, question.limit_s, question.wait.asked);
         let latest_end = self.latest_end(asked, TimeLimits::duration(limit_s));
         let _busy = self.supervised.busy(latest_end);
@@ -225,9 +233,14 @@ impl<'w> Exchange<'w> {
         self.prefer_kill_reason(result, phase, limit_s, asked)
     }
 
-    fn await_answer(&mut self, question: &mut PendingQuestion, until: Instant) -> Result<Option<Answer>, SessionError> {
+    fn await_answer(
+        &mut self,
+        question: &mut PendingQuestion,
+        until: Instant,
+    ) -> Result<Option<Answer>, SessionError> {
         if self.evaluator_cpus.is_some() && self.is_quick {
-            self.process.spin_until(until.min(question.wait.asked + SPIN_TIME))?;
+            self.process
+                .spin_until(until.min(question.wait.asked + SPIN_TIME))?;
         }
         loop {
             let stop = until.min(question.wait.wake);
@@ -263,15 +276,23 @@ impl<'w> Exchange<'w> {
     }
 
     /// Waits until [`Self::poll`] has something to do for one of several agents, or until `until`.
-    pub fn wait_for_any(exchanges: &[(&Self, &PendingQuestion)], until: Instant) -> Result<(), PlatformFault> {
+    pub fn wait_for_any(
+        exchanges: &[(&Self, &PendingQuestion)],
+        until: Instant,
+    ) -> Result<(), PlatformFault> {
         let _busy: Vec<BusyGuard> = exchanges
             .iter()
             .map(|(exchange, question)| {
                 let limit = TimeLimits::duration(question.limit_s);
-                exchange.supervised.busy(exchange.latest_end(question.wait.asked, limit))
+                exchange
+                    .supervised
+                    .busy(exchange.latest_end(question.wait.asked, limit))
             })
             .collect();
-        let processes: Vec<&AgentProcess> = exchanges.iter().map(|(exchange, _)| &exchange.process).collect();
+        let processes: Vec<&AgentProcess> = exchanges
+            .iter()
+            .map(|(exchange, _)| &exchange.process)
+            .collect();
         let until = exchanges
             .iter()
             .fold(until, |until, (_, question)| until.min(question.wait.wake));

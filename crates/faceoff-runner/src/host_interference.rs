@@ -1,7 +1,7 @@
 //! Host interference in the time of an answer: as much as the kernel's counters prove, and only for late answers.
 //! Before an answer is late, only a baseline is read, which costs a few microseconds.
 
-use faceoff_sandbox::{CpuReading, Baseline, CpuSamples, CallerCounters};
+use faceoff_sandbox::{Baseline, CallerCounters, CpuReading, CpuSamples};
 use std::{
     sync::Arc,
     time::{Duration, Instant},
@@ -241,8 +241,12 @@ mod tests {
     fn agents_run_time_is_never_host_interference() {
         let asked = Instant::now();
         let wait = AnswerWait::begin(None, asked, asked, MS(1000));
-        let interference =
-            |others, agent| wait.interference(&KernelCounters, counters(asked + MS(10), others, agent, false));
+        let interference = |others, agent| {
+            wait.interference(
+                &KernelCounters,
+                counters(asked + MS(10), others, agent, false),
+            )
+        };
         assert_eq!(interference(4, 1), MS(4));
         assert_eq!(interference(9, 8), MS(2));
         assert_eq!(interference(9, 30), MS(0), "several threads");
@@ -275,8 +279,9 @@ mod tests {
     fn late_wake_on_separate_cpus_is_host_interference() {
         let asked = Instant::now();
         let mut wait = AnswerWait::begin(None, asked, asked, MS(1000));
-        let interference =
-            |wait: &AnswerWait, at, apart| wait.interference(&KernelCounters, counters(asked + MS(at), 0, 1, apart));
+        let interference = |wait: &AnswerWait, at, apart| {
+            wait.interference(&KernelCounters, counters(asked + MS(at), 0, 1, apart))
+        };
         assert_eq!(interference(&wait, 9, true), MS(0));
         assert_eq!(interference(&wait, 11, true), MS(0), "normal lateness");
         assert_eq!(interference(&wait, 60, true), MS(50));
@@ -324,22 +329,31 @@ mod tests {
     fn absence_of_the_evaluator_is_not_charged() {
         let asked = Instant::now();
         let mut wait = AnswerWait::begin(None, asked, asked, MS(1000));
-        let interference =
-            |wait: &AnswerWait, at, ran| wait.interference(&KernelCounters, counters(asked + MS(at), 0, ran, false));
+        let interference = |wait: &AnswerWait, at, ran| {
+            wait.interference(&KernelCounters, counters(asked + MS(at), 0, ran, false))
+        };
         wait.add_absence(MS(500));
         assert_eq!(
             interference(&wait, 510, 1),
             MS(500),
             "its answer may have waited all the time"
         );
-        assert_eq!(interference(&wait, 510, 300), MS(210), "without its run time");
+        assert_eq!(
+            interference(&wait, 510, 300),
+            MS(210),
+            "without its run time"
+        );
         assert_eq!(
             interference(&wait, 400, 1),
             MS(399),
             "at most the whole wait"
         );
         wait.clear_absence();
-        assert_eq!(interference(&wait, 510, 1), MS(0), "no answer was available");
+        assert_eq!(
+            interference(&wait, 510, 1),
+            MS(0),
+            "no answer was available"
+        );
     }
 
     #[test]

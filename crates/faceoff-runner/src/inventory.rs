@@ -50,7 +50,10 @@ fn inspect(env: &AgentEnvironment, runtime: &Runtime) -> Result<RuntimeContent, 
                 .iter()
                 .any(|root| path.starts_with(root))
     };
-    if runtime.interpreter().is_some_and(|python| is_visible(&python)) {
+    if runtime
+        .interpreter()
+        .is_some_and(|python| is_visible(&python))
+    {
         let line = first_line(env, runtime, &["python3", "-c", SCRIPT])?;
         return serde_json::from_str::<Answer>(&line)
             .map(|answer| RuntimeContent::Python(answer.into()))
@@ -86,7 +89,11 @@ impl From<Answer> for PythonInventory {
 }
 
 /// The first line that `command` prints in an empty bundle.
-fn first_line(env: &AgentEnvironment, runtime: &Runtime, command: &[&str]) -> Result<String, String> {
+fn first_line(
+    env: &AgentEnvironment,
+    runtime: &Runtime,
+    command: &[&str],
+) -> Result<String, String> {
     let bundle = empty_bundle().map_err(|error| format!("cannot make a folder: {error}"))?;
     let spec = SpawnSpec {
         bundle_dir: bundle.path().to_owned(),

@@ -22,25 +22,29 @@ mod log;
 mod player;
 mod session;
 mod shard;
-mod validation;
 mod supervisor;
+mod validation;
 mod wait_breakdown;
 mod wire_env;
 
 pub use config::AgentEnvironment;
-pub use faceoff_dataset::{AssembledDataset, CLIPS_FILE, ShardReport, assemble, game::GameArchives};
+pub use faceoff_dataset::{
+    AssembledDataset, CLIPS_FILE, ShardReport, assemble, game::GameArchives,
+};
 pub use faceoff_types::TimeLimits;
 pub use faceoff_wire::game::{GameCalibration, GameSpec};
 pub use faceoff_wire::job::{EvaluationMeta, ShardSpec, ValidationSpec};
 pub use fault::{PlatformFault, SessionError};
 pub use game::{
-    LiveFeed, LiveFeedSink, GameObserver, GameReport, POSITION_INTERVAL, play_game, run_game,
+    GameObserver, GameReport, LiveFeed, LiveFeedSink, POSITION_INTERVAL, play_game, run_game,
     run_game_monitored,
 };
-pub use host_interference::{KernelCounters, InterferenceMonitor};
+pub use host_interference::{InterferenceMonitor, KernelCounters};
 pub use inventory::take_inventory;
 pub use session::Session;
 pub use shard::{Observer, play_shard, run_shard, run_shard_monitored};
-pub use validation::{VALIDATION_STEPS, ValidationFailure, ValidationReport, validate, validate_monitored};
 pub use supervisor::{Supervision, stuck_threads};
+pub use validation::{
+    VALIDATION_STEPS, ValidationFailure, ValidationReport, validate, validate_monitored,
+};
 pub use wait_breakdown::WaitBreakdown;

@@ -8,7 +8,7 @@ use crate::{
     session::Session,
     wait_breakdown::WaitBreakdown,
 };
-use faceoff_episode::{Arena, RunningEpisode, Question, StepSink};
+use faceoff_episode::{Arena, Question, RunningEpisode, StepSink};
 use faceoff_types::{AgentFaultKind, EpisodeOutcome, Phase, Task};
 use std::time::Instant;
 
@@ -201,14 +201,16 @@ impl<'a> Player<'a> {
         };
         let interpolation = session.as_ref().ok().map(Session::interpolation);
         let mut running =
-            RunningEpisode::begin(&self.arena, self.task, episode, interpolation, sink).with_max_steps(max_steps);
+            RunningEpisode::begin(&self.arena, self.task, episode, interpolation, sink)
+                .with_max_steps(max_steps);
         let mut session = match session {
             Ok(session) => session,
             Err(StartUpFault { fault, stderr }) => {
                 return Ok(self.fail(running, Phase::StartUp, fault, &stderr));
             }
         };
-        let (phase, error) = match self.run_episode(&mut session, episode, &mut running, cancelled) {
+        let (phase, error) = match self.run_episode(&mut session, episode, &mut running, cancelled)
+        {
             Ok(outcome) => {
                 self.session = Some(session);
                 return Ok(Try {
@@ -259,7 +261,8 @@ impl<'a> Player<'a> {
     }
 
     fn start(&self) -> Result<Result<Session<'a>, StartUpFault>, PlatformFault> {
-        let started = Session::start_monitored(self.bundle, self.env, self.task.into(), self.monitor);
+        let started =
+            Session::start_monitored(self.bundle, self.env, self.task.into(), self.monitor);
         match started {
             Ok(session) => Ok(Ok(session)),
             Err((error, stderr)) => {
@@ -294,10 +297,12 @@ impl<'a> Player<'a> {
         let timing = session.reset(episode);
         self.resets.spend(match &timing {
             Ok(timing) => timing.computation_time_s,
-            Err(SessionError::TimedOut { wait, .. } | SessionError::HostInterference { wait, .. }) => {
-                wait.charged().as_secs_f64()
+            Err(
+                SessionError::TimedOut { wait, .. } | SessionError::HostInterference { wait, .. },
+            ) => wait.charged().as_secs_f64(),
+            Err(SessionError::Agent { .. } | SessionError::Platform(_)) => {
+                asked.elapsed().as_secs_f64()
             }
-            Err(SessionError::Agent { .. } | SessionError::Platform(_)) => asked.elapsed().as_secs_f64(),
         });
         timing?;
         Ok(self.resets.check()?)

@@ -3,7 +3,7 @@ use crate::{
     config::AgentEnvironment,
     exchange::{Answer, Exchange, PendingQuestion},
     fault::{PlatformFault, SessionError},
-    host_interference::{KernelCounters, InterferenceMonitor},
+    host_interference::{InterferenceMonitor, KernelCounters},
     wire_env::wire_env,
 };
 use faceoff_episode::AnswerTiming;
@@ -207,7 +207,11 @@ impl<'w> Session<'w> {
         }
     }
 
-    fn parse_answer(&mut self, question: Question, answer: &Answer) -> Result<AnswerTiming, SessionError> {
+    fn parse_answer(
+        &mut self,
+        question: Question,
+        answer: &Answer,
+    ) -> Result<AnswerTiming, SessionError> {
         match question {
             Question::Reset { episode } => answer::parse_reset_ready(&answer.bytes, episode),
             Question::Step { step } => {
@@ -268,10 +272,7 @@ fn hello(
                 got: format!("ready with interpolation {}", ready.interpolation),
             }))
         }
-        _ => Ok((
-            ready.interpolation,
-            answer.wait.charged().as_secs_f64(),
-        )),
+        _ => Ok((ready.interpolation, answer.wait.charged().as_secs_f64())),
     }
 }
 

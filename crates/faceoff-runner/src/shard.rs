@@ -3,7 +3,7 @@ use crate::{
     calibration::Calibration,
     config::AgentEnvironment,
     fault::PlatformFault,
-    host_interference::{KernelCounters, InterferenceMonitor},
+    host_interference::{InterferenceMonitor, KernelCounters},
     player::{OnHostInterference, Player},
 };
 use faceoff_dataset::{Recorder, ShardFolder, ShardReport};

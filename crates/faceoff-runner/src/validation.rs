@@ -2,7 +2,7 @@ use crate::{
     bundle::Bundle,
     config::AgentEnvironment,
     fault::PlatformFault,
-    host_interference::{KernelCounters, InterferenceMonitor},
+    host_interference::{InterferenceMonitor, KernelCounters},
     log::Log,
     player::{OnHostInterference, Player},
     wait_breakdown::WaitBreakdown,
@@ -11,7 +11,7 @@ use faceoff_episode::{AnswerTiming, Arena, EpisodeStart, RecordError, StepRow, S
 use faceoff_sandbox::affinity::AffinityGuard;
 use faceoff_scoring::computation_time_penalty;
 use faceoff_sim::EPISODE_STEPS;
-use faceoff_types::{AgentFault, EpisodeOutcome, Profile, ValidationTiming, Task};
+use faceoff_types::{AgentFault, EpisodeOutcome, Profile, Task, ValidationTiming};
 use faceoff_wire::job::ValidationSpec;
 use std::fmt;
 
@@ -53,10 +53,7 @@ pub enum ValidationFailure {
 impl fmt::Display for ValidationFailure {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Fault {
-                fault,
-                wait: None,
-            } => fault.fmt(f),
+            Self::Fault { fault, wait: None } => fault.fmt(f),
             Self::Fault {
                 fault,
                 wait: Some(wait),

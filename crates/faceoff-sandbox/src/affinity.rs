@@ -17,9 +17,9 @@ pub fn allowed() -> io::Result<Vec<usize>> {
 
 /// The CPUs that this process may use (those of its main thread), whatever the calling thread is pinned to.
 pub(crate) fn process_cpus() -> io::Result<Vec<usize>> {
-    Ok(cpu_numbers(&sched_getaffinity(
-        Some(rustix::process::getpid()),
-    )?))
+    Ok(cpu_numbers(&sched_getaffinity(Some(
+        rustix::process::getpid(),
+    ))?))
 }
 
 fn cpu_numbers(set: &CpuSet) -> Vec<usize> {

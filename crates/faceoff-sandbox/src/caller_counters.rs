@@ -5,7 +5,7 @@
 //! subtracted.
 
 use crate::{
-    cpu_counters::{Ticks, ticks, parse_ticks},
+    cpu_counters::{Ticks, parse_ticks, ticks},
     sched_stat::SchedStat,
 };
 use std::{cell::RefCell, fs::File, time::Duration};
@@ -94,8 +94,14 @@ mod tests {
             log_reader_ran: Duration::from_millis(ran_ms),
             ticks: Vec::new(),
         };
-        assert_eq!(at(50, 0).run_delay_since(&at(10, 0)), Duration::from_millis(40));
-        assert_eq!(at(50, 35).run_delay_since(&at(10, 5)), Duration::from_millis(10));
+        assert_eq!(
+            at(50, 0).run_delay_since(&at(10, 0)),
+            Duration::from_millis(40)
+        );
+        assert_eq!(
+            at(50, 35).run_delay_since(&at(10, 5)),
+            Duration::from_millis(10)
+        );
         assert_eq!(at(50, 95).run_delay_since(&at(10, 5)), Duration::ZERO);
     }
 
@@ -113,7 +119,10 @@ mod tests {
                 .collect(),
         };
         let before = stolen(&[1, 5]);
-        assert_eq!(stolen(&[4, 7]).run_delay_since(&before), Duration::from_millis(20));
+        assert_eq!(
+            stolen(&[4, 7]).run_delay_since(&before),
+            Duration::from_millis(20)
+        );
         assert_eq!(stolen(&[4, 5]).run_delay_since(&before), Duration::ZERO);
     }
 }

@@ -12,7 +12,7 @@
 //! Neither the agent nor a child of it can reopen an end by path through `/proc/*/fd`. The writer's buffer
 //! determines the space for a question, so no agent can make it smaller.
 
-use crate::{SandboxError, error::IoContext, line_socket::LineSocket, fd_passing};
+use crate::{SandboxError, error::IoContext, fd_passing, line_socket::LineSocket};
 use rustix::{
     fs::fstat,
     net::{

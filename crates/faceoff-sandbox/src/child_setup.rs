@@ -136,13 +136,16 @@ impl ChildSetup {
             let _ = file.and_then(|file| write(&file, b"800"));
         }
         if let Some(mounts) = &mut self.mounts {
-            mounts.mount_all().map_err(|error| (Step::MakeMounts, error))?;
+            mounts
+                .mount_all()
+                .map_err(|error| (Step::MakeMounts, error))?;
         }
         for &(resource, limit) in &self.rlimits {
             process::setrlimit(resource, limit).map_err(|error| (Step::SetRlimits, error))?;
         }
         if let Some(user) = self.user {
-            user.switch_to().map_err(|error| (Step::BecomeUser, error))?;
+            user.switch_to()
+                .map_err(|error| (Step::BecomeUser, error))?;
         }
         for fd in &self.inherit {
             fcntl_setfd(fd, FdFlags::empty()).map_err(|error| (Step::Inherit, error))?;

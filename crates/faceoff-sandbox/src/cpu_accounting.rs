@@ -11,10 +11,10 @@ mod reading;
 
 use crate::{
     CallerCounters, cpu_clock,
-    cpu_counters::{sum_of_cpus, read_text, parse_throttled, parse_ticks, parse_usage},
+    cpu_counters::{parse_throttled, parse_ticks, parse_usage, read_text, sum_of_cpus},
     thread_waits::{AnswerState, TrackedThreads, WaitLedger},
 };
-use estimator::{InterferenceEstimator, upper_bound, stolen_time};
+use estimator::{InterferenceEstimator, stolen_time, upper_bound};
 pub use reading::CpuReading;
 use std::{
     fs::{self, File},
@@ -88,7 +88,8 @@ impl CpuSamples {
         if let (Some(now), Some(baseline)) = (&first.waits, baseline)
             && let Some(earlier) = &baseline.waits
         {
-            let stolen = stolen_time(baseline, &first).min(first.at.saturating_duration_since(asked));
+            let stolen =
+                stolen_time(baseline, &first).min(first.at.saturating_duration_since(asked));
             ledger.begin(earlier, now, stolen);
         }
         Self {
@@ -158,7 +159,9 @@ impl CpuAccounting {
         // between the baseline and the question did not delay the answer. Both are subtracted.
         let since_baseline = baseline.map(|baseline| {
             let age = asked.saturating_duration_since(baseline.at);
-            let ran = estimator.others_time(baseline, &now).saturating_sub(LAG + age);
+            let ran = estimator
+                .others_time(baseline, &now)
+                .saturating_sub(LAG + age);
             ran.max(estimator.run_delay(baseline, &now).saturating_sub(age))
         });
         // The baseline is the earlier reading, so it covers the longer span.
@@ -167,7 +170,10 @@ impl CpuAccounting {
             .map(|from| upper_bound(from, &now, estimator.precise))
             .unwrap_or_default();
         let observed_wait = match &now.waits {
-            Some(now) => estimator.ledger.longest_observed_wait(now, answer).min(max_interference),
+            Some(now) => estimator
+                .ledger
+                .longest_observed_wait(now, answer)
+                .min(max_interference),
             None => Duration::ZERO,
         };
         Some(HostInterference {

@@ -81,7 +81,9 @@ impl ExitReport<'_> {
             return self.classify_signal(code - 128);
         }
         match &self.limit_hit {
-            Some(LimitHit::Memory { peak_bytes }) if code != 0 => self.memory_limit_exceeded(*peak_bytes),
+            Some(LimitHit::Memory { peak_bytes }) if code != 0 => {
+                self.memory_limit_exceeded(*peak_bytes)
+            }
             Some(LimitHit::Pids { refused }) if code != 0 => {
                 ExitCause::Agent(AgentFaultKind::LimitExceeded {
                     limit: "processes".into(),

@@ -35,15 +35,10 @@ pub struct MemoryImage {
 pub enum MemoryImageError {
     /// The files exceed the allowed size.
     #[error("the runtimes' files are larger than {limit_bytes} bytes")]
-    TooLarge {
-        limit_bytes: u64,
-    },
+    TooLarge { limit_bytes: u64 },
     /// The host has too little free memory.
     #[error("the runtimes' files have {bytes} bytes, and {MEMORY} has {free_bytes} bytes free")]
-    NotEnoughMemory {
-        bytes: u64,
-        free_bytes: u64,
-    },
+    NotEnoughMemory { bytes: u64, free_bytes: u64 },
     /// The files could not be read or written.
     #[error(transparent)]
     Failed(#[from] SandboxError),
@@ -81,7 +76,10 @@ impl MemoryImage {
     ///
     /// # Errors
     /// [`MemoryImageError`], as [`Self::make`] would say.
-    pub fn size(runtimes: &BTreeMap<String, Runtime>, limit_bytes: u64) -> Result<u64, MemoryImageError> {
+    pub fn size(
+        runtimes: &BTreeMap<String, Runtime>,
+        limit_bytes: u64,
+    ) -> Result<u64, MemoryImageError> {
         let mut bytes = 0;
         for path in paths(runtimes) {
             add_size(&path, limit_bytes, &mut bytes)
@@ -191,7 +189,10 @@ mod tests {
             ("two".to_owned(), runtime(&["lib", "lib/inner", "program"])),
         ]);
         let refused = MemoryImage::make(&mut runtimes, 8000).unwrap_err();
-        assert!(matches!(refused, MemoryImageError::TooLarge { limit_bytes: 8000 }));
+        assert!(matches!(
+            refused,
+            MemoryImageError::TooLarge { limit_bytes: 8000 }
+        ));
         assert_eq!(runtimes["one"].files, RuntimeFiles::Host);
 
         let image = MemoryImage::make(&mut runtimes, 1 << 20).unwrap();

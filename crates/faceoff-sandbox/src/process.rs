@@ -1,19 +1,19 @@
 use crate::{
-    AnswerState, CpuReading, Baseline, Isolation, Killer, Limits, CpuSamples, CallerCounters, ReadLine,
-    SandboxError, SpawnError, SpawnSpec, HostInterference, WriteError,
+    AnswerState, Baseline, CallerCounters, CpuReading, CpuSamples, HostInterference, Isolation,
+    Killer, Limits, ReadLine, SandboxError, SpawnError, SpawnSpec, WriteError,
     cgroup::AgentCgroup,
     command_check::check_command,
-    thread_waits::TrackedThreads,
-    exit_cause::{ExitCause, ExitReport},
     error::IoContext,
-    line_socket::{Closed, LineSocket, wait_for_any},
-    poll_interval::PollInterval,
+    exit_cause::{ExitCause, ExitReport},
     inherited_descriptors,
     launch::{Launch, LaunchedAgent},
+    line_socket::{Closed, LineSocket, wait_for_any},
+    poll_interval::PollInterval,
     process_tree::ProcessTree,
     status_pipe::StatusPipe,
     stderr_tail::StderrTail,
     sweep,
+    thread_waits::TrackedThreads,
 };
 use faceoff_types::AgentFaultKind;
 use rustix::event::PollFd;
@@ -289,7 +289,8 @@ impl AgentProcess {
         Baseline {
             at: Instant::now(),
             cpus: accounting.and_then(|accounting| accounting.read_baseline(&self.threads, &stat)),
-            caller: caller_cpus.map(|cpus| CallerCounters::read(&stat, cpus, self.stderr.reader_run_time())),
+            caller: caller_cpus
+                .map(|cpus| CallerCounters::read(&stat, cpus, self.stderr.reader_run_time())),
         }
     }
 
@@ -385,7 +386,9 @@ impl AgentProcess {
             let status = match self.tree.wait(Instant::now() + wait) {
                 Ok(status) => status?,
                 Err(error) => {
-                    self.end = Some(ExitCause::Platform(format!("cannot wait for the agent: {error}")));
+                    self.end = Some(ExitCause::Platform(format!(
+                        "cannot wait for the agent: {error}"
+                    )));
                     return self.end.as_ref();
                 }
             };

@@ -124,7 +124,10 @@ impl ProcessTree {
         if let Some(init) = &self.sandbox_init {
             let _ = pidfd_send_signal(init, Signal::KILL);
             self.thaw();
-            if matches!(self.wait(Instant::now() + BUBBLEWRAP_EXIT_TIMEOUT), Ok(Some(_))) {
+            if matches!(
+                self.wait(Instant::now() + BUBBLEWRAP_EXIT_TIMEOUT),
+                Ok(Some(_))
+            ) {
                 return;
             }
         }

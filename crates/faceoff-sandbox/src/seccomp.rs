@@ -122,8 +122,7 @@ const CACHESTAT: i64 = 451;
 /// Advice about files: succeeds without effect. The real calls would load a shared file into memory, or drop it.
 const IGNORED: &[i64] = &[libc::SYS_fadvise64, libc::SYS_readahead];
 /// The same for a mapping.
-const IGNORED_ADVICE: [libc::c_int; 3] =
-    [libc::MADV_WILLNEED, libc::MADV_COLD, libc::MADV_PAGEOUT];
+const IGNORED_ADVICE: [libc::c_int; 3] = [libc::MADV_WILLNEED, libc::MADV_COLD, libc::MADV_PAGEOUT];
 
 /// Requests of `fcntl` that are answered as if the kernel did not know them (`EINVAL`).
 ///

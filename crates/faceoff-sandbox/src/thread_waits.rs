@@ -113,7 +113,8 @@ impl WaitLedger {
         for (id, thread) in &now.threads {
             let account = self.0.entry(*id).or_default();
             let earlier = baseline.threads.get(id);
-            if thread.is_runnable && earlier.is_some_and(|earlier| earlier.slices == thread.slices) {
+            if thread.is_runnable && earlier.is_some_and(|earlier| earlier.slices == thread.slices)
+            {
                 account.observed_wait += stolen;
                 account.slices = thread.slices;
             }
@@ -241,7 +242,10 @@ impl TrackedThreads {
         self.read(TrackedThread::sample)
     }
 
-    fn read(&self, read_thread: impl Fn(&TrackedThread) -> Option<ThreadState>) -> Option<ThreadWaits> {
+    fn read(
+        &self,
+        read_thread: impl Fn(&TrackedThread) -> Option<ThreadState>,
+    ) -> Option<ThreadWaits> {
         let each = self.threads.iter();
         let threads: BTreeMap<u32, ThreadState> = each
             .filter_map(|thread| Some((thread.id, read_thread(thread)?)))
@@ -358,7 +362,11 @@ mod tests {
         }
         let waiting: &[_] = &[(2, "70 0 1", "R", "0")];
         assert_eq!(longest(waiting, Pending), WALL, "it never ran");
-        assert_eq!(longest(waiting, Received), NS(0), "the answer came without it");
+        assert_eq!(
+            longest(waiting, Received),
+            NS(0),
+            "the answer came without it"
+        );
     }
 
     #[test]
@@ -415,12 +423,18 @@ mod tests {
             let mut ledger = WaitLedger::default();
             let now = waits(threads);
             ledger.begin(&baseline, &now, NS(40));
-            ledger.longest_observed_wait(&now, AnswerState::Pending).as_nanos()
+            ledger
+                .longest_observed_wait(&now, AnswerState::Pending)
+                .as_nanos()
         };
         assert_eq!(now(&[(1, "500 100 3", "R", "0")]), 40);
         assert_eq!(now(&[(1, "500 100 3", "S", "0")]), 0, "it sleeps");
         assert_eq!(now(&[(1, "501 100 4", "R", "0")]), 0, "it ran");
-        assert_eq!(now(&[(1, "500 100 3", "R", "5")]), 0, "its policy is SCHED_IDLE");
+        assert_eq!(
+            now(&[(1, "500 100 3", "R", "5")]),
+            0,
+            "its policy is SCHED_IDLE"
+        );
     }
 
     #[test]

@@ -4,7 +4,7 @@ use crate::{
     paired::{PairedTally, SIGNIFICANCE, overall_p_value},
     summary::EpisodeSummary,
 };
-use faceoff_types::{deprecated_names, Profile, Seed, Task, TaskWeights, Variation};
+use faceoff_types::{Profile, Seed, Task, TaskWeights, Variation, deprecated_names};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 

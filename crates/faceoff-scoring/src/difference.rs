@@ -35,11 +35,7 @@ impl Estimate {
 
     /// `a − b` of two rates whose episodes correlate with `phi`; 0 for independent ones.
     fn difference(a: Self, b: Self, phi: f64) -> Self {
-        let margin = |a: f64, b: f64| {
-            (a * a - 2.0 * phi * a * b + b * b)
-                .max(0.0)
-                .sqrt()
-        };
+        let margin = |a: f64, b: f64| (a * a - 2.0 * phi * a * b + b * b).max(0.0).sqrt();
         let value = a.value - b.value;
         Self {
             value,
@@ -151,9 +147,8 @@ mod tests {
         ] {
             let truth = cells[1] - cells[2];
             // The cells in sequence, each conditional on the earlier ones.
-            let probability = |p: f64, n: u32, k: u32| {
-                Binomial::new(p, u64::from(n)).unwrap().pmf(u64::from(k))
-            };
+            let probability =
+                |p: f64, n: u32, k: u32| Binomial::new(p, u64::from(n)).unwrap().pmf(u64::from(k));
             let mut covered = 0.0;
             for both in 0..=N {
                 for only_a in 0..=N - both {

@@ -21,6 +21,7 @@ mod mean;
 mod paired;
 mod qualifying;
 mod rank_groups;
+mod solved_episodes;
 mod step_times;
 mod successes;
 mod summary;
@@ -29,11 +30,12 @@ mod tier;
 mod tier_change;
 pub mod tournament;
 mod unique_map;
-mod solved_episodes;
 
 pub use ablation::{ProfileEffect, ablation};
 pub use board::{BoardEntry, RankedEntry, overall_board, task_board};
-pub use comparison::{Comparison, NotComparable, OverallComparison, ComparedEvaluation, TaskComparison};
+pub use comparison::{
+    ComparedEvaluation, Comparison, NotComparable, OverallComparison, TaskComparison,
+};
 pub use episode::{
     COMPUTATION_TIME_LIMITS_S, COMPUTATION_TIME_MAX_POINTS, EE_POINTS, JOINT_POS_POINTS,
     JOINT_VEL_POINTS, LINK_POINTS, MAX_EPISODE_PENALTY, computation_time_penalty, episode_penalty,
@@ -46,6 +48,7 @@ pub use qualifying::{
     InvalidTaskScore, QUALIFYING_EPISODES, QualifyingRow, QualifyingScores, TaskRow, TaskScore,
 };
 pub use rank_groups::rank_groups;
+pub use solved_episodes::SolvedEpisodes;
 pub use step_times::StepTimes;
 pub use successes::Successes;
 pub use summary::{EpisodeSummary, TaskSummary};
@@ -54,4 +57,3 @@ pub use tier::{
     DEPLOYABLE_POINTS_PER_EPISODE, IMPROVABLE_POINTS_PER_EPISODE, tier_of, tier_with_bounds,
 };
 pub use tier_change::TIER_CHANGE_RESAMPLES;
-pub use solved_episodes::SolvedEpisodes;

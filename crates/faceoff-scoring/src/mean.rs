@@ -46,7 +46,8 @@ pub fn mean_result(
 
 fn mean_task(days: &[&TaskResult], bounds: &TierBounds) -> TaskResult {
     let sum = |value: fn(&TaskResult) -> u32| -> u32 {
-        days.iter().fold(0, |sum, day| sum.saturating_add(value(day)))
+        days.iter()
+            .fold(0, |sum, day| sum.saturating_add(value(day)))
     };
     let (episodes, successes) = (sum(|day| day.episodes), sum(|day| day.successes));
     // Points are multiples of one half: the sum is exact in any order.
@@ -108,10 +109,7 @@ pub fn joined_summary(summaries: &[&EpisodeSummary]) -> EpisodeSummary {
     }
     let tasks = tasks.into_iter().map(|(task, days)| {
         let summary = TaskSummary {
-            successes: days
-                .iter()
-                .flat_map(|day| day.successes.iter())
-                .collect(),
+            successes: days.iter().flat_map(|day| day.successes.iter()).collect(),
             penalty_points: days.iter().map(|day| day.penalty_points).sum(),
             tier_change: 0.0,
         };

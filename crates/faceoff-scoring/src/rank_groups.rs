@@ -20,9 +20,7 @@ pub fn rank_groups<K, E>(
     let mut leader: Option<&RankedEntry<K>> = None;
     for row in board {
         let joins = match leader {
-            Some(leader) if leader.tier == row.tier => {
-                !differs(&leader.entry.key, &row.entry.key)?
-            }
+            Some(leader) if leader.tier == row.tier => !differs(&leader.entry.key, &row.entry.key)?,
             _ => false,
         };
         if !joins {

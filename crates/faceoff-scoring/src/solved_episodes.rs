@@ -1,4 +1,4 @@
-use crate::{NotComparable, ComparedEvaluation};
+use crate::{ComparedEvaluation, NotComparable};
 use faceoff_types::Task;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -22,17 +22,17 @@ impl ComparedEvaluation<'_> {
     ///
     /// # Errors
     /// If the episodes are not the same: the field that differs.
-    pub fn solved_episodes(&self, other: &Self) -> Result<BTreeMap<Task, SolvedEpisodes>, NotComparable> {
+    pub fn solved_episodes(
+        &self,
+        other: &Self,
+    ) -> Result<BTreeMap<Task, SolvedEpisodes>, NotComparable> {
         // Checks that the episodes are the same.
         self.compare(other)?;
         let sides = self.summary.tasks.iter().zip(other.summary.tasks.values());
         Ok(sides
             .map(|((task, a), b)| {
                 let mut lists = SolvedEpisodes::default();
-                let solved = a
-                    .successes
-                    .iter()
-                    .zip(b.successes.iter());
+                let solved = a.successes.iter().zip(b.successes.iter());
                 for (episode, solved) in (0..).zip(solved) {
                     let list = match solved {
                         (true, true) => &mut lists.both,

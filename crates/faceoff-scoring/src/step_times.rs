@@ -86,7 +86,11 @@ mod tests {
         let hundred: Vec<f64> = (1..=100).rev().map(f64::from).collect();
         let summary_of_hundred = summary(&hundred);
         assert_eq!(
-            (summary_of_hundred.mean, summary_of_hundred.p99, summary_of_hundred.max),
+            (
+                summary_of_hundred.mean,
+                summary_of_hundred.p99,
+                summary_of_hundred.max
+            ),
             (50.5, 99.0, 100.0)
         );
         assert_eq!(summary(&[0.5]).p99, 0.5);

@@ -42,7 +42,10 @@ impl EpisodeSummary {
     ///
     /// # Errors
     /// If the episodes of a task are not 0, 1, … n − 1, each once.
-    pub fn from_outcomes(outcomes: &[EpisodeOutcome], bounds: &TierBounds) -> Result<Self, PairingError> {
+    pub fn from_outcomes(
+        outcomes: &[EpisodeOutcome],
+        bounds: &TierBounds,
+    ) -> Result<Self, PairingError> {
         let mut by_task = BTreeMap::<Task, Vec<&EpisodeOutcome>>::new();
         for outcome in outcomes {
             by_task.entry(outcome.task).or_default().push(outcome);

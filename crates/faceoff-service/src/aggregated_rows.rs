@@ -4,7 +4,7 @@
 use crate::problem::Problem;
 use faceoff_scoring::mean_result;
 use faceoff_store::{BoardRecord, Store};
-use faceoff_types::{EvaluationId, RunId, StageId, CountingResult, Task};
+use faceoff_types::{CountingResult, EvaluationId, RunId, StageId, Task};
 use jiff::{Timestamp, civil::Date};
 use std::{
     collections::HashMap,

@@ -146,7 +146,9 @@ pub fn cache_key(request: &Request, store: &Store, second: i64) -> Option<Answer
     let headers = request.headers();
     let is_public = request.method() == Method::GET
         && is_public_path(request.uri().path())
-        && !PERSONAL_HEADERS.iter().any(|name| headers.contains_key(name));
+        && !PERSONAL_HEADERS
+            .iter()
+            .any(|name| headers.contains_key(name));
     let value = |name| headers.get(name).map(|value| value.as_bytes().to_vec());
     if !is_public {
         return None;

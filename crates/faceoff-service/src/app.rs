@@ -1,9 +1,9 @@
 //! The state that all handlers share.
 
 use crate::{
-    config::HttpConfig, tournament_cache::TournamentCache, analysis_cache::AnalysisCache, answer_cache::AnswerCache,
-    passwords::Passwords, problem::Problem, rate_limits::RequestLimiter, aggregated_rows::RowCache, summaries::Summaries,
-    upload_slots::UploadSlots,
+    aggregated_rows::RowCache, analysis_cache::AnalysisCache, answer_cache::AnswerCache,
+    config::HttpConfig, passwords::Passwords, problem::Problem, rate_limits::RequestLimiter,
+    summaries::Summaries, tournament_cache::TournamentCache, upload_slots::UploadSlots,
 };
 use faceoff_api::views::champion_shares::ChampionSharesView;
 use faceoff_notify::Feed;

@@ -4,14 +4,16 @@ use crate::{
     app::App,
     boxed,
     problem::{Problem, ProblemKind},
-    session, request_log,
+    request_log, session,
 };
 use axum::{
     extract::FromRequestParts,
     http::{header, request::Parts},
 };
 use faceoff_api::token::hash_token;
-use faceoff_store::{Actor, VerifiedToken, User, TokenRejection, StoreError, Team, Token, TokenKind, Principal};
+use faceoff_store::{
+    Actor, Principal, StoreError, Team, Token, TokenKind, TokenRejection, User, VerifiedToken,
+};
 use faceoff_types::TeamId;
 use jiff::Timestamp;
 use std::sync::Arc;

@@ -1,6 +1,9 @@
 //! Configuration of the web server.
 
-use crate::{link_key::LinkKey, agent_resources::AgentResources, transfer_rate::MinTransferRate, rate_limits::RateLimits};
+use crate::{
+    agent_resources::AgentResources, link_key::LinkKey, rate_limits::RateLimits,
+    transfer_rate::MinTransferRate,
+};
 use faceoff_metrics::{Metrics, Process};
 use faceoff_notify::WebhookRules;
 use faceoff_store::UploadQuota;

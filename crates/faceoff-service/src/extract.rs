@@ -75,7 +75,9 @@ fn too_large(rejection: &BytesRejection) -> Problem {
     if rejection.status() == StatusCode::PAYLOAD_TOO_LARGE {
         Problem::new(
             ProblemKind::TooLarge,
-            format!("expected at most {MAX_JSON_BYTES} bytes of JSON, got more; send a smaller body"),
+            format!(
+                "expected at most {MAX_JSON_BYTES} bytes of JSON, got more; send a smaller body"
+            ),
         )
         .with("limit_bytes", MAX_JSON_BYTES)
     } else {

@@ -4,37 +4,37 @@
 //! This crate unpacks no bundle, runs no agent and computes no score; workers and `faceoff-scoring` do. It reads no clock
 //! and no environment that is not passed in, and defines no routes.
 
-pub mod services;
+pub mod agent_resources;
+mod aggregated_rows;
+mod analysis_cache;
+pub mod answer_cache;
 pub mod app;
 pub mod archive_contents;
 pub mod auth;
 pub mod conditions;
 pub mod config;
 pub mod csv;
-pub mod shutdown;
 pub mod episode_path;
 pub mod extract;
-mod tournament_cache;
-mod analysis_cache;
-pub mod answer_cache;
+pub mod free_space;
 pub mod link_key;
 pub mod network;
-pub mod agent_resources;
-pub mod transfer_rate;
 pub mod passwords;
 pub mod problem;
 pub mod rate_limits;
 pub mod release;
-pub mod free_space;
+pub mod request_log;
+pub mod services;
 pub mod session;
-mod aggregated_rows;
+pub mod shutdown;
 mod summaries;
 pub mod text;
 pub mod timeouts;
+mod tournament_cache;
+pub mod transfer_rate;
 mod upload_slots;
 pub mod viewer;
 pub mod views;
-pub mod request_log;
 
 /// Boxes the future of an `async fn` that other crates await. Without it each of these crates would compile the body.
 pub(crate) use async_recursion::async_recursion as boxed;

@@ -19,7 +19,10 @@ pub async fn check_released(app: &AppState, evaluation: &Evaluation) -> Result<(
     let day = evaluation.stage_day.date;
     let day_evaluations = app.store.evaluations_of_day(evaluation.stage_day).await?;
     let is_open = |state: &EvaluationState| !state.is_over();
-    let under_way = day_evaluations.iter().filter(|other| is_open(&other.state)).count();
+    let under_way = day_evaluations
+        .iter()
+        .filter(|other| is_open(&other.state))
+        .count();
     Err(Problem::new(
         ProblemKind::NotYet,
         format!(

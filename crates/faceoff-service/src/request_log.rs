@@ -55,7 +55,11 @@ impl Kind {
 
 /// Handles a request in a span with its id and, once it is authenticated, its actor.
 #[boxed]
-pub async fn log_request(State(app): State<Arc<AppState>>, request: Request, next: Next) -> Response {
+pub async fn log_request(
+    State(app): State<Arc<AppState>>,
+    request: Request,
+    next: Next,
+) -> Response {
     let began = Instant::now();
     let (method, path) = (request.method().clone(), request.uri().path());
     let kind = Kind::new(&method, path);

@@ -87,7 +87,10 @@ mod tests {
     fn session_is_found_among_other_cookies() {
         let both = headers(&[("cookie", "a=b; faceoff_session=x; c=d")]);
         assert_eq!(session_cookie(&both), Some("x"));
-        assert_eq!(session_cookie(&headers(&[("cookie", "faceoff_session=")])), None);
+        assert_eq!(
+            session_cookie(&headers(&[("cookie", "faceoff_session=")])),
+            None
+        );
         assert_eq!(
             session_cookie(&headers(&[("cookie", "other_faceoff_session=x")])),
             None

@@ -73,10 +73,11 @@ impl Summaries {
         let outcomes = self.store.outcomes(run).await?;
         let bounds = self.store.run_variation(run).await?.tier_bounds;
         // Takes some ten milliseconds, so it runs off the threads that handle requests.
-        let summary = tokio::task::spawn_blocking(move || EpisodeSummary::from_outcomes(&outcomes, &bounds))
-            .await
-            .map_err(Problem::internal)?
-            .map_err(|error| Problem::internal(format_args!("run {run}: {error}")))?;
+        let summary =
+            tokio::task::spawn_blocking(move || EpisodeSummary::from_outcomes(&outcomes, &bounds))
+                .await
+                .map_err(Problem::internal)?
+                .map_err(|error| Problem::internal(format_args!("run {run}: {error}")))?;
         let json = serde_json::to_string(&summary).map_err(Problem::internal)?;
         let stored =
             self.store

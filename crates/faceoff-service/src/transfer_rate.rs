@@ -86,7 +86,10 @@ mod tests {
         );
         assert_eq!(seconds_until_disconnect(1001, 1), None);
         assert_eq!(seconds_until_disconnect(21_000, 20), None, "in bursts");
-        assert!(seconds_until_disconnect(1 << 30, 31).is_some(), "a pause beyond the grace");
+        assert!(
+            seconds_until_disconnect(1 << 30, 31).is_some(),
+            "a pause beyond the grace"
+        );
     }
 
     #[test]

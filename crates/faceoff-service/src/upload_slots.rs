@@ -44,9 +44,7 @@ impl UploadSlots {
 
     /// A panic cannot leave a count half-written.
     fn running(&self) -> MutexGuard<'_, HashMap<TeamId, usize>> {
-        self.running
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner)
+        self.running.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 

@@ -2,7 +2,7 @@
 
 use crate::{
     app::App,
-    auth::{OptionalCaller, Caller},
+    auth::{Caller, OptionalCaller},
     problem::{Problem, ProblemKind},
 };
 use axum::{extract::FromRequestParts, http::request::Parts};

@@ -247,7 +247,11 @@ fn draw_paths(file: &Path, replays: &[Replay]) -> DrawResult {
     })
 }
 
-fn picture(file: &Path, size: (u32, u32), draw: impl FnOnce(&Area<'_>) -> DrawResult) -> DrawResult {
+fn picture(
+    file: &Path,
+    size: (u32, u32),
+    draw: impl FnOnce(&Area<'_>) -> DrawResult,
+) -> DrawResult {
     let root = SVGBackend::new(file, size).into_drawing_area();
     root.fill(&WHITE)?;
     draw(&root)?;

@@ -8,8 +8,8 @@ use crate::{
     channel::observation::OBSERVATION_WITH_OPPONENT_LEN,
     dynamics::path::LanePath,
     episode::{Episode, StepOutcome},
-    robot::plant::Plant,
     episode_step::step_episodes_on,
+    robot::plant::Plant,
 };
 use faceoff_types::{Factors, Interpolation, PerturbationSettings, Seed, Task};
 use rayon::prelude::*;

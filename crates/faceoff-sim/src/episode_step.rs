@@ -23,7 +23,7 @@ pub fn step_episodes(
     step_episodes_on(LanePath::fastest(), episodes, actions, outcomes);
 }
 
-/// As [`step_together`], with a given instruction set. All of them give the same bits.
+/// As [`step_episodes`], with a given instruction set. All of them give the same bits.
 ///
 /// # Panics
 /// If the three slices differ in length.

@@ -19,6 +19,7 @@ pub mod batch;
 pub mod channel;
 pub mod dynamics;
 pub mod episode;
+mod episode_step;
 pub mod export;
 pub mod game;
 pub mod golden;
@@ -27,19 +28,18 @@ pub mod perturbation;
 pub mod robot;
 pub mod stream;
 pub mod table;
-mod episode_step;
 pub mod world;
 
 pub use batch::{Batch, BatchOutcome, BatchSetup};
 pub use channel::Command;
+pub use dynamics::path::LanePath;
 pub use episode::{
     EPISODE_STEPS, Episode, EpisodeState, StepOutcome,
     constraints::ConstraintValues,
     env_info::{EnvInfo, env_info, env_info_for},
 };
-pub use game::{Game, GameSetup, GameState, GameStep, referee::RallyEnd};
-pub use dynamics::path::LanePath;
-pub use faceoff_types::{Interpolation, JOINTS, PerturbationSettings, SUBSTEPS};
-pub use robot::plant::Plant;
 pub use episode_step::{step_episodes, step_episodes_on};
-pub use world::{Bounds, Divergence, Impact, Impacts, MalletState, ContactBody, Runaway, World};
+pub use faceoff_types::{Interpolation, JOINTS, PerturbationSettings, SUBSTEPS};
+pub use game::{Game, GameSetup, GameState, GameStep, referee::RallyEnd};
+pub use robot::plant::Plant;
+pub use world::{Bounds, ContactBody, Divergence, Impact, Impacts, MalletState, Runaway, World};

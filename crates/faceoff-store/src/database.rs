@@ -1,6 +1,6 @@
 use crate::{
     error::{Result, StoreError},
-    log::{MAX_LOG_BYTES, Log},
+    log::{Log, MAX_LOG_BYTES},
     schema::{self, MIGRATIONS, Upgrade},
 };
 use futures::future::BoxFuture;

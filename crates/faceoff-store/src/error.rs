@@ -12,9 +12,7 @@ pub enum StoreError {
     NotFound(&'static str),
     /// The outcomes of an old run were removed; its summary and its dataset remain.
     #[error("the run's single outcomes were removed at {at}; its dataset has them")]
-    OutcomesRemoved {
-        at: Timestamp,
-    },
+    OutcomesRemoved { at: Timestamp },
     /// Names that differ only in case count as the same.
     #[error("a team named {0:?} exists already")]
     TeamNameTaken(String),
@@ -33,10 +31,7 @@ pub enum StoreError {
     TournamentNameTaken(String),
     /// The team has requested as many test games and friendly games as it may on one UTC day.
     #[error("{used} of {limit} test and friendly games were requested today")]
-    GameQuotaExceeded {
-        limit: u32,
-        used: u32,
-    },
+    GameQuotaExceeded { limit: u32, used: u32 },
     /// The stage is not open yet, or is closed.
     #[error("the stage {name:?} {}", match closed_at {
         Some(at) => format!("closed at {at}"),
@@ -58,14 +53,10 @@ pub enum StoreError {
     },
     /// The team has withdrawn from the season.
     #[error("the team retired at {at}")]
-    Retired {
-        at: Timestamp,
-    },
+    Retired { at: Timestamp },
     /// No member of the team has accepted the current terms.
     #[error("no member of the team has accepted version {version} of the terms")]
-    TermsNotAccepted {
-        version: u32,
-    },
+    TermsNotAccepted { version: u32 },
     /// Names that differ only in case count as the same.
     #[error("a user named {0:?} exists already")]
     UserNameTaken(String),
@@ -74,9 +65,7 @@ pub enum StoreError {
     InvitationInvalid(String),
     /// The season is closed: it accepts no uploads and runs no evaluations.
     #[error("the season was closed at {closed_at}")]
-    SeasonClosed {
-        closed_at: Timestamp,
-    },
+    SeasonClosed { closed_at: Timestamp },
     /// The season was imported from an archive and is read-only.
     #[error("the season is archived as it was at {made_at}")]
     Archived {

@@ -11,9 +11,9 @@ pub use parse::ParseEventError;
 pub use subject::Subject;
 
 use faceoff_types::{
-    DivisionName, EvaluationId, InvitationId, DepartureKind, UserName, ProposalId, Retention,
-    RoundNumber, RunId, ShardId, StageId, StageName, StageRules, StageSettings, SubmissionId, Task,
-    TeamId, TeamName, TokenId, TournamentRules, TournamentSettings, WebhookId, Zone,
+    DepartureKind, DivisionName, EvaluationId, InvitationId, ProposalId, Retention, RoundNumber,
+    RunId, ShardId, StageId, StageName, StageRules, StageSettings, SubmissionId, Task, TeamId,
+    TeamName, TokenId, TournamentRules, TournamentSettings, UserName, WebhookId, Zone,
 };
 use jiff::{Timestamp, civil::Date};
 use serde::{Deserialize, Serialize};

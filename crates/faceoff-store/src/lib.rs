@@ -24,15 +24,15 @@ mod column;
 mod database;
 mod error;
 mod event;
+mod free_space;
 mod health;
+mod health_probes;
 mod live;
 mod log;
 mod operations;
 mod program;
-mod health_probes;
-mod queue;
 mod queries;
-mod free_space;
+mod queue;
 mod schema;
 mod signals;
 mod store;
@@ -47,17 +47,19 @@ pub(crate) use async_recursion::async_recursion as boxed;
 pub use artifacts::{ArtifactStream, Artifacts};
 pub use error::StoreError;
 pub use event::{Actor, Change, Event, EventRecord, ParseEventError, Subject};
+pub use free_space::{DiskSpace, FreeSpace};
 pub use health::{Health, QueueHealth};
-pub use live::{MAX_FINISHED_LIVE_GAMES, LiveGames, LiveCursor, LiveUpdate, LiveSubscription};
+pub use live::{LiveCursor, LiveGames, LiveSubscription, LiveUpdate, MAX_FINISHED_LIVE_GAMES};
 pub use log::MAX_LOG_BYTES;
 pub use operations::{
     announcements::MAX_OPEN_QUESTIONS,
     backup::CheckedDatabase,
     claim::MAX_LEASES,
+    cleanup::{RECORDINGS_KEPT_FOR, UNCHECKED_KEPT_FOR},
     commit::CommitOutcome,
-    submission_description::SubmissionDescription,
-    lease_release::MAX_ATTEMPTS,
     invitations::{CodeStatus, JoinOutcome, JoinRequest, MAX_OPEN_INVITATIONS, NewInvitation},
+    jobs::{ClaimedJob, Job, RunSeeds},
+    lease_release::MAX_ATTEMPTS,
     proposals::Reevaluation,
     purpose::JobFilter,
     registrations::{MAX_PENDING_REGISTRATIONS, NewRegistration},
@@ -66,74 +68,78 @@ pub use operations::{
     runs::RunOwner,
     snapshot::Snapshot,
     stages::{NewStage, StageChange},
+    submission_description::SubmissionDescription,
     teams::TeamChange,
-    cleanup::{RECORDINGS_KEPT_FOR, UNCHECKED_KEPT_FOR},
-    tokens::{VerifiedToken, LAST_USE_INTERVAL, MAX_TOKENS, NewToken, TokenRejection, SESSION_LIFETIME, Principal},
+    tokens::{
+        LAST_USE_INTERVAL, MAX_TOKENS, NewToken, Principal, SESSION_LIFETIME, TokenRejection,
+        VerifiedToken,
+    },
     tournament::{
         entrants::DepartureRequest,
         open::{NewTournament, TournamentChange},
         replays::MAX_REPLAYS,
     },
     webhooks::{
-        DeliveryOutcome, DELIVERIES_KEPT_FOR, DISABLED_AFTER, MAX_ORGANISER_WEBHOOKS, MAX_TEAM_WEBHOOKS,
-        MAX_PENDING_DELIVERIES, NewWebhook, OLD_SECRET_VALID_FOR, PlannedDeliveries, WebhookChange,
+        DELIVERIES_KEPT_FOR, DISABLED_AFTER, DeliveryOutcome, MAX_ORGANISER_WEBHOOKS,
+        MAX_PENDING_DELIVERIES, MAX_TEAM_WEBHOOKS, NewWebhook, OLD_SECRET_VALID_FOR,
+        PlannedDeliveries, WebhookChange,
     },
-    jobs::{ClaimedJob, RunSeeds, Job},
 };
 pub use program::Program;
-pub use queue::JobClaim;
 pub use queries::{
     board::{BoardRecord, BoardScope},
-    subject_contexts::SubjectContext,
+    board_days::BoardDays,
     evaluations::EvaluationFilter,
     gauges::Gauges,
     queue_forecast::{EvaluationBacklog, QueueForecast, QueuePosition},
     runs::RunFaults,
-    board_days::BoardDays,
     storage::{StorageScope, TeamStorage},
+    subject_contexts::SubjectContext,
     tournaments::{GameFilter, TournamentRecord},
     worker_bans::WorkerResults,
 };
-pub use free_space::{DiskSpace, FreeSpace};
+pub use queue::JobClaim;
 pub use schema::Upgrade;
 pub use store::Store;
 pub use tables::{
     ablations::{Ablation, AblationState},
     announcements::Announcement,
-    archive::{ArchivedSeason, Edition, ArchivedArtifact, ArtifactOwner, ParseEditionError},
+    archive::{ArchivedArtifact, ArchivedSeason, ArtifactOwner, Edition, ParseEditionError},
     bundles::{UploadQuota, UploadUsage},
     days::Day,
     deliveries::{Delivery, DeliveryAttempt, DeliveryState},
-    proposed_evaluations::ProposedEvaluation,
-    entrants::{Entrant, Departure},
+    entrants::{Departure, Entrant},
     evaluations::{Evaluation, EvaluationState},
     events::EventFilter,
-    sign_offs::SignOff,
     game_attempts::{AttemptEnd, AttemptOutcome, GameAttempt},
-    games::{Game, GameCommit, GamePurpose, GameRecording, GameResultRow, GameState, ScheduleEntry},
-    invitations::{Invitation, InvitationState, InvitationRole},
+    games::{
+        Game, GameCommit, GamePurpose, GameRecording, GameResultRow, GameState, ScheduleEntry,
+    },
+    invitations::{Invitation, InvitationRole, InvitationState},
     job_durations::JobDurations,
-    required_artifacts::RequiredArtifact,
-    users::User,
     plan::RunPlan,
     proposals::{Proposal, ProposalKind, ProposalOutcome},
+    proposed_evaluations::ProposedEvaluation,
     questions::{Question, Reply},
     registrations::{Registration, RegistrationState},
+    required_artifacts::RequiredArtifact,
     rounds::{DrawnMatchday, DrawnRound, RoundBye, TournamentRound},
     rulings::Ruling,
     runs::{ClearableRun, Run},
     season::Season,
     shards::{Shard, ShardCommit},
+    sign_offs::SignOff,
     stages::{Revision, Stage, StagePhase},
     submissions::{Deletion, Submission, SubmissionState},
     teams::{Team, TeamProfile},
     terms::Terms,
     tokens::{Token, TokenKind, TokenOwner},
     tournaments::Tournament,
+    users::User,
     webhooks::{DisabledWebhook, Webhook, WebhookSecrets},
     worker_bans::WorkerBan,
 };
 pub use workers::{
-    ParseWorkerNameError, UploadGuard, WORKER_TIMEOUT, SlotReport, WorkerInfo, SlotStatus, WorkerStatus,
-    WorkerName, Workers,
+    ParseWorkerNameError, SlotReport, SlotStatus, UploadGuard, WORKER_TIMEOUT, WorkerInfo,
+    WorkerName, WorkerStatus, Workers,
 };

@@ -1,7 +1,7 @@
 //! Live games, for viewers. The data is in memory only: the result is stored at the end.
 
 use crate::boxed;
-use faceoff_types::{GameEvent, GameId, LiveGame, LiveEvent, LivePosition};
+use faceoff_types::{GameEvent, GameId, LiveEvent, LiveGame, LivePosition};
 use std::{
     collections::VecDeque,
     sync::{Arc, Mutex, MutexGuard, PoisonError},
@@ -228,10 +228,7 @@ mod tests {
     }
 
     const fn cursor(attempt: u32, events: u32) -> LiveCursor {
-        LiveCursor {
-            attempt,
-            events,
-        }
+        LiveCursor { attempt, events }
     }
 
     #[tokio::test]
@@ -268,7 +265,11 @@ mod tests {
         // a viewer that falls behind, or returns, continues at its cursor
         assert_eq!(subscription.read_since(Some(cursor(1, 1))).events.len(), 1);
         assert_eq!(subscription.read_since(Some(second.end)).events, []);
-        assert_eq!(subscription.read_since(Some(cursor(1, 9))).events, [], "no such cursor");
+        assert_eq!(
+            subscription.read_since(Some(cursor(1, 9))).events,
+            [],
+            "no such cursor"
+        );
         assert_eq!(subscription.read_since(Some(cursor(7, 1))).events.len(), 2);
     }
 
@@ -292,7 +293,10 @@ mod tests {
         assert!(subscription.changed().await);
         let restarted = subscription.read_since(Some(broken.end));
         assert_eq!((restarted.end, restarted.events.len()), (cursor(2, 0), 0));
-        assert_eq!((restarted.state.score, restarted.state.is_over), ([0; 2], false));
+        assert_eq!(
+            (restarted.state.score, restarted.state.is_over),
+            ([0; 2], false)
+        );
         assert!(restarted.end > broken.end);
 
         let end = GameEvent::Ended {
@@ -311,7 +315,9 @@ mod tests {
     #[tokio::test]
     async fn finished_games_are_forgotten_and_running_ones_are_not() {
         let live = LiveGames::default();
-        let games: Vec<GameId> = (0..MAX_FINISHED_LIVE_GAMES + 3).map(|_| GameId::new()).collect();
+        let games: Vec<GameId> = (0..MAX_FINISHED_LIVE_GAMES + 3)
+            .map(|_| GameId::new())
+            .collect();
         live.begin(games[0], 1, 10);
         let mut early = live.subscribe(games[0]).unwrap();
         live.end_attempt(games[0], 1);

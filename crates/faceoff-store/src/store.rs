@@ -1,7 +1,7 @@
 use crate::{
-    artifacts::Artifacts, boxed, database::Database, error::Result, event::Change, live::LiveGames,
-    health_probes::HealthProbes, free_space::FreeSpace, schema::Upgrade, signals::Signals, tables::archive::ArchivedSeason,
-    workers::Workers,
+    artifacts::Artifacts, boxed, database::Database, error::Result, event::Change,
+    free_space::FreeSpace, health_probes::HealthProbes, live::LiveGames, schema::Upgrade,
+    signals::Signals, tables::archive::ArchivedSeason, workers::Workers,
 };
 use std::sync::Arc;
 use tokio::sync::{broadcast, watch};

@@ -63,7 +63,9 @@ impl FromStr for WorkerName {
     fn from_str(text: &str) -> Result<Self, ParseWorkerNameError> {
         let allowed = |c: char| c.is_ascii_alphanumeric() || matches!(c, '-' | '_');
         let is_name = (1..=MAX_NAME_LEN).contains(&text.len()) && text.chars().all(allowed);
-        is_name.then(|| Self(text.to_owned())).ok_or(ParseWorkerNameError)
+        is_name
+            .then(|| Self(text.to_owned()))
+            .ok_or(ParseWorkerNameError)
     }
 }
 
@@ -211,13 +213,7 @@ impl Workers {
     }
 
     /// Records that a worker has polled for a job, and why it gets none, if it is refused.
-    pub fn record_poll(
-        &self,
-        name: &str,
-        info: WorkerInfo,
-        refusal: Option<&str>,
-        now: Timestamp,
-    ) {
+    pub fn record_poll(&self, name: &str, info: WorkerInfo, refusal: Option<&str>, now: Timestamp) {
         let mut state = self.lock();
         state
             .workers

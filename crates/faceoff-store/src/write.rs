@@ -74,7 +74,8 @@ async fn append(
     subject: Subject,
     event: &Event,
 ) -> Result<i64> {
-    let damaged = |problem: &dyn std::fmt::Display| StoreError::Damaged(format!("an event: {problem}"));
+    let damaged =
+        |problem: &dyn std::fmt::Display| StoreError::Damaged(format!("an event: {problem}"));
     let mut payload = serde_json::to_value(event).map_err(|error| damaged(&error))?;
     let kind = match payload
         .as_object_mut()

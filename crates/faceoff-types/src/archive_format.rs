@@ -16,7 +16,7 @@ impl ArchiveFormat {
     /// four, so [`Self::detect`] takes shorter heads too.
     pub const LONGEST_MAGIC: usize = TAR_MAGIC_AT + TAR_MAGIC.len();
 
-/// Detects the format from an archive's first bytes; file names are not trusted.
+    /// Detects the format from an archive's first bytes; file names are not trusted.
     #[must_use]
     pub fn detect(head: &[u8]) -> Option<Self> {
         match head {

@@ -99,7 +99,8 @@ mod tests {
             job: None,
             state: State::Delivered { ended_at: 7 },
         };
-        let sent = json!({"bytes": 3, "size": 3, "state": "delivered", "ended_at": 7, "settled_at": 7});
+        let sent =
+            json!({"bytes": 3, "size": 3, "state": "delivered", "ended_at": 7, "settled_at": 7});
         assert_eq!(to_value(&delivered).unwrap(), sent);
         assert_eq!(from_value::<Delivery>(sent).unwrap(), delivered);
     }

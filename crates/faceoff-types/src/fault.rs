@@ -8,9 +8,7 @@ use std::fmt;
 #[serde(tag = "kind", rename_all = "snake_case")]
 pub enum AgentFaultKind {
     /// A line that is not a JSON object.
-    NotJson {
-        detail: String,
-    },
+    NotJson { detail: String },
     /// Another message than the one expected.
     WrongMessage {
         /// What the protocol asked for, e.g. `ready with episode 3`.
@@ -40,9 +38,7 @@ pub enum AgentFaultKind {
         detail: String,
     },
     /// A line longer than the protocol allows.
-    LineTooLong {
-        limit_bytes: u64,
-    },
+    LineTooLong { limit_bytes: u64 },
     /// No answer within the time limit.
     TimedOut {
         /// Which answer was due.
@@ -59,13 +55,9 @@ pub enum AgentFaultKind {
     /// Standard output was closed while an answer was due.
     ClosedOutput,
     /// The process ended while an answer was due.
-    Exited {
-        code: i32,
-    },
+    Exited { code: i32 },
     /// The process was ended by a signal that the evaluator did not send.
-    Signalled {
-        signal: i32,
-    },
+    Signalled { signal: i32 },
     /// The process was ended because it exceeded a resource limit.
     LimitExceeded {
         /// Name of the limit, e.g. `memory`.
@@ -76,9 +68,7 @@ pub enum AgentFaultKind {
         used: String,
     },
     /// The program could not be started: the command is missing or not executable.
-    CannotStart {
-        detail: String,
-    },
+    CannotStart { detail: String },
 }
 
 impl fmt::Display for AgentFaultKind {

@@ -53,8 +53,6 @@ mod tests {
     #[test]
     fn other_io_errors_are_not_full_disk() {
         assert!(!is_full_disk(&io::Error::from_raw_os_error(5)));
-        assert!(!is_full_disk(&io::Error::other(
-            "no space left on device"
-        )));
+        assert!(!is_full_disk(&io::Error::other("no space left on device")));
     }
 }

@@ -99,7 +99,8 @@ impl FromStr for GameSeedLabel {
         fn number(text: &str) -> Result<u32, ParseGameSeedLabelError> {
             text.parse().map_err(|_| ParseGameSeedLabelError)
         }
-        let round = |text| RoundNumber::try_from(number(text)?).map_err(|_| ParseGameSeedLabelError);
+        let round =
+            |text| RoundNumber::try_from(number(text)?).map_err(|_| ParseGameSeedLabelError);
         let parts: Vec<&str> = s.split('/').collect();
         Ok(match parts[..] {
             ["tournament", tournament, "round", at, "meeting", meeting] => Self::Fixture {

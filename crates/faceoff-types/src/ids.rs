@@ -60,19 +60,13 @@ macro_rules! id {
     };
 }
 
-id!(
-    TeamId,
-    "team"
-);
+id!(TeamId, "team");
 id!(
     /// A part of a season with its own days, rules and board. Seeds of its days follow from it.
     StageId,
     "stage"
 );
-id!(
-    SubmissionId,
-    "submission"
-);
+id!(SubmissionId, "submission");
 id!(
     /// One run of a submission over the tasks of a profile.
     EvaluationId,
@@ -128,10 +122,7 @@ id!(
     ProposalId,
     "proposal"
 );
-id!(
-    TournamentId,
-    "tournament"
-);
+id!(TournamentId, "tournament");
 id!(
     /// A game between two submissions.
     GameId,

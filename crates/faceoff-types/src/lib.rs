@@ -4,29 +4,29 @@
 //! This crate does no I/O, reads no clock and holds no policy: rules live in `faceoff-scoring`,
 //! physics in `faceoff-sim`.
 
+mod agent_task;
 mod archive_format;
 mod bundle_ref;
 mod clock;
 mod computation_time;
 mod constraint;
-mod agent_task;
 mod day_deadline;
+mod departure_kind;
+pub mod deprecated_names;
 mod fault;
 mod full_disk;
 mod game;
 mod game_limits;
 mod game_seed_label;
-mod printable;
 mod ids;
 mod interpolation;
-mod departure_kind;
-pub mod deprecated_names;
 mod limits;
 mod live_game;
 mod millionths;
 mod names;
 mod outcome;
 mod perturbations;
+mod printable;
 mod profile;
 mod result;
 mod retention;
@@ -37,7 +37,6 @@ mod runtimes;
 mod schedule;
 mod seed;
 mod seed_label;
-mod validation_outcome;
 mod stage;
 mod stage_bounds;
 mod stage_limits;
@@ -47,39 +46,40 @@ mod tier;
 mod timing;
 mod tournament_format;
 mod tournament_rules;
+mod validation_outcome;
 mod variation;
 mod zone;
 
+pub use agent_task::{AgentTask, Side};
 pub use archive_format::ArchiveFormat;
 pub use bundle_ref::BundleRef;
 pub use clock::Clock;
 pub use computation_time::ComputationTime;
 pub use constraint::{Constraint, Violations};
-pub use agent_task::{AgentTask, Side};
 pub use day_deadline::{DayDeadline, MAX_DEADLINE_H, ParseDayDeadlineError};
+pub use departure_kind::DepartureKind;
+pub use deprecated_names::DeprecatedNames;
 pub use fault::{AgentFault, AgentFaultKind, Phase};
 pub use full_disk::is_full_disk;
 pub use game::{ForfeitCause, GameEnd, GameFault, GameOutcome, GameWindow, SideOutcome};
 pub use game_limits::GameLimits;
 pub use game_seed_label::{GameSeedLabel, ParseGameSeedLabelError};
-pub use printable::{escape_unprintable, is_printable};
 pub use ids::{
     AblationId, AnnouncementId, DeliveryId, EvaluationId, GameId, InvitationId, ParseIdError,
-    UserId, ProposalId, QuestionId, RegistrationId, RunId, ShardId, StageId, SubmissionId,
-    TeamId, TokenId, TournamentId, WebhookId,
+    ProposalId, QuestionId, RegistrationId, RunId, ShardId, StageId, SubmissionId, TeamId, TokenId,
+    TournamentId, UserId, WebhookId,
 };
 pub use interpolation::{Interpolation, JOINTS, MAX_ACTION_LEN, SUBSTEPS, UnknownInterpolation};
-pub use departure_kind::DepartureKind;
-pub use deprecated_names::DeprecatedNames;
 pub use limits::{AgentLimits, BundleLimits, ResourceLimits, TimeLimits};
-pub use live_game::{GameEvent, LiveGame, LiveEvent, LivePosition};
+pub use live_game::{GameEvent, LiveEvent, LiveGame, LivePosition};
 pub use millionths::{Millionths, NotMillionths};
-pub use names::{DivisionName, InvalidName, UserName, StageName, TeamName};
+pub use names::{DivisionName, InvalidName, StageName, TeamName, UserName};
 pub use outcome::{EpisodeEnd, EpisodeOutcome};
 pub use perturbations::{
     DelaySettings, DisturbanceSettings, InvalidPerturbation, MismatchSettings, NoiseSettings,
     PerturbationSettings, TrackingLossSettings,
 };
+pub use printable::{escape_unprintable, is_printable};
 pub use profile::{Factor, Factors, ParseProfileError, Profile};
 pub use result::{ComputationTimeSummary, EvaluationResult, TaskResult, ViolationCounts};
 pub use retention::{InvalidRetention, MAX_DAYS_AFTER_SIGN_OFF, MAX_LAST, Retention};
@@ -92,11 +92,10 @@ pub use runtimes::{IMAGE_RUNTIME, InvalidRuntimes, RuntimeRefused, Runtimes, Sta
 pub use schedule::{InvalidSchedule, Schedule};
 pub use seed::{ParseSeedError, Seed};
 pub use seed_label::{ParseSeedLabelError, SeedLabel};
-pub use validation_outcome::{ValidationOutcome, ValidationTiming};
 pub use stage::{ParseStageDayError, StageDay, StageRules};
 pub use stage_bounds::{InvalidStageRules, MAX_MEAN_DAYS};
 pub use stage_limits::{InvalidLimit, StageLimits, StageUploadLimits};
-pub use stage_settings::{Publication, StageSettings, CountingResult, UnknownSetting};
+pub use stage_settings::{CountingResult, Publication, StageSettings, UnknownSetting};
 pub use task::{CONTROL_STEP_S, EPISODE_STEPS, MAX_EPISODES_PER_TASK, ParseTaskError, Task};
 pub use tier::Tier;
 pub use timing::{RoundTrips, SlotTiming};
@@ -104,5 +103,6 @@ pub use tournament_format::TournamentFormat;
 pub use tournament_rules::{
     InvalidTournament, MAX_FREE_GAMES, MAX_GAME_STEPS, TournamentRules, TournamentSettings,
 };
+pub use validation_outcome::{ValidationOutcome, ValidationTiming};
 pub use variation::{InvalidVariation, TaskWeights, TierBounds, Variation};
 pub use zone::{UnknownZone, Zone};

@@ -145,7 +145,10 @@ mod tests {
     #[test]
     fn runtime_accepted_by_one_stage_is_accepted() {
         let stages = [stage("Main", &["native"]), stage("Late", &["python3"])];
-        assert_eq!(StageRuntimes::reasons_if_all_refuse(&stages, "python3"), None);
+        assert_eq!(
+            StageRuntimes::reasons_if_all_refuse(&stages, "python3"),
+            None
+        );
         assert_eq!(StageRuntimes::reasons_if_all_refuse(&[], "julia"), None);
         let refused = StageRuntimes::reasons_if_all_refuse(&stages, "julia").unwrap();
         assert!(

@@ -65,10 +65,7 @@ pub enum InvalidSchedule {
     #[error(
         "{pattern:?} is no schedule of five fields (minute, hour, day of the month, month, day of the week): {why}"
     )]
-    Cron {
-        pattern: String,
-        why: String,
-    },
+    Cron { pattern: String, why: String },
 }
 
 /// How far ahead to search for a cutoff: beyond the gap between two leap days, and any holidays.

@@ -68,7 +68,8 @@ impl StageRules {
     /// # Errors
     /// The first invalid field.
     pub fn check(&self) -> Result<(), InvalidStageRules> {
-        let is_repeated = |task: &Task| self.tasks.iter().filter(|other| *other == task).count() > 1;
+        let is_repeated =
+            |task: &Task| self.tasks.iter().filter(|other| *other == task).count() > 1;
         if self.tasks.is_empty() || self.tasks.iter().any(is_repeated) {
             return Err(InvalidStageRules::Tasks);
         }

@@ -222,7 +222,10 @@ mod tests {
             (CountingResult::Final, r#""final""#, "final"),
         ] {
             assert_eq!(serde_json::to_string(&standings).unwrap(), json);
-            assert_eq!(serde_json::from_str::<CountingResult>(json).unwrap(), standings);
+            assert_eq!(
+                serde_json::from_str::<CountingResult>(json).unwrap(),
+                standings
+            );
             assert_eq!(standings.to_string(), words);
             assert_eq!(words.parse(), Ok(standings));
         }

@@ -172,7 +172,10 @@ mod tests {
 
     #[test]
     fn sealed_grant_opens_and_forgeries_do_not() {
-        let (key, other) = (GrantKey::from_secret(&[1; 32]), GrantKey::from_secret(&[2; 32]));
+        let (key, other) = (
+            GrantKey::from_secret(&[1; 32]),
+            GrantKey::from_secret(&[2; 32]),
+        );
         let sealed = grant().seal(&key).unwrap();
         assert_eq!(Grant::open(&sealed, &key), Some(grant()));
         assert_eq!(Grant::open(&sealed, &other), None);

@@ -6,8 +6,8 @@
 use crate::game::GameSpec;
 use faceoff_types::{
     AgentLimits, BundleRef, EpisodeOutcome, EvaluationId, EvaluationResult, GameId,
-    PerturbationSettings, Profile, Ruleset, Seed, ValidationOutcome, StageRuntimes, SubmissionId, Task,
-    Variation,
+    PerturbationSettings, Profile, Ruleset, Seed, StageRuntimes, SubmissionId, Task,
+    ValidationOutcome, Variation,
 };
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
@@ -248,7 +248,9 @@ impl JobReport {
 impl fmt::Display for JobPayload {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Validation { submission, .. } => write!(f, "validation run of submission {submission}"),
+            Self::Validation { submission, .. } => {
+                write!(f, "validation run of submission {submission}")
+            }
             Self::Shard { part_of, spec, .. } => write!(
                 f,
                 "{} episodes {} to {} of {part_of}, profile {}",

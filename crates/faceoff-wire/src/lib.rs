@@ -20,12 +20,12 @@ pub mod answer;
 pub mod dataset;
 pub mod game;
 pub mod grant;
+pub mod job;
 mod manifest;
 pub mod message;
 mod protocol;
 mod quote;
 pub mod remote;
-pub mod job;
 
 pub use manifest::{MANIFEST_MAX_BYTES, Manifest, ManifestError};
 pub use message::{Env, Message, ProtocolTask};

@@ -127,7 +127,10 @@ impl Manifest {
             "must have at most 64 variables",
         )?;
         for (name, value) in &self.env {
-            let key: String = format!("env.{}", escape_unprintable(name)).chars().take(80).collect();
+            let key: String = format!("env.{}", escape_unprintable(name))
+                .chars()
+                .take(80)
+                .collect();
             require(
                 Self::is_variable_name(name),
                 &key,

@@ -1,6 +1,6 @@
 //! JSON messages between the server and remote workers: jobs, requests of workers, live updates of games, and results.
 
-use crate::job::{Lease, JobSpec, JobReport};
+use crate::job::{JobReport, JobSpec, Lease};
 use faceoff_types::{GameId, LiveEvent, LivePosition, RuntimeInventory};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;

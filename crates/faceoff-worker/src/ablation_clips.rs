@@ -1,7 +1,7 @@
 //! Stores clips of an ablation's episodes that end differently than in the ideal simulator, with the ideal counterparts.
 
 use anyhow::Context as _;
-use faceoff_replay::{select_episodes, merged_index};
+use faceoff_replay::{merged_index, select_episodes};
 use faceoff_store::{AblationState, Artifacts, Store, StoreError};
 use faceoff_types::{AblationId, Profile, Task};
 use std::{
@@ -87,6 +87,9 @@ fn select_clips(parts: &ByProfile<Vec<PathBuf>>) -> anyhow::Result<ByProfile<Vec
             ideal_episodes.extend(differing);
         }
     }
-    packs.insert(Profile::Ideal, select_episodes(ideal, &ideal_episodes, Vec::new())?);
+    packs.insert(
+        Profile::Ideal,
+        select_episodes(ideal, &ideal_episodes, Vec::new())?,
+    );
     Ok(packs)
 }

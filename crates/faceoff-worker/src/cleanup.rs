@@ -83,11 +83,15 @@ async fn clear_runs(store: &Store, now: Timestamp) -> anyhow::Result<()> {
 
 /// Clears a run after storing a summary of its episodes, if it has none.
 async fn clear_run(store: &Store, clearable: ClearableRun, now: Timestamp) -> anyhow::Result<()> {
-    let ClearableRun { run, needs_summary: wants_summary } = clearable;
+    let ClearableRun {
+        run,
+        needs_summary: wants_summary,
+    } = clearable;
     if wants_summary {
         let outcomes = store.outcomes(run).await?;
         let bounds = store.run_variation(run).await?.tier_bounds;
-        let summary = tokio::task::spawn_blocking(move || EpisodeSummary::from_outcomes(&outcomes, &bounds));
+        let summary =
+            tokio::task::spawn_blocking(move || EpisodeSummary::from_outcomes(&outcomes, &bounds));
         let json = serde_json::to_string(&summary.await??)?;
         store
             .store_episode_summary(run, EpisodeSummary::VERSION, &json, now)

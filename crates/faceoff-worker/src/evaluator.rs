@@ -1,6 +1,7 @@
 use faceoff_runner::{
-    AgentEnvironment, AssembledDataset, LiveFeed, EvaluationMeta, LiveFeedSink, GameReport, GameSpec,
-    Observer, POSITION_INTERVAL, PlatformFault, ShardReport, ShardSpec, ValidationReport, ValidationSpec,
+    AgentEnvironment, AssembledDataset, EvaluationMeta, GameReport, GameSpec, LiveFeed,
+    LiveFeedSink, Observer, POSITION_INTERVAL, PlatformFault, ShardReport, ShardSpec,
+    ValidationReport, ValidationSpec,
     bundle::{self, Bundle, BundleError, BundleLimits},
 };
 use std::path::{Path, PathBuf};

@@ -4,17 +4,17 @@ use crate::{
     bundle_cache::{BundleCache, Unpacked},
     cpus::SlotCpus,
     evaluator::Evaluator,
+    game_broadcast::GameBroadcast,
     lease::Progress,
     server::JobServer,
-    game_broadcast::GameBroadcast,
 };
 use anyhow::Context as _;
 use faceoff_runner::{AgentEnvironment, CLIPS_FILE, GameSpec, Supervision, bundle::Bundle};
 use faceoff_sandbox::{Isolation, Runtime};
-use faceoff_types::{AgentLimits, GameId, SlotTiming, ValidationOutcome, StageRuntimes};
+use faceoff_types::{AgentLimits, GameId, SlotTiming, StageRuntimes, ValidationOutcome};
 use faceoff_wire::job::{
-    AgentSpec, JobPayload, EvaluationMeta, OutputFiles, Lease, ShardSpec, ValidationSpec, GameFiles,
-    JobSpec, JobReport,
+    AgentSpec, EvaluationMeta, GameFiles, JobPayload, JobReport, JobSpec, Lease, OutputFiles,
+    ShardSpec, ValidationSpec,
 };
 use std::{
     collections::BTreeMap,
@@ -71,11 +71,7 @@ impl AgentHost {
 
 impl Executor {
     /// Runs a job and returns its report.
-    pub(crate) fn run(
-        &mut self,
-        job: &JobSpec,
-        progress: &Progress,
-    ) -> anyhow::Result<JobReport> {
+    pub(crate) fn run(&mut self, job: &JobSpec, progress: &Progress) -> anyhow::Result<JobReport> {
         match &job.payload {
             JobPayload::Validation {
                 agent,
@@ -86,7 +82,10 @@ impl Executor {
                 .validate(agent, spec, runtimes, progress)
                 .map(JobReport::Validation),
             JobPayload::Shard {
-                agent, spec, output, ..
+                agent,
+                spec,
+                output,
+                ..
             } => self.play_shard(agent, spec, output, progress.clone()),
             JobPayload::Game {
                 game,
@@ -201,9 +200,9 @@ impl Executor {
         let bundle = self.valid_bundle(agent, None, &progress)?;
         let environment = self.host.environment(&agent.limits, &progress);
         let out = self.folder("recording")?;
-        let played = self
-            .evaluator
-            .play_shard(spec, &bundle, &environment, out.path(), &mut progress)?;
+        let played =
+            self.evaluator
+                .play_shard(spec, &bundle, &environment, out.path(), &mut progress)?;
         // The steps after this one depend on whether the slot is local or remote.
         tracing::debug!("played");
         let recording = match output {
@@ -230,7 +229,13 @@ impl Executor {
         })
     }
 
-    fn broadcast(&self, lease: &Lease, game: (GameId, u32), steps: u32, progress: &Progress) -> GameBroadcast {
+    fn broadcast(
+        &self,
+        lease: &Lease,
+        game: (GameId, u32),
+        steps: u32,
+        progress: &Progress,
+    ) -> GameBroadcast {
         GameBroadcast::begin(
             Arc::clone(&self.server),
             lease.clone(),

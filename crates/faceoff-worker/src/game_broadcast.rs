@@ -48,10 +48,7 @@ impl GameBroadcast {
 impl LiveFeedSink for GameBroadcast {
     fn receive(&mut self, events: Vec<LiveEvent>, position: LivePosition) {
         self.progress.game_stepped(position.step);
-        self.publish(GameUpdate::Progress {
-            events,
-            position,
-        });
+        self.publish(GameUpdate::Progress { events, position });
     }
 
     fn cancelled(&self) -> bool {

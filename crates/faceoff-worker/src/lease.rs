@@ -1,4 +1,4 @@
-use crate::server::{ReleaseReason, LeaseStatus, JobServer};
+use crate::server::{JobServer, LeaseStatus, ReleaseReason};
 use faceoff_types::{EpisodeOutcome, WINDOW_STEPS};
 use faceoff_wire::job::Lease;
 use std::{

@@ -10,10 +10,12 @@
 
 mod ablation_clips;
 mod bundle_cache;
+mod cleanup;
 mod cpus;
 mod evaluator;
 mod executor;
 mod full_disk;
+mod game_broadcast;
 mod lease;
 mod local;
 mod remote;
@@ -21,22 +23,20 @@ mod schedule;
 mod scratch;
 mod server;
 mod service;
-mod game_broadcast;
 mod slot;
 mod slot_threads;
 #[cfg(test)]
 mod tests;
-mod cleanup;
 
 /// Boxes public async functions, so that they are compiled once, here, and not in each crate that awaits them.
 pub(crate) use async_recursion::async_recursion as boxed;
 
+pub use cleanup::clean_up;
 pub use cpus::{CpuLayout, SlotCpus};
 pub use remote::{
-    BucketConfig, ConnectionCheck, NatsConfig, RemoteConfig, RemoteWorker, check_connection, dispatch,
-    run_remote_worker,
+    BucketConfig, ConnectionCheck, NatsConfig, RemoteConfig, RemoteWorker, check_connection,
+    dispatch, run_remote_worker,
 };
 pub use schedule::{run_schedule, start_due};
 pub use service::{SlotsConfig, WorkerConfig, run};
 pub use slot_threads::{SlotStarter, SlotThreads};
-pub use cleanup::clean_up;

@@ -1,20 +1,20 @@
 //! The job server for slots of the same process: the only place of this crate that uses the store's queue.
 
 use crate::{
-    full_disk::{self, ClaimPause},
-    server::{ClaimResult, GameUpdate, ReleaseReason, LeaseStatus, QueueVersion, JobServer},
     cleanup,
+    full_disk::{self, ClaimPause},
+    server::{ClaimResult, GameUpdate, JobServer, LeaseStatus, QueueVersion, ReleaseReason},
 };
 use faceoff_store::{
-    Artifacts, JobClaim, ClaimedJob, CommitOutcome, GameCommit, GameRecording, JobFilter, RunOwner,
-    ShardCommit, Store, StoreError, Job,
+    Artifacts, ClaimedJob, CommitOutcome, GameCommit, GameRecording, Job, JobClaim, JobFilter,
+    RunOwner, ShardCommit, Store, StoreError,
 };
 use faceoff_types::{AgentLimits, BundleRef, Clock, EvaluationResult, GameId, StageLimits};
 use faceoff_wire::{
     game::GameSpec,
     job::{
-        AgentSpec, JobPayload, EvaluationMeta, OutputFiles, Lease, ShardSpec, ValidationSpec, GameFiles,
-        JobSpec, JobReport,
+        AgentSpec, EvaluationMeta, GameFiles, JobPayload, JobReport, JobSpec, Lease, OutputFiles,
+        ShardSpec, ValidationSpec,
     },
 };
 use std::{path::Path, time::Duration};
@@ -90,14 +90,18 @@ impl LocalServer {
                     perturbations: run.plan.variation.perturbations.clone(),
                 },
                 output: match owner {
-                    _ if run.keeps_recordings => OutputFiles::Recording(claim.recording_key(run.id)),
+                    _ if run.keeps_recordings => {
+                        OutputFiles::Recording(claim.recording_key(run.id))
+                    }
                     RunOwner::Ablation(id) => OutputFiles::Clips(Artifacts::ablation_part_key(
                         id,
                         run.plan.profile,
                         shard.task,
                         shard.first_episode,
                     )),
-                    RunOwner::Evaluation(_) | RunOwner::ProposedEvaluation { .. } => OutputFiles::None,
+                    RunOwner::Evaluation(_) | RunOwner::ProposedEvaluation { .. } => {
+                        OutputFiles::None
+                    }
                 },
             },
             Job::Game {
@@ -163,7 +167,11 @@ impl LocalServer {
 
     /// Commits a shard. The recording of a lost lease is removed. After an error the commit may still have succeeded, so
     /// the recording is left.
-    async fn commit_shard(&self, claim: &JobClaim, played: ShardCommit) -> anyhow::Result<LeaseStatus> {
+    async fn commit_shard(
+        &self,
+        claim: &JobClaim,
+        played: ShardCommit,
+    ) -> anyhow::Result<LeaseStatus> {
         let recording = played.recording.clone();
         let committed = self.store.commit_shard(claim, played, self.clock.now());
         let status = lease_status(committed.await?);
@@ -179,7 +187,11 @@ impl LocalServer {
     /// Commits a game, as [`commit_shard`](Self::commit_shard) does. Only the recording of the counting attempt is kept.
     /// Recordings of voided results, and of attempts that were killed between upload and commit, are removed with the
     /// next result.
-    async fn commit_game(&self, claim: &JobClaim, played: GameCommit) -> anyhow::Result<LeaseStatus> {
+    async fn commit_game(
+        &self,
+        claim: &JobClaim,
+        played: GameCommit,
+    ) -> anyhow::Result<LeaseStatus> {
         let committed = self
             .store
             .commit_game(claim, &played, self.clock.now())
@@ -268,10 +280,9 @@ impl JobServer for LocalServer {
         let live = self.store.live_games();
         match update {
             GameUpdate::Started { steps } => live.begin(game, attempt, steps),
-            GameUpdate::Progress {
-                events,
-                position,
-            } => live.advance(game, attempt, events, Some(position)),
+            GameUpdate::Progress { events, position } => {
+                live.advance(game, attempt, events, Some(position))
+            }
             GameUpdate::Ended => live.end_attempt(game, attempt),
         }
     }
@@ -281,7 +292,8 @@ impl JobServer for LocalServer {
         self.runtime.block_on(async {
             match report {
                 JobReport::Validation(outcome) => {
-                    let status = lease_status(self.store.commit_validation(&claim, outcome, now).await?);
+                    let status =
+                        lease_status(self.store.commit_validation(&claim, outcome, now).await?);
                     cleanup::remove_invalid_bundles(&self.store, now).await;
                     Ok(status)
                 }
@@ -316,10 +328,7 @@ impl JobServer for LocalServer {
                     dataset,
                     blake3,
                     result,
-                } => {
-                    self.commit_score(&claim, &dataset, &blake3, &result)
-                        .await
-                }
+                } => self.commit_score(&claim, &dataset, &blake3, &result).await,
             }
         })
     }

@@ -21,30 +21,30 @@
 //!   transfer files, and `result_sender.rs` sends results;
 //! * `connection_check.rs` checks in advance whether a worker would get jobs.
 
-mod requests;
+mod accepted_results;
 mod bucket;
-mod result_checks;
-mod connection;
-mod dispatch;
-mod connection_check;
-mod server_client;
-mod grants;
-mod pending_results;
-mod result_sender;
 mod compatibility;
-mod worker_link;
+mod connection;
+mod connection_check;
+mod dispatch;
+mod grants;
+mod job_files;
 mod names;
 mod next_job;
-mod job_files;
-mod streams;
+mod pending_results;
 mod published_jobs;
-mod accepted_results;
+mod requests;
+mod result_checks;
+mod result_sender;
+mod server_client;
+mod streams;
 mod transfer;
 mod worker;
+mod worker_link;
 
 pub use bucket::BucketConfig;
 pub use connection::NatsConfig;
-pub use dispatch::{RemoteConfig, dispatch};
 pub use connection_check::{ConnectionCheck, check_connection};
+pub use dispatch::{RemoteConfig, dispatch};
 pub(crate) use result_sender::TooLarge;
 pub use worker::{RemoteWorker, run_remote_worker};

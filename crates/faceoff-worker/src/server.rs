@@ -1,5 +1,5 @@
 use faceoff_types::{BundleRef, GameId, LiveEvent, LivePosition};
-use faceoff_wire::job::{Lease, JobSpec, JobReport};
+use faceoff_wire::job::{JobReport, JobSpec, Lease};
 use std::{path::Path, time::Duration};
 use tokio_util::sync::CancellationToken;
 

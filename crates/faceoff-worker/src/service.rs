@@ -1,6 +1,7 @@
 use crate::{
     boxed,
     bundle_cache::BundleCache,
+    cleanup,
     cpus::{self, CpuLayout},
     evaluator::{Evaluator, Runner},
     executor::{AgentHost, Executor},
@@ -10,7 +11,6 @@ use crate::{
     server::JobServer,
     slot::{Backoff, Slot},
     slot_threads::SlotThreads,
-    cleanup,
 };
 use anyhow::Context as _;
 use faceoff_metrics::Metrics;
@@ -134,7 +134,10 @@ pub(crate) async fn run_with(
 
     match server.end_leases_of(scratch.worker()).await {
         Ok(0) => {}
-        Ok(ended) => tracing::info!(jobs = ended, "released the jobs of this worker's previous process"),
+        Ok(ended) => tracing::info!(
+            jobs = ended,
+            "released the jobs of this worker's previous process"
+        ),
         // They expire anyway.
         Err(error @ StoreError::DiskFull(_)) => {
             tracing::warn!(%error, "the leases of this worker's previous process remain until they expire");
@@ -268,9 +271,7 @@ async fn wait_for(
 async fn report_stalled_slots(metrics: Metrics, stop: CancellationToken) {
     const EVERY: Duration = Duration::from_secs(1);
     loop {
-        metrics
-            .slots()
-            .set_stuck(faceoff_runner::stuck_threads());
+        metrics.slots().set_stuck(faceoff_runner::stuck_threads());
         tokio::select! {
             () = stop.cancelled() => return,
             () = tokio::time::sleep(EVERY) => {}

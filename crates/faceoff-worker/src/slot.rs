@@ -2,11 +2,11 @@ use crate::{
     executor::Executor,
     lease::{LeaseKeeper, Progress},
     remote::TooLarge,
-    server::{ClaimResult, ReleaseReason, LeaseStatus, JobServer},
+    server::{ClaimResult, JobServer, LeaseStatus, ReleaseReason},
 };
-use faceoff_metrics::{Metrics, JobEnd};
+use faceoff_metrics::{JobEnd, Metrics};
 use faceoff_runner::PlatformFault;
-use faceoff_wire::job::{JobPayload, JobSpec, JobReport};
+use faceoff_wire::job::{JobPayload, JobReport, JobSpec};
 use std::{
     panic::AssertUnwindSafe,
     sync::Arc,
@@ -112,11 +112,17 @@ impl Slot {
         // All log lines of this thread carry the job's ids until the span ends.
         let _span = span(job).entered();
         tracing::info!(job = %id, description = %payload, "started");
-        let (busy, began) = (self.metrics.slots().start_job(kind(payload)), Instant::now());
+        let (busy, began) = (
+            self.metrics.slots().start_job(kind(payload)),
+            Instant::now(),
+        );
         // A panic in the evaluator must end neither the slot nor the evaluation.
         let ended = std::panic::catch_unwind(AssertUnwindSafe(|| self.execute(job)))
             .unwrap_or_else(|panic| {
-                Err(anyhow::anyhow!("the evaluator failed: {}", panic_message(&*panic)))
+                Err(anyhow::anyhow!(
+                    "the evaluator failed: {}",
+                    panic_message(&*panic)
+                ))
             });
         let end = match ended {
             Ok(LeaseStatus::Held) => {
@@ -143,11 +149,8 @@ impl Slot {
 
     /// Runs and commits a job. An error is a platform fault.
     fn execute(&mut self, job: &JobSpec) -> anyhow::Result<LeaseStatus> {
-        let keeper = LeaseKeeper::keep(
-            Arc::clone(&self.server),
-            job.lease.clone(),
-            &self.shutdown,
-        )?;
+        let keeper =
+            LeaseKeeper::keep(Arc::clone(&self.server), job.lease.clone(), &self.shutdown)?;
         let progress = keeper.progress();
         let committed = self.executor.run(job, &progress).and_then(|report| {
             let status = self.commit(job, &report, &progress)?;
@@ -217,9 +220,7 @@ impl Slot {
             match self.server.release(&job.lease, reason) {
                 Ok(()) => return,
                 // Otherwise the lease would expire, and the attempt would count.
-                Err(error)
-                    if self.server.is_full_disk(&error) && !self.shutdown.is_cancelled() =>
-                {
+                Err(error) if self.server.is_full_disk(&error) && !self.shutdown.is_cancelled() => {
                     self.server.wait(&self.shutdown, self.idle_poll, None);
                 }
                 Err(error) => {
@@ -295,7 +296,8 @@ mod tests {
             first: Duration::from_secs(2),
             longest: Duration::from_secs(300),
         };
-        let pauses = [1, 2, 3, 8, 9, 32, 33, u32::MAX].map(|faults| backoff.after(faults).as_secs());
+        let pauses =
+            [1, 2, 3, 8, 9, 32, 33, u32::MAX].map(|faults| backoff.after(faults).as_secs());
         assert_eq!(pauses, [2, 4, 8, 256, 300, 300, 300, 300]);
     }
 }

@@ -2,18 +2,18 @@
 
 mod archive;
 mod download;
+mod files;
 mod game;
 mod http;
-mod files;
 mod links;
 mod pages;
-mod users;
 mod proposals;
 mod sessions;
 mod sse;
 mod tls;
 mod tournament;
 mod uploads;
+mod users;
 mod webhooks;
 mod workers;
 
@@ -23,7 +23,7 @@ use faceoff_api::{
     API_BASE,
     requests::{
         BoardFormat, BoardQuery, Cancellation, CloseSeason, ComparisonQuery, Confirmation,
-        Decision, NewExtraEvaluation, MissedDay, NewStage, NewTeam, Reason, StageChange, StartDay,
+        Decision, MissedDay, NewExtraEvaluation, NewStage, NewTeam, Reason, StageChange, StartDay,
     },
     views::{
         board::BoardView,
@@ -113,11 +113,7 @@ impl Client {
     ///
     /// # Errors
     /// [`ApiError`] if the server refuses, [`Unreachable`] if it does not answer; the same holds for all calls below.
-    pub async fn board(
-        &self,
-        task: Option<Task>,
-        query: &BoardQuery,
-    ) -> anyhow::Result<BoardView> {
+    pub async fn board(&self, task: Option<Task>, query: &BoardQuery) -> anyhow::Result<BoardView> {
         let request = self.request(Method::GET, &board_path(task)).query(query);
         read_json(self.send(request).await?).await
     }

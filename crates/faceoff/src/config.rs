@@ -11,8 +11,8 @@ use faceoff_runner::{AgentEnvironment, Supervision, TimeLimits, bundle::BundleLi
 use faceoff_sandbox::{Isolation, Layer, Limits, Runtime, affinity};
 use faceoff_store::UploadQuota;
 use faceoff_types::{
-    DayDeadline, InvalidSchedule, PerturbationSettings, Profile, Publication, Ruleset, Schedule,
-    StageRules, StageSettings, CountingResult, Task, TaskWeights, TierBounds, Variation, Zone,
+    CountingResult, DayDeadline, InvalidSchedule, PerturbationSettings, Profile, Publication,
+    Ruleset, Schedule, StageRules, StageSettings, Task, TaskWeights, TierBounds, Variation, Zone,
 };
 use jiff::civil::{Date, Time};
 use serde::{Deserialize, Serialize};
@@ -354,15 +354,18 @@ impl Config {
         };
         let read = || -> anyhow::Result<Self> {
             let config = Self::parse(&text)?;
-            config.check_host(&affinity::allowed().context("reading the CPU affinity of this process")?)?;
+            config.check_host(
+                &affinity::allowed().context("reading the CPU affinity of this process")?,
+            )?;
             Ok(config)
         };
         read().with_context(|| format!("the configuration {}", file.display()))
     }
 
     fn parse(text: &str) -> anyhow::Result<Self> {
-        let config: Self = toml::from_str(text)
-            .map_err(|error: toml::de::Error| anyhow!(suggestion::with_suggestion(&error.to_string())))?;
+        let config: Self = toml::from_str(text).map_err(|error: toml::de::Error| {
+            anyhow!(suggestion::with_suggestion(&error.to_string()))
+        })?;
         config.check()?;
         Ok(config)
     }

@@ -183,7 +183,10 @@ mod tests {
 
         let mut loaded = Credentials::load(&file).unwrap();
         assert_eq!(loaded.default_server(), Some("https://a.example"));
-        assert_eq!(loaded.login("HTTPS://A.example").unwrap().token, "fo_person_a");
+        assert_eq!(
+            loaded.login("HTTPS://A.example").unwrap().token,
+            "fo_person_a"
+        );
         assert_eq!(
             loaded.login("http://127.0.0.1:8080/").unwrap().token,
             "fo_person_b"

@@ -65,7 +65,9 @@ impl Descriptors {
     pub fn divide(limit: u64, slots: usize, requested: &ConnectionLimits) -> anyhow::Result<Self> {
         let reserved = SERVICE + PER_SLOT * slots as u64;
         let left = limit.saturating_sub(reserved) / PER_CONNECTION;
-        let connections = usize::try_from(left).unwrap_or(usize::MAX).min(requested.open);
+        let connections = usize::try_from(left)
+            .unwrap_or(usize::MAX)
+            .min(requested.open);
         anyhow::ensure!(
             connections >= MIN_CONNECTIONS,
             "{limit} file descriptors are too few: evaluations in {slots} slot(s) and the service need \
@@ -77,7 +79,9 @@ impl Descriptors {
             limit,
             reserved,
             connections,
-            per_address: requested.per_address.min((connections / ADDRESS_SHARE).max(1)),
+            per_address: requested
+                .per_address
+                .min((connections / ADDRESS_SHARE).max(1)),
         })
     }
 

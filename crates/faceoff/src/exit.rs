@@ -125,7 +125,8 @@ mod tests {
         let broken_pipe = || std::io::Error::from(std::io::ErrorKind::BrokenPipe);
         let output = anyhow::Error::from(broken_pipe()).context("writing");
         assert_eq!(Exit::from_outcome(Err(output)), Exit::Done);
-        let connection = anyhow::Error::from(broken_pipe()).context(Unreachable("the server hung up".into()));
+        let connection =
+            anyhow::Error::from(broken_pipe()).context(Unreachable("the server hung up".into()));
         assert_eq!(Exit::from_outcome(Err(connection)), Exit::Unreachable);
     }
 

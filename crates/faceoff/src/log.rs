@@ -55,9 +55,9 @@ impl LogFormat {
 const NATS_CLIENT: &str = "async_nats";
 
 fn parse_filter(list: &str) -> anyhow::Result<Targets> {
-    let filter: Targets = list.parse().with_context(|| {
-        format!("RUST_LOG={list:?}: expected e.g. info,sqlx::query=debug")
-    })?;
+    let filter: Targets = list
+        .parse()
+        .with_context(|| format!("RUST_LOG={list:?}: expected e.g. info,sqlx::query=debug"))?;
     let is_named = filter
         .iter()
         .any(|(target, _)| target.starts_with(NATS_CLIENT));

@@ -75,7 +75,8 @@ pub fn members() -> Vec<Member> {
 
 /// The table of `ARCHITECTURE.md`: the first column is the crate, the last the crates it may use.
 pub fn allowed() -> BTreeMap<String, AllowedDependencies> {
-    let text = fs::read_to_string(repository().join("ARCHITECTURE.md")).expect("ARCHITECTURE.md can be read");
+    let text = fs::read_to_string(repository().join("ARCHITECTURE.md"))
+        .expect("ARCHITECTURE.md can be read");
     let mut allowed = BTreeMap::new();
     let rows = text
         .lines()

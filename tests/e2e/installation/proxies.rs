@@ -4,7 +4,7 @@
 use crate::{CONFIG, Team};
 use faceoff_tests::{
     bundle, repository,
-    server::{TIMEOUT, Server},
+    server::{Server, TIMEOUT},
 };
 use reqwest::{blocking::Client, redirect::Policy};
 use rustls::{ClientConfig, RootCertStore};

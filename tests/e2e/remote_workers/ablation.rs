@@ -1,6 +1,6 @@
 //! Ablations on remote workers: results and clips equal those of a local slot.
 
-use super::{local_config, server_config, resume, worker_config};
+use super::{local_config, resume, server_config, worker_config};
 use crate::{Team, commands::admin, kills::copy_folder};
 use bytes::Bytes;
 use faceoff_tests::{bundle, nats::Nats, relay::Relay, server::Server, worker::Worker};
@@ -32,7 +32,9 @@ fn wait_for_result(
                 .as_u64()
                 .zip(effect["gained"].as_u64())
                 .map_or(0, |(a, b)| a + b);
-            let profile = effect["profile"].as_str().expect("an effect names its profile");
+            let profile = effect["profile"]
+                .as_str()
+                .expect("an effect names its profile");
             keys.extend((0..EPISODES).map(|episode| format!("{profile}/{task}/{episode}")));
         }
     }

@@ -1,6 +1,6 @@
 //! Bundles and recordings in an S3 bucket instead of the server's HTTP transfer.
 
-use super::{ReferenceRun, server_config, resume, worker_config};
+use super::{ReferenceRun, resume, server_config, worker_config};
 use faceoff_tests::{bucket::Bucket, nats::Nats, relay::Relay, server::Server, worker::Worker};
 
 #[test]
@@ -10,7 +10,8 @@ fn bucket_transfers_files_without_route_to_server() {
     let (nats, bucket) = (Nats::start(&scratch.path().join("nats")), Bucket::start());
     // No server is behind the address for files, and at first none behind that of the bucket.
     let (files, link) = (Relay::start(), Relay::start());
-    let config = server_config(&nats, files.address()) + &format!("bucket = \"{}\"\n", bucket.url());
+    let config =
+        server_config(&nats, files.address()) + &format!("bucket = \"{}\"\n", bucket.url());
     let environment = Bucket::environment(link.address());
     let server = Server::start_with_environment(&reference_run.data, &config, &environment);
     let worker = Worker::start(scratch.path(), "worker", &worker_config(nats.address(), 1));

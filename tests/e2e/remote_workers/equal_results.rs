@@ -1,6 +1,8 @@
 //! Results of remote workers equal those of one local slot, bit for bit.
 
-use super::{ReferenceRun, EPISODES, server_config, many_shards, resume, worker_config, wait_for_workers};
+use super::{
+    EPISODES, ReferenceRun, many_shards, resume, server_config, wait_for_workers, worker_config,
+};
 use crate::{Team, kills::copy_folder};
 use async_nats::Message;
 use bytes::Bytes;
@@ -73,7 +75,11 @@ fn remote_results_equal_local_results() {
                 let committed = log.lines().any(|line| {
                     line.contains("committed") && line.contains(&format!("slot-{slot}"))
                 });
-                assert!(committed, "{}: slot {slot} has run no job:\n{log}", setup.name);
+                assert!(
+                    committed,
+                    "{}: slot {slot} has run no job:\n{log}",
+                    setup.name
+                );
             }
             worker.stop();
         }
@@ -81,7 +87,12 @@ fn remote_results_equal_local_results() {
         let has_local_episodes = log
             .lines()
             .any(|line| line.contains("committed") && line.contains(" episodes "));
-        assert_eq!(has_local_episodes, setup.server > 0, "{}:\n{log}", setup.name);
+        assert_eq!(
+            has_local_episodes,
+            setup.server > 0,
+            "{}:\n{log}",
+            setup.name
+        );
     }
 }
 
@@ -104,9 +115,12 @@ fn idle_worker_starts_the_first_job_it_receives() {
     let mut messages = messages.expect("the test may subscribe");
     let worker = Worker::start(scratch.path(), "worker", &worker_config(nats.address(), 1));
     runtime.block_on(async {
-        let is_job_request =
-            |message: &Message| message.subject.starts_with("faceoff.free.");
-        while !messages.next().await.is_some_and(|message| is_job_request(&message)) {}
+        let is_job_request = |message: &Message| message.subject.starts_with("faceoff.free.");
+        while !messages
+            .next()
+            .await
+            .is_some_and(|message| is_job_request(&message))
+        {}
     });
     // Most of the time that a request for a job stays open.
     thread::sleep(Duration::from_secs(3));
@@ -128,7 +142,8 @@ fn idle_worker_starts_the_first_job_it_receives() {
                 }
                 "faceoff.asks.worker" => {
                     let request = serde_json::from_slice(&message.payload);
-                    if let WorkerRequest::StartJob { lease, .. } = request.expect("it is a request") {
+                    if let WorkerRequest::StartJob { lease, .. } = request.expect("it is a request")
+                    {
                         // A worker repeats a request that is not answered soon.
                         if started.last() != Some(&lease.nonce) {
                             started.push(lease.nonce);

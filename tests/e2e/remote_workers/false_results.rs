@@ -1,6 +1,9 @@
 //! False results from a remote worker: it takes jobs like any other worker and reports results that it never computed.
 
-use super::{ReferenceRun, EPISODES, local_config, server_config, queue_evaluation, resume, start_server, worker_config};
+use super::{
+    EPISODES, ReferenceRun, local_config, queue_evaluation, resume, server_config, start_server,
+    worker_config,
+};
 use crate::{Team, commands::admin};
 use async_nats::{
     Client, HeaderMap,
@@ -35,7 +38,10 @@ impl FakeWorker {
 
     async fn request(&self, request: &Value) -> Value {
         let payload = serde_json::to_vec(request).expect("it is JSON");
-        let answer = self.client.request("faceoff.asks.liar", payload.into()).await;
+        let answer = self
+            .client
+            .request("faceoff.asks.liar", payload.into())
+            .await;
         let answer = answer.expect("the server answers");
         serde_json::from_slice(&answer.payload).expect("an answer is JSON")
     }
@@ -101,7 +107,9 @@ impl FakeWorker {
         *success = json!(!success.as_bool().unwrap_or_default());
         let mut forged = result.clone();
         forged["lease"]["nonce"] = json!("00000000-0000-4000-8000-000000000000");
-        let nonce = result["lease"]["nonce"].as_str().expect("a lease has a nonce");
+        let nonce = result["lease"]["nonce"]
+            .as_str()
+            .expect("a lease has a nonce");
         for (subject, message, variant) in [
             ("faceoff.outcomes.honest", result, "again"),
             ("faceoff.outcomes.thief", result, "as a thief"),
@@ -214,7 +222,12 @@ impl OtherSeasonResult {
 
 /// Uploads a file of a job as its worker does.
 fn upload_file(job: &Value, name: &str, bytes: Vec<u8>) {
-    let text = |field: &str| job[field].as_str().expect("a job has this field").to_owned();
+    let text = |field: &str| {
+        job[field]
+            .as_str()
+            .expect("a job has this field")
+            .to_owned()
+    };
     let client = http().build().expect("a client needs nothing");
     let stored = client
         .put(format!("{}/work/files/{name}", text("files")))
@@ -232,7 +245,11 @@ fn recording_of_other_episodes_is_rejected_and_worker_banned() {
     let other_result = OtherSeasonResult::compute(&scratch.path().join("another"));
     let nats = Nats::start(&scratch.path().join("nats"));
     let files = Relay::start();
-    let server = start_server(&reference_run, &server_config(&nats, files.address()), &files);
+    let server = start_server(
+        &reference_run,
+        &server_config(&nats, files.address()),
+        &files,
+    );
     resume(&server);
     let runtime = Runtime::new().expect("a runtime starts");
     let fake = runtime.block_on(FakeWorker::connect(&nats));
@@ -267,7 +284,11 @@ fn missing_result_message_requeues_job() {
     let reference_run = ReferenceRun::prepare(scratch.path());
     let nats = Nats::start(&scratch.path().join("nats"));
     let files = Relay::start();
-    let server = start_server(&reference_run, &server_config(&nats, files.address()), &files);
+    let server = start_server(
+        &reference_run,
+        &server_config(&nats, files.address()),
+        &files,
+    );
     resume(&server);
     let runtime = Runtime::new().expect("a runtime starts");
     let fake = runtime.block_on(FakeWorker::connect(&nats));
@@ -289,7 +310,11 @@ fn repeated_late_stolen_and_forged_results_change_nothing() {
     let reference_run = ReferenceRun::prepare(scratch.path());
     let nats = Nats::start(&scratch.path().join("nats"));
     let files = Relay::start();
-    let server = start_server(&reference_run, &server_config(&nats, files.address()), &files);
+    let server = start_server(
+        &reference_run,
+        &server_config(&nats, files.address()),
+        &files,
+    );
     let runtime = Runtime::new().expect("a runtime starts");
     let (fake, mut messages) = runtime.block_on(async {
         let client = async_nats::connect(nats.url()).await;
@@ -312,7 +337,8 @@ fn repeated_late_stolen_and_forged_results_change_nothing() {
         while seen.len() < shards {
             let message = messages.next().await.expect("NATS is there");
             let result: Value = serde_json::from_slice(&message.payload).expect("it is JSON");
-            if result["outcome"]["kind"] != "done" || !seen.insert(result["lease"]["nonce"].to_string())
+            if result["outcome"]["kind"] != "done"
+                || !seen.insert(result["lease"]["nonce"].to_string())
             {
                 continue;
             }
@@ -332,7 +358,13 @@ fn repeated_late_stolen_and_forged_results_change_nothing() {
         let jetstream = jetstream::new(fake.client.clone());
         loop {
             let stream = jetstream.get_stream("faceoff-outcomes").await;
-            if stream.expect("the stream exists").cached_info().state.messages == 0 {
+            if stream
+                .expect("the stream exists")
+                .cached_info()
+                .state
+                .messages
+                == 0
+            {
                 return;
             }
             // NATS sends no event when a stream is empty.
@@ -340,7 +372,8 @@ fn repeated_late_stolen_and_forged_results_change_nothing() {
         }
     });
     let log = server.log();
-    let counts = |line: &str| line.contains("result accepted job=") && line.contains("worker=thief");
+    let counts =
+        |line: &str| line.contains("result accepted job=") && line.contains("worker=thief");
     assert!(!log.lines().any(counts), "{log}");
     assert!(log.contains("over already"), "{log}");
     let view = server.get("/api/v1/workers", Some(&server.admin_token));

@@ -25,7 +25,8 @@ fn worker_without_required_runtime_gets_no_jobs() {
         (runtime, "would give jobs to a worker \"asks\""),
     ] {
         let file = scratch.path().join("asks.toml");
-        fs::write(&file, worker_config(nats.address(), 1) + runtimes).expect("a file can be written");
+        fs::write(&file, worker_config(nats.address(), 1) + runtimes)
+            .expect("a file can be written");
         let doctor = Command::new(program("faceoff"))
             .args(["doctor", "--name", "asks", "--config"])
             .arg(&file)
@@ -67,7 +68,11 @@ fn worker_without_required_runtime_gets_no_jobs() {
     let finished = team.wait_until_finished(&server, &evaluation);
     assert_eq!(finished["state"], "finished", "{finished:#}");
     assert!(compatible.log().contains("committed"));
-    assert!(!compatible.log().contains("lease lost"), "{}", compatible.log());
+    assert!(
+        !compatible.log().contains("lease lost"),
+        "{}",
+        compatible.log()
+    );
     let problems = other
         .get("/api/v1/workers", Some(&other.admin_token))
         .json::<Value>();
@@ -83,9 +88,7 @@ fn worker_without_required_runtime_gets_no_jobs() {
     let view: Value = view.json().expect("the API speaks JSON");
     let labels = json!(["lab 3", "rack"]);
     let workers = view["workers"].as_array().expect("workers are a list");
-    let compatible = workers
-        .iter()
-        .find(|worker| worker["name"] == "compatible");
+    let compatible = workers.iter().find(|worker| worker["name"] == "compatible");
     assert_eq!(
         compatible.map(|worker| &worker["labels"]),
         Some(&labels),

@@ -1,7 +1,7 @@
 //! Interruptions of remote workers: cut and slow links, full disks, wrong clocks. Each run ends with the result of a local
 //! slot, and no agent gets a fault.
 
-use super::{ReferenceRun, server_config, resume, start_server, worker_config, wait_for_workers};
+use super::{ReferenceRun, resume, server_config, start_server, wait_for_workers, worker_config};
 use crate::{dataset, entry};
 use faceoff_tests::{
     nats::Nats,
@@ -24,8 +24,16 @@ fn disconnected_worker_stops_and_another_gets_its_job() {
     let nats = Nats::start(&scratch.path().join("nats"));
     let (files, link) = (Relay::start(), Relay::start());
     link.set_target(nats.address());
-    let server = start_server(&reference_run, &server_config(&nats, files.address()), &files);
-    let disconnected = Worker::start(scratch.path(), "disconnected", &worker_config(link.address(), 1));
+    let server = start_server(
+        &reference_run,
+        &server_config(&nats, files.address()),
+        &files,
+    );
+    let disconnected = Worker::start(
+        scratch.path(),
+        "disconnected",
+        &worker_config(link.address(), 1),
+    );
     resume(&server);
     disconnected.wait_for_log("committed", 1);
     disconnected.wait_for_log("started job=", 2);
@@ -44,7 +52,11 @@ fn slow_and_breaking_links_lose_no_result() {
     let reference_run = ReferenceRun::prepare(scratch.path());
     let nats = Nats::start(&scratch.path().join("nats"));
     let files = Relay::start();
-    let server = start_server(&reference_run, &server_config(&nats, files.address()), &files);
+    let server = start_server(
+        &reference_run,
+        &server_config(&nats, files.address()),
+        &files,
+    );
     let links = [Relay::start(), Relay::start()];
     for (seed, link) in (0..).zip(&links) {
         link.set_target(nats.address());
@@ -63,12 +75,19 @@ fn slow_and_breaking_links_lose_no_result() {
     files.set_delay(Duration::from_millis(200));
     let workers = [0, 1].map(|index: usize| {
         let name = format!("worker-{index}");
-        Worker::start(scratch.path(), &name, &worker_config(links[index].address(), 1))
+        Worker::start(
+            scratch.path(),
+            &name,
+            &worker_config(links[index].address(), 1),
+        )
     });
     resume(&server);
     reference_run.assert_equal_result(&server);
     for link in links.iter().chain([&files]) {
-        assert!(link.broken_connections() > 0, "a link had no broken connection");
+        assert!(
+            link.broken_connections() > 0,
+            "a link had no broken connection"
+        );
     }
     for worker in workers {
         let log = worker.log();
@@ -82,7 +101,11 @@ fn worker_with_full_disk_releases_jobs_until_it_has_space() {
     let reference_run = ReferenceRun::prepare(scratch.path());
     let nats = Nats::start(&scratch.path().join("nats"));
     let files = Relay::start();
-    let server = start_server(&reference_run, &server_config(&nats, files.address()), &files);
+    let server = start_server(
+        &reference_run,
+        &server_config(&nats, files.address()),
+        &files,
+    );
     let disk = MountedDisk::at(&scratch.path().join("full/scratch"), SCRATCH_BYTES);
     let mut command = disk.namespace_command();
     command.arg(program("faceoff"));
@@ -99,7 +122,10 @@ fn worker_with_full_disk_releases_jobs_until_it_has_space() {
     drop(filled);
     full.wait_for_log("committed", 1);
 
-    let (evaluation, token) = (reference_run.evaluation.clone(), reference_run.team.token.clone());
+    let (evaluation, token) = (
+        reference_run.evaluation.clone(),
+        reference_run.team.token.clone(),
+    );
     reference_run.assert_equal_result(&server);
     let shards = entry(
         &mut dataset(&server, &evaluation, &token),
@@ -130,7 +156,11 @@ fn workers_with_wrong_clocks_run_jobs_normally() {
     let reference_run = ReferenceRun::prepare(scratch.path());
     let nats = Nats::start(&scratch.path().join("nats"));
     let files = Relay::start();
-    let server = start_server(&reference_run, &server_config(&nats, files.address()), &files);
+    let server = start_server(
+        &reference_run,
+        &server_config(&nats, files.address()),
+        &files,
+    );
     let began = Timestamp::now();
     let workers = [("early", "-3600"), ("late", "+3600")].map(|(name, offset)| {
         let mut command = Command::new(program("faceoff"));
@@ -160,6 +190,9 @@ fn workers_with_wrong_clocks_run_jobs_normally() {
         let time = log.split_whitespace().next().expect("the log has a line");
         let time: Timestamp = time.parse().expect("a log line begins with its time");
         let off = (time.as_second() - began.as_second()) as f64 / 3600.0;
-        assert!((off - hours).abs() < 0.5, "its clock is not {hours} h off:\n{log}");
+        assert!(
+            (off - hours).abs() < 0.5,
+            "its clock is not {hours} h off:\n{log}"
+        );
     }
 }

@@ -1,6 +1,6 @@
 //! Workers, server, NATS and links are killed or cut at random moments.
 
-use super::{ReferenceRun, server_config, many_shards, resume, worker_config};
+use super::{ReferenceRun, many_shards, resume, server_config, worker_config};
 use crate::kills::draw;
 use faceoff_tests::{nats::Nats, relay::Relay, server::Server, worker::Worker};
 use std::time::Duration;
@@ -22,10 +22,7 @@ enum Fault {
 }
 
 #[test]
-#[expect(
-    clippy::print_stdout,
-    reason = "the seed repeats a failed run"
-)]
+#[expect(clippy::print_stdout, reason = "the seed repeats a failed run")]
 fn random_kills_and_cut_links_lose_and_repeat_no_result() {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
     let reference_run = ReferenceRun::prepare_many_shards(scratch.path());
@@ -65,11 +62,15 @@ fn random_kills_and_cut_links_lose_and_repeat_no_result() {
     .map(|fault| (next_draw(), fault));
     faults.sort_by(|(a, _), (b, _)| a.total_cmp(b));
     for (number, (_, fault)) in (1..).zip(faults) {
-        let _ = server.poll(&reference_run.evaluation, &reference_run.team.token, |view| {
-            let done = view["progress"]["episodes_done"].as_u64();
-            // A finished evaluation has no progress.
-            done.is_none_or(|done| done >= SHARDS_BETWEEN * number)
-        });
+        let _ = server.poll(
+            &reference_run.evaluation,
+            &reference_run.team.token,
+            |view| {
+                let done = view["progress"]["episodes_done"].as_u64();
+                // A finished evaluation has no progress.
+                done.is_none_or(|done| done >= SHARDS_BETWEEN * number)
+            },
+        );
         std::thread::sleep(Duration::from_secs_f64(next_draw()));
         match fault {
             Fault::Worker => {

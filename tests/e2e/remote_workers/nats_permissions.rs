@@ -43,15 +43,21 @@ fn shipped_permissions_allow_only_what_workers_need() {
         .replace("KEY_OF_RACK_1", &make_key(&worker_key));
     let nats = Nats::start_with_config(&scratch.path().join("nats"), &config);
     let files = Relay::start();
-    let with_key = |config: String, key: &Path| format!("{config}nkey_file = \"{}\"\n", key.display());
+    let with_key =
+        |config: String, key: &Path| format!("{config}nkey_file = \"{}\"\n", key.display());
     let config = with_key(server_config(&nats, files.address()), &server_key);
     let server = Server::start(&scratch.path().join("data"), &config);
     files.set_target(server.address().into());
     let team = Team::create(&server, "Alpha");
     let submission = team.submit(&server, &repository().join("agents/hold"));
     let evaluation = team.evaluate(&server, &submission);
-    let worker =
-        |name, key: &Path| Worker::start(scratch.path(), name, &with_key(worker_config(nats.address(), 1), key));
+    let worker = |name, key: &Path| {
+        Worker::start(
+            scratch.path(),
+            name,
+            &with_key(worker_config(nats.address(), 1), key),
+        )
+    };
     let _ = make_key(&unknown_key);
     let unknown = worker("unknown", &unknown_key);
     unknown.wait_for_log("authorization violation", 1);

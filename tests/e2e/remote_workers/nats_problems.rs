@@ -1,7 +1,10 @@
 //! Problems of NATS: full streams, payload limits, TLS, changed streams, a missing server. Each is reported, and jobs
 //! continue once it is fixed.
 
-use super::{COMMON, ReferenceRun, server_config, resume, start_server, with_episodes, worker_config, wait_for_workers};
+use super::{
+    COMMON, ReferenceRun, resume, server_config, start_server, wait_for_workers, with_episodes,
+    worker_config,
+};
 use crate::Team;
 use async_nats::jetstream::{
     self,
@@ -12,7 +15,7 @@ use faceoff_tests::{
     nats::Nats,
     relay::Relay,
     repository,
-    server::{TIMEOUT, Server},
+    server::{Server, TIMEOUT},
     worker::Worker,
 };
 use rcgen::{BasicConstraints, CertificateParams, CertifiedIssuer, DnType, IsCa, KeyPair};
@@ -175,7 +178,8 @@ fn oversized_result_waits_until_limit_is_raised() {
     let mut nats = Nats::start_with_config(&scratch.path().join("nats"), "max_payload: 8192\n");
     let files = Relay::start();
     // The lease is long enough for slow machines.
-    let config = with_large_result(&server_config(&nats, files.address())).replace("lease_s = 10", "lease_s = 3600");
+    let config = with_large_result(&server_config(&nats, files.address()))
+        .replace("lease_s = 10", "lease_s = 3600");
     let server = Server::start(&scratch.path().join("data"), &config);
     files.set_target(server.address().into());
     let team = Team::create(&server, "Alpha");
@@ -237,8 +241,10 @@ fn nats_certificate_is_verified_with_configured_authority() {
         format!("{config}ca_file = {authority:?}\n")
     };
     let refused = "NATS cannot be reached: its certificate is not trusted";
-    let server_config_with = |authority: &Path| with_authority(server_config(&nats, files.address()), authority);
-    let worker_config_with = |authority: &Path| with_authority(worker_config(nats.address(), 1), authority);
+    let server_config_with =
+        |authority: &Path| with_authority(server_config(&nats, files.address()), authority);
+    let worker_config_with =
+        |authority: &Path| with_authority(worker_config(nats.address(), 1), authority);
 
     let server = Server::start(&scratch.path().join("other"), &server_config_with(&wrong));
     server.wait_for_log(refused, 1);
@@ -264,8 +270,8 @@ fn stream_with_other_settings_is_reported_then_recreated() {
     let config = server_config(&nats, files.address());
     let server = start_server(&reference_run, &config, &files);
     let administrator = Administrator::connect(&nats);
-    let streams =
-        ["faceoff-orders", "faceoff-outcomes"].map(|name| (name, administrator.stream_config(name)));
+    let streams = ["faceoff-orders", "faceoff-outcomes"]
+        .map(|name| (name, administrator.stream_config(name)));
     server.kill();
     for (name, stream) in streams {
         administrator.delete(name);
@@ -283,7 +289,11 @@ fn stream_with_other_settings_is_reported_then_recreated() {
         server.wait_for_log(&message, 1);
         wait_for_problem(&server, &message);
         let log = server.log();
-        assert_eq!(log.matches(&message).count(), 1, "it is logged once:\n{log}");
+        assert_eq!(
+            log.matches(&message).count(),
+            1,
+            "it is logged once:\n{log}"
+        );
     }
     assert!(!worker.log().contains("started job="), "{}", worker.log());
     for name in ["faceoff-orders", "faceoff-outcomes"] {
@@ -326,7 +336,13 @@ fn server_without_nats_starts_and_continues_once_connected() {
     assert_eq!(finished["state"], "finished", "{finished:#}");
     // A worker with --drain-after-idle stops when no job is left.
     let options = ["--drain-after-idle", "1s"];
-    Worker::start_with_arguments(scratch.path(), "idle", &worker_config(link.address(), 1), &options).wait_for_exit();
+    Worker::start_with_arguments(
+        scratch.path(),
+        "idle",
+        &worker_config(link.address(), 1),
+        &options,
+    )
+    .wait_for_exit();
     let workers = server.poll("/api/v1/workers", &server.admin_token, |view| {
         view["problems"] == json!([])
     });

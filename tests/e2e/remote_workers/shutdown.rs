@@ -1,7 +1,7 @@
 //! Remote workers that are stopped (SIGTERM) during a job: the job is released at once and counts as no failure. Leases
 //! last an hour here, so other workers get the job only if it is released.
 
-use super::{ReferenceRun, server_config, resume, with_episodes, worker_config};
+use super::{ReferenceRun, resume, server_config, with_episodes, worker_config};
 use crate::{Team, dataset, entry, evaluation_path, start_day};
 use faceoff_tests::{bundle, nats::Nats, relay::Relay, repository, server::Server, worker::Worker};
 use serde_json::json;
@@ -36,7 +36,10 @@ fn job_waiting_for_bundle_is_released_and_rerun_after_restart() {
 
     files.set_target(server.address().into());
     let restarted = Worker::start(scratch.path(), "worker", &config);
-    let (evaluation, token) = (reference_run.evaluation.clone(), reference_run.team.token.clone());
+    let (evaluation, token) = (
+        reference_run.evaluation.clone(),
+        reference_run.team.token.clone(),
+    );
     reference_run.assert_equal_result(&server);
     restarted.stop();
     let shards = entry(
@@ -58,8 +61,12 @@ fn running_job_is_released_and_started_by_another_worker() {
     let nats = Nats::start(&scratch.path().join("nats"));
     let files = Relay::start();
     // One shard of one task.
-    let config = with_episodes(&with_hour_leases(&server_config(&nats, files.address())), 40, 40)
-        .replace("[evaluation]", "[evaluation]\ntasks = [\"hit\"]");
+    let config = with_episodes(
+        &with_hour_leases(&server_config(&nats, files.address())),
+        40,
+        40,
+    )
+    .replace("[evaluation]", "[evaluation]\ntasks = [\"hit\"]");
     let server = Server::start(&scratch.path().join("data"), &config);
     files.set_target(server.address().into());
     // The agent hangs after 3000 control steps: validation runs are shorter, the shard is longer.
@@ -109,8 +116,11 @@ fn cancelled_job_stops_on_worker_and_frees_its_slot() {
     assert_eq!(slow_evaluation["state"], "valid", "{slow_evaluation:#}");
     let worker = Worker::start(scratch.path(), "worker", &worker_config(nats.address(), 1));
     let day = start_day(&server);
-    let [slow_evaluation, quick_evaluation] = [&slow_evaluation, &quick_evaluation].map(|submission| evaluation_path(&day, submission));
-    let _ = server.poll(&slow_evaluation, &slow.token, |answer| answer["state"] == "running");
+    let [slow_evaluation, quick_evaluation] =
+        [&slow_evaluation, &quick_evaluation].map(|submission| evaluation_path(&day, submission));
+    let _ = server.poll(&slow_evaluation, &slow.token, |answer| {
+        answer["state"] == "running"
+    });
     let cancelled = server.post(
         &format!("{slow_evaluation}/cancel"),
         &server.admin_token,

@@ -35,7 +35,7 @@ use std::{
     thread,
     time::{Duration, Instant},
 };
-use stub::{Plan, Workload, Stub, Measurements};
+use stub::{Measurements, Plan, Stub, Workload};
 use tokio::{runtime::Runtime, task::JoinSet};
 use usage::{Threads, Usage};
 

@@ -12,8 +12,8 @@ use faceoff_types::{
     Violations,
 };
 use faceoff_wire::{
-    remote::{WorkerResponse, WorkerRequest, WorkerCapabilities, JobEnd, RemoteJob, ResultMessage},
-    job::{JobPayload, OutputFiles, Lease, ShardSpec, JobReport},
+    job::{JobPayload, JobReport, Lease, OutputFiles, ShardSpec},
+    remote::{JobEnd, RemoteJob, ResultMessage, WorkerCapabilities, WorkerRequest, WorkerResponse},
 };
 use futures::StreamExt as _;
 use reqwest::{StatusCode, header};
@@ -194,7 +194,11 @@ impl Stub {
     }
 
     /// Runs a shard and sends its result. Returns false if the lease was lost.
-    async fn run_shard(&mut self, plan: &Plan, measurements: &mut Measurements) -> anyhow::Result<bool> {
+    async fn run_shard(
+        &mut self,
+        plan: &Plan,
+        measurements: &mut Measurements,
+    ) -> anyhow::Result<bool> {
         let free = Instant::now();
         let job = self.next_job(&mut measurements.retries).await?;
         let started = Instant::now();
@@ -254,7 +258,10 @@ impl Stub {
     }
 
     async fn request_job(&self) -> anyhow::Result<Option<StartedJob>> {
-        match self.request(&WorkerRequest::Register(self.capabilities.clone())).await? {
+        match self
+            .request(&WorkerRequest::Register(self.capabilities.clone()))
+            .await?
+        {
             WorkerResponse::Accepted => {}
             other => anyhow::bail!("the server refuses this worker: {other:?}"),
         }
@@ -303,10 +310,7 @@ impl Stub {
             output: OutputFiles::Recording(recording),
         } = job.payload
         else {
-            anyhow::bail!(
-                "expected a shard with a recording, got {}",
-                job.payload
-            );
+            anyhow::bail!("expected a shard with a recording, got {}", job.payload);
         };
         Ok(Some(StartedJob {
             lease,
@@ -349,9 +353,10 @@ impl Stub {
                 _ => Bytes::from_static(&[0; SMALL_BYTES]),
             };
             loop {
-                let request = self.http.put(format!("{}/work/files/{name}", job.files_url));
-                let request =
-                    request.header(header::AUTHORIZATION, format!("Grant {}", job.grant));
+                let request = self
+                    .http
+                    .put(format!("{}/work/files/{name}", job.files_url));
+                let request = request.header(header::AUTHORIZATION, format!("Grant {}", job.grant));
                 match request.body(body.clone()).send().await {
                     Ok(response) if response.status() == StatusCode::FORBIDDEN => return Ok(None),
                     Ok(response) if !is_busy(response.status()) => {

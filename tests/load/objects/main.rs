@@ -61,7 +61,11 @@ async fn measure(nats: &Nats, folder: &Path) -> anyhow::Result<()> {
 }
 
 /// Measures all files over links with this delay.
-async fn measure_link(nats: SocketAddr, http_server: SocketAddr, delay: Duration) -> anyhow::Result<Value> {
+async fn measure_link(
+    nats: SocketAddr,
+    http_server: SocketAddr,
+    delay: Duration,
+) -> anyhow::Result<Value> {
     let files = FileClient::at(link::forward(http_server, delay).await?)?;
     let nats = link::forward(nats, delay).await?;
     let client = async_nats::connect(format!("nats://{nats}")).await?;
@@ -214,7 +218,9 @@ async fn compare(
 
 async fn seconds<T>(work: impl Future<Output = anyhow::Result<T>>) -> anyhow::Result<(T, f64)> {
     let started = Instant::now();
-    let done = timeout(TRANSFER_TIMEOUT, work).await.context("the transfer exceeded its time limit")??;
+    let done = timeout(TRANSFER_TIMEOUT, work)
+        .await
+        .context("the transfer exceeded its time limit")??;
     Ok((done, started.elapsed().as_secs_f64()))
 }
 

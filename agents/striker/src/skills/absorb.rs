@@ -234,7 +234,9 @@ fn interception_with_cost(scene: &Scene<'_>, left: f64) -> Option<(Interception,
         time: left,
     };
     let effort = scene.mallet.effort(&target, scene.field);
-    let outside = (puck.pos.x - INTERCEPT_X.1).max(INTERCEPT_X.0 - puck.pos.x).max(0.0);
+    let outside = (puck.pos.x - INTERCEPT_X.1)
+        .max(INTERCEPT_X.0 - puck.pos.x)
+        .max(0.0);
     let cost = 20.0 * outside
         + 0.3 * effort.acceleration
         + 20.0 * (effort.speed - 1.2).max(0.0)

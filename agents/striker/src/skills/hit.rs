@@ -13,8 +13,10 @@ use crate::arm::Posture;
 use crate::field::Vec2;
 use crate::keeper::Keeper;
 use crate::motion::{Pace, Target};
-use crate::scene::{MalletCommand, Scene, waypoint, lean_side};
-use plan::{Plan, NUDGE_THRESHOLD, NUDGE_THRESHOLD_IN_GAME, replan, best_nudge, best_plan, refresh};
+use crate::scene::{MalletCommand, Scene, lean_side, waypoint};
+use plan::{
+    NUDGE_THRESHOLD, NUDGE_THRESHOLD_IN_GAME, Plan, best_nudge, best_plan, refresh, replan,
+};
 
 /// A plan is replaced only by one whose chance of a goal is higher by this much.
 const SWITCH_MARGIN: f64 = 0.06;
@@ -186,7 +188,13 @@ impl Hit {
 
     /// Continues through the contact at full speed, then stops on a fixed path, so that the
     /// deceleration is even.
-    fn follow(&mut self, scene: &Scene<'_>, through: f64, stop: Option<Stop>, rest: f64) -> MalletCommand {
+    fn follow(
+        &mut self,
+        scene: &Scene<'_>,
+        through: f64,
+        stop: Option<Stop>,
+        rest: f64,
+    ) -> MalletCommand {
         let posture = Posture::Strike(lean_side(scene.mallet.pos));
         if scene.time < through {
             return MalletCommand::coast(scene, scene.mallet.vel, posture);

@@ -74,7 +74,12 @@ impl Prepare {
         }
     }
 
-    fn search(&mut self, scene: &Scene<'_>, next: usize, mut best: Option<Strike>) -> MalletCommand {
+    fn search(
+        &mut self,
+        scene: &Scene<'_>,
+        next: usize,
+        mut best: Option<Strike>,
+    ) -> MalletCommand {
         let puck = &scene.puck;
         let moving = puck.vel.norm() > CALM_PUCK || scene.puck_speed_deviation.norm() > 0.05;
         if moving || is_prepared(puck) {

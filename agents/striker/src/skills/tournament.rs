@@ -50,7 +50,11 @@ impl Tournament {
             Mode::Prepare => self.prepare.is_committed(),
             Mode::Wait | Mode::Defend => false,
         };
-        let next_mode = if is_busy { self.mode } else { self.choose(scene) };
+        let next_mode = if is_busy {
+            self.mode
+        } else {
+            self.choose(scene)
+        };
         if next_mode != self.mode {
             self.mode = next_mode;
             self.mode_since = scene.time;

@@ -1,6 +1,6 @@
 //! Queries of boards and of their history.
 
-use faceoff_types::{DivisionName, StageId, CountingResult, Task};
+use faceoff_types::{CountingResult, DivisionName, StageId, Task};
 use jiff::civil::Date;
 use serde::{Deserialize, Serialize};
 use utoipa::{IntoParams, ToSchema};

@@ -7,7 +7,10 @@ pub(super) fn deserialize_some<'de, D: Deserializer<'de>, T: Deserialize<'de>>(
     Option::deserialize(deserializer).map(Some)
 }
 
-#[expect(clippy::option_option, reason = "null differs from a field that is left out")]
+#[expect(
+    clippy::option_option,
+    reason = "null differs from a field that is left out"
+)]
 pub(super) fn serialize_option<S: Serializer, T: Serialize>(
     value: &Option<Option<T>>,
     serializer: S,

@@ -1,8 +1,8 @@
 //! Requests about tournaments and their games.
 
 use super::{
-    merge_patch::MergePatch,
     double_option::{deserialize_some, serialize_option},
+    merge_patch::MergePatch,
 };
 use faceoff_types::{
     DepartureKind, RoundNumber, SubmissionId, TeamName, TournamentRules, TournamentSettings,

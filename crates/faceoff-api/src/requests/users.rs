@@ -1,7 +1,7 @@
 //! Requests about users, teams, tokens, invitations, terms and announcements.
 
 use super::double_option::{deserialize_some, serialize_option};
-use faceoff_types::{DivisionName, UserId, UserName, TeamId, TeamName};
+use faceoff_types::{DivisionName, TeamId, TeamName, UserId, UserName};
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;

@@ -1,7 +1,7 @@
 //! Baselines on a board: reference agents of the organisers, shown unranked.
 
 use crate::views::task::TaskView;
-use faceoff_types::{deprecated_names, EvaluationId, Profile, Seed, Task, TeamId, TeamName, Tier};
+use faceoff_types::{EvaluationId, Profile, Seed, Task, TeamId, TeamName, Tier, deprecated_names};
 use jiff::{Timestamp, civil::Date};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;

@@ -1,12 +1,12 @@
 //! Boards: ranks of the teams, and their statistical uncertainty.
 
 use crate::views::{
-    baseline::BaselineRow, sign_off::SignOffView, ruling::RulingView, task::TaskView,
+    baseline::BaselineRow, ruling::RulingView, sign_off::SignOffView, task::TaskView,
     team::TeamView,
 };
-use faceoff_types::{deprecated_names, 
-    DivisionName, EvaluationId, PerturbationSettings, Profile, Seed, StageId, StageName, CountingResult,
-    Task, TaskWeights, TeamId, TeamName, Tier, TierBounds,
+use faceoff_types::{
+    CountingResult, DivisionName, EvaluationId, PerturbationSettings, Profile, Seed, StageId,
+    StageName, Task, TaskWeights, TeamId, TeamName, Tier, TierBounds, deprecated_names,
 };
 use jiff::{Timestamp, civil::Date};
 use serde::{Deserialize, Serialize};

@@ -1,6 +1,6 @@
 //! Paired comparison of two evaluations on the same episodes.
 
-use faceoff_scoring::{OverallComparison, TaskComparison, SolvedEpisodes};
+use faceoff_scoring::{OverallComparison, SolvedEpisodes, TaskComparison};
 use faceoff_types::{EvaluationId, Profile, Task, TeamName};
 use jiff::civil::Date;
 use serde::{Deserialize, Serialize};

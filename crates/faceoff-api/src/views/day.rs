@@ -1,7 +1,7 @@
 //! An evaluation day after its cutoff, and the next cutoff.
 
 use crate::views::{evaluation::EvaluationView, exclusion::ExcludedTeam, team::TeamView};
-use faceoff_types::{deprecated_names, StageId, StageName, Zone};
+use faceoff_types::{StageId, StageName, Zone, deprecated_names};
 use jiff::{Timestamp, civil::Date};
 use serde::{Deserialize, Serialize};
 use std::fmt;

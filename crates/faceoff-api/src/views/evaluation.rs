@@ -2,7 +2,9 @@
 
 pub use crate::views::evaluation_status::{EvaluationStatus, FaultView, ResultView};
 use crate::views::{queue::QueueView, ruling::RulingView};
-use faceoff_types::{deprecated_names, EvaluationId, Profile, StageId, SubmissionId, Task, TeamId, TeamName};
+use faceoff_types::{
+    EvaluationId, Profile, StageId, SubmissionId, Task, TeamId, TeamName, deprecated_names,
+};
 use jiff::{Timestamp, civil::Date};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;

@@ -73,8 +73,7 @@ pub enum EvaluationStatus {
 
 impl EvaluationStatus {
     /// What happens next to a finished evaluation of a released day.
-    pub const DONE: &'static str =
-        "Done. The team can download the dataset and verify the score.";
+    pub const DONE: &'static str = "Done. The team can download the dataset and verify the score.";
 
     /// What happens next to an evaluation, in words.
     pub const fn next(&self, released: bool, voided: bool) -> &'static str {
@@ -277,12 +276,7 @@ mod tests {
             (&agent_failed, true, false, "what to correct"),
             (&platform_failed, false, false, "twice automatically"),
             (&platform_failed, true, false, "can repeat it"),
-            (
-                &not_played,
-                true,
-                false,
-                "earlier day stays on the board",
-            ),
+            (&not_played, true, false, "earlier day stays on the board"),
             (&cancelled, true, false, "does not count"),
         ] {
             let text = status.next(released, voided);

@@ -1,9 +1,9 @@
 //! Games between two submissions: purpose, state and result.
 
 use faceoff_scoring::tournament::{Forfeit, ResultReason};
-use faceoff_types::{deprecated_names, 
+use faceoff_types::{
     ComputationTimeSummary, GameId, RoundNumber, Seed, StageName, SubmissionId, TeamId, TeamName,
-    Tier, TournamentId, ViolationCounts,
+    Tier, TournamentId, ViolationCounts, deprecated_names,
 };
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};

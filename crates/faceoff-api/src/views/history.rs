@@ -2,7 +2,7 @@
 
 use crate::views::{ruling::RulingView, task::TaskView};
 use faceoff_types::{
-    DivisionName, EvaluationId, StageId, StageName, CountingResult, Task, TeamId, TeamName, Tier,
+    CountingResult, DivisionName, EvaluationId, StageId, StageName, Task, TeamId, TeamName, Tier,
 };
 use jiff::{Timestamp, civil::Date};
 use serde::{Deserialize, Serialize};

@@ -1,7 +1,7 @@
 //! Invitations and registrations.
 
 use crate::requests::InvitedRole;
-use faceoff_types::{DivisionName, InvitationId, UserId, RegistrationId, TeamId, TeamName};
+use faceoff_types::{DivisionName, InvitationId, RegistrationId, TeamId, TeamName, UserId};
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;

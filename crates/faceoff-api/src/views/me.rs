@@ -1,7 +1,7 @@
 //! A team's own status: today's evaluation and the submission for the next cutoff.
 
 use crate::views::{day::NextCutoff, exclusion::StageExclusion, queue::QueueView, team::TeamView};
-use faceoff_types::{deprecated_names, EvaluationId, StageId, SubmissionId};
+use faceoff_types::{EvaluationId, StageId, SubmissionId, deprecated_names};
 use jiff::civil::Date;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;

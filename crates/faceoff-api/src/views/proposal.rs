@@ -4,8 +4,9 @@ use crate::views::{
     board::BoardView,
     evaluation::{FaultView, Progress, ResultView},
 };
-use faceoff_types::{deprecated_names, 
+use faceoff_types::{
     EvaluationId, ProposalId, StageId, StageName, SubmissionId, TeamId, TeamName, Tier,
+    deprecated_names,
 };
 use jiff::{Timestamp, civil::Date};
 use serde::{Deserialize, Serialize};

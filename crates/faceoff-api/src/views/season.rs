@@ -1,7 +1,7 @@
 //! The season: its commitment, stages and days, and the seeds that are revealed.
 
 use crate::views::{archive::ArchiveView, day::NextCutoff, ruling::RulingView, stage::StageView};
-use faceoff_types::{deprecated_names, DivisionName, Seed, StageId};
+use faceoff_types::{DivisionName, Seed, StageId, deprecated_names};
 use jiff::{Timestamp, civil::Date};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;

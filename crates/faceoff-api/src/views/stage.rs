@@ -1,7 +1,9 @@
 //! Stages: opening times, rules and the next cutoff.
 
-use crate::views::{capacity::DayLoad, day::NextCutoff, sign_off::SignOffView, ruling::RulingView};
-use faceoff_types::{deprecated_names, Retention, StageId, StageName, StageRules, StageSettings, Zone};
+use crate::views::{capacity::DayLoad, day::NextCutoff, ruling::RulingView, sign_off::SignOffView};
+use faceoff_types::{
+    Retention, StageId, StageName, StageRules, StageSettings, Zone, deprecated_names,
+};
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;

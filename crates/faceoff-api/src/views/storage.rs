@@ -1,6 +1,6 @@
 //! Disk usage and quota of teams.
 
-use faceoff_types::{deprecated_names, TeamId, TeamName};
+use faceoff_types::{TeamId, TeamName, deprecated_names};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 

@@ -1,7 +1,7 @@
 //! Submissions and the verdicts of their validation runs.
 
 use crate::views::{exclusion::StageExclusion, queue::QueueView, ruling::RulingView};
-use faceoff_types::{deprecated_names, ValidationTiming, SubmissionId, TeamId};
+use faceoff_types::{SubmissionId, TeamId, ValidationTiming, deprecated_names};
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;

@@ -1,6 +1,6 @@
 //! Tokens and sessions, without their secrets.
 
-use faceoff_types::{UserId, TeamId, TokenId};
+use faceoff_types::{TeamId, TokenId, UserId};
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;

@@ -2,9 +2,9 @@
 
 use crate::views::ruling::RulingView;
 use faceoff_scoring::tournament::schedule::Table;
-use faceoff_types::{deprecated_names, 
+use faceoff_types::{
     DepartureKind, RoundNumber, StageId, StageName, SubmissionId, TeamId, TeamName, TournamentId,
-    TournamentRules, TournamentSettings,
+    TournamentRules, TournamentSettings, deprecated_names,
 };
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};

@@ -1,7 +1,7 @@
 //! Users, and the calling user or API client.
 
 use crate::views::{team::TeamView, token::TokenView};
-use faceoff_types::{UserId, UserName, TeamId};
+use faceoff_types::{TeamId, UserId, UserName};
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;

@@ -1,6 +1,6 @@
 //! Webhooks, without their secrets, and their deliveries.
 
-use faceoff_types::{deprecated_names, DeliveryId, TeamId, WebhookId};
+use faceoff_types::{DeliveryId, TeamId, WebhookId, deprecated_names};
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;

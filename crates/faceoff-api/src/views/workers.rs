@@ -1,6 +1,6 @@
 //! Remote workers and their slots.
 
-use faceoff_types::{deprecated_names, EvaluationId, GameId};
+use faceoff_types::{EvaluationId, GameId, deprecated_names};
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;

@@ -99,14 +99,26 @@ fn entries_other_than_files_are_refused() {
 fn difference_from_manifest_is_refused() {
     let manifest_json = json(&manifest(vec![entry("a", b"one"), entry("b", b"two")]));
     let (a, b) = (|| file("a", b"one"), || file("b", b"two"));
-    assert_refused(&pack(&manifest_json, &[a(), file("b", b"owt")]), "has the hash");
-    assert_refused(&pack(&manifest_json, &[a(), file("b", b"more")]), "has 4 bytes");
-    assert_refused(&pack(&manifest_json, &[a()]), "ends before 1 of its files, \"b\"");
+    assert_refused(
+        &pack(&manifest_json, &[a(), file("b", b"owt")]),
+        "has the hash",
+    );
+    assert_refused(
+        &pack(&manifest_json, &[a(), file("b", b"more")]),
+        "has 4 bytes",
+    );
+    assert_refused(
+        &pack(&manifest_json, &[a()]),
+        "ends before 1 of its files, \"b\"",
+    );
     assert_refused(
         &pack(&manifest_json, &[a(), b(), file("c", b"")]),
         "does not name",
     );
-    assert_refused(&pack(&manifest_json, &[a(), a(), b()]), "or contains it twice");
+    assert_refused(
+        &pack(&manifest_json, &[a(), a(), b()]),
+        "or contains it twice",
+    );
 
     let twice = json(&manifest(vec![entry("a", b"one"), entry("a", b"one")]));
     assert_refused(&pack(&twice, &[a()]), "twice");

@@ -1,8 +1,5 @@
 //! Valid and hostile archives.
-#![expect(
-    clippy::unwrap_used,
-    reason = "helpers of tests fail by panicking"
-)]
+#![expect(clippy::unwrap_used, reason = "helpers of tests fail by panicking")]
 
 mod hostile;
 mod round_trip;

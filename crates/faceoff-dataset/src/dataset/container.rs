@@ -45,9 +45,7 @@ impl Container {
         let altered = |problem: &str| Err(DatasetError::Altered(problem.to_owned()));
         match seal::check(file)? {
             Seal::Intact => Ok(()),
-            Seal::Broken => {
-                altered("the archive's bytes do not match its seal; download it again")
-            }
+            Seal::Broken => altered("the archive's bytes do not match its seal; download it again"),
             Seal::Absent => {
                 let zip = zip.lock().unwrap_or_else(PoisonError::into_inner);
                 if zip.comment().is_empty() {

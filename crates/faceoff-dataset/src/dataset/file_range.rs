@@ -61,7 +61,9 @@ impl FileRange {
 impl Read for FileRangeReader {
     fn read(&mut self, out: &mut [u8]) -> io::Result<usize> {
         let remaining = self.range.bytes.saturating_sub(self.at);
-        let length = out.len().min(usize::try_from(remaining).unwrap_or(usize::MAX));
+        let length = out
+            .len()
+            .min(usize::try_from(remaining).unwrap_or(usize::MAX));
         let read = self
             .range
             .file

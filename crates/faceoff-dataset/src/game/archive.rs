@@ -204,7 +204,11 @@ impl ArchiveContents<'_> {
         self.add_table(RALLIES_FILE, archive)
     }
 
-    fn add_side_files(&self, side: Side, archive: &mut ArchiveWriter) -> Result<(), RecordingError> {
+    fn add_side_files(
+        &self,
+        side: Side,
+        archive: &mut ArchiveWriter,
+    ) -> Result<(), RecordingError> {
         self.add_table(steps_file(side), archive)?;
         self.add_table(entries_file(side), archive)?;
         let log = &self.logs[side.index()];

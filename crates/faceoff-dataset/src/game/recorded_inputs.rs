@@ -139,7 +139,10 @@ impl RecordedEntry {
                 return Err(at.difference("interpolation", recorded, expected));
             }
         };
-        Ok(Self { entry, step_fault: later })
+        Ok(Self {
+            entry,
+            step_fault: later,
+        })
     }
 }
 
@@ -181,7 +184,9 @@ impl RecordedResponse {
         let wrong = |expected: &str| Err(at.difference("effect", text, expected));
         match effect {
             None => wrong("in_time, late, fault or held"),
-            Some(Effect::Held) if active => wrong("in_time, late or fault: the side had no fault before"),
+            Some(Effect::Held) if active => {
+                wrong("in_time, late or fault: the side had no fault before")
+            }
             Some(Effect::Held) => Ok(Self::Held),
             Some(_) if !active => wrong("held, after its fault"),
             Some(Effect::Fault) => {
@@ -247,7 +252,11 @@ fn read_action(
     }
 }
 
-fn read_timing(steps: &RecordBatch, row: usize, at: RowLocation) -> Result<AnswerTiming, Difference> {
+fn read_timing(
+    steps: &RecordBatch,
+    row: usize,
+    at: RowLocation,
+) -> Result<AnswerTiming, Difference> {
     let [computation, host, cpu] = SIDE_TIMES;
     let needed = |name: &str| {
         read_time(steps, name, row, at)?.ok_or_else(|| at.difference(name, "nothing", "a time"))
@@ -260,7 +269,12 @@ fn read_timing(steps: &RecordBatch, row: usize, at: RowLocation) -> Result<Answe
 }
 
 /// A recorded time, s.
-fn read_time(rows: &RecordBatch, name: &str, row: usize, at: RowLocation) -> Result<Option<f64>, Difference> {
+fn read_time(
+    rows: &RecordBatch,
+    name: &str,
+    row: usize,
+    at: RowLocation,
+) -> Result<Option<f64>, Difference> {
     let column: &Int64Array = rows[name].as_primitive::<Int64Type>();
     if column.is_null(row) {
         return Ok(None);

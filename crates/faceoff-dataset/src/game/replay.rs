@@ -12,7 +12,7 @@ use crate::{
 };
 use arrow_array::{ArrayRef, RecordBatch};
 use arrow_schema::SchemaRef;
-use faceoff_episode::{Arena, FinishedGame, RunningGame, RecordError};
+use faceoff_episode::{Arena, FinishedGame, RecordError, RunningGame};
 use faceoff_types::{AgentFault, Interpolation, Side};
 
 /// Simulates a game again with its recorded inputs.
@@ -69,12 +69,16 @@ impl GameReplay {
         };
         if self.game.end().is_none() {
             let expected = "another rally: the game has not ended";
-            return Err(at(RALLIES_FILE).difference("rows", "no more", expected).into());
+            return Err(at(RALLIES_FILE)
+                .difference("rows", "no more", expected)
+                .into());
         }
         for table in &mut self.entries {
             if table.fill()? > 0 {
                 let at = at(table.name());
-                return Err(at.difference("rows", "another row", "no more rallies").into());
+                return Err(at
+                    .difference("rows", "another row", "no more rallies")
+                    .into());
             }
         }
         let [first, second] = &mut self.steps;
@@ -87,7 +91,11 @@ impl GameReplay {
         Ok(self.game.finish())
     }
 
-    fn replay_rally(&mut self, row: &RecordBatch, progress: &dyn Fn(u64)) -> Result<(), VerifyError> {
+    fn replay_rally(
+        &mut self,
+        row: &RecordBatch,
+        progress: &dyn Fn(u64),
+    ) -> Result<(), VerifyError> {
         let number = self.game.rally();
         let at = RowLocation {
             file: RALLIES_FILE,
@@ -117,7 +125,11 @@ impl GameReplay {
             let rows = &mut rows.entries[side.index()];
             let played = batch(rows.take(), rows.schema());
             let file = entries_file(side);
-            check_same(RowLocation { file, ..at }, &recorded.entries[side.index()], &played)?;
+            check_same(
+                RowLocation { file, ..at },
+                &recorded.entries[side.index()],
+                &played,
+            )?;
         }
         Ok(())
     }
@@ -151,7 +163,12 @@ impl GameReplay {
     }
 
     /// Simulates up to `most` steps of a rally and compares the resulting rows.
-    fn replay_steps(&mut self, most: usize, rally: u32, recorded: &RecordedRally) -> Result<usize, VerifyError> {
+    fn replay_steps(
+        &mut self,
+        most: usize,
+        rally: u32,
+        recorded: &RecordedRally,
+    ) -> Result<usize, VerifyError> {
         let first_step = self.game.rally_steps();
         let mut count = most;
         let [first, second] = &mut self.steps;
@@ -163,7 +180,9 @@ impl GameReplay {
                     rally,
                     step: Some(first_step),
                 };
-                return Err(at.difference("rows", "no more", "a row of this step").into());
+                return Err(at
+                    .difference("rows", "no more", "a row of this step")
+                    .into());
             }
         }
         let motion = take_rows(&mut self.motion, count);
@@ -180,7 +199,9 @@ impl GameReplay {
         }
         let earliest = compared
             .iter()
-            .filter_map(|(file, rows, played)| Some((file, compare::first_row_difference(rows, played)?)))
+            .filter_map(|(file, rows, played)| {
+                Some((file, compare::first_row_difference(rows, played)?))
+            })
             .min_by_key(|(_, cell)| cell.row);
         if let Some((file, cell)) = earliest {
             let at = RowLocation {
@@ -244,7 +265,11 @@ fn batch(columns: Vec<ArrayRef>, schema: &SchemaRef) -> RecordBatch {
     RecordBatch::try_new(schema.clone(), columns).expect("the rows are built by their own schema")
 }
 
-fn check_same(at: RowLocation, recorded: &RecordBatch, played: &RecordBatch) -> Result<(), Difference> {
+fn check_same(
+    at: RowLocation,
+    recorded: &RecordBatch,
+    played: &RecordBatch,
+) -> Result<(), Difference> {
     match compare::first_row_difference(recorded, played) {
         None => Ok(()),
         Some(cell) => Err(at.difference(&cell.field, cell.recorded, cell.expected)),

@@ -1,5 +1,5 @@
 use crate::{
-    dataset::{BATCH_ROWS, FileRange, check_footer, check_columns},
+    dataset::{BATCH_ROWS, FileRange, check_columns, check_footer},
     error::DatasetError,
 };
 use arrow_array::RecordBatch;

@@ -1,4 +1,6 @@
-use super::{archive::game_settings, files::OUTCOME_FILE, recording::GameRecording, replay::GameReplay};
+use super::{
+    archive::game_settings, files::OUTCOME_FILE, recording::GameRecording, replay::GameReplay,
+};
 use crate::{
     error::DatasetError,
     files::RESULTS_FILE,
@@ -42,7 +44,8 @@ pub fn verify_game(
         (RESULTS_FILE, json_file(&score)),
     ] {
         let expected = expected.map_err(DatasetError::unreadable(name))?;
-        if let Some(difference) = compare::json_difference(name, &recording.bytes(name)?, &expected) {
+        if let Some(difference) = compare::json_difference(name, &recording.bytes(name)?, &expected)
+        {
             return Err(difference.into());
         }
     }

@@ -13,7 +13,7 @@ use arrow_array::{
     },
 };
 use arrow_schema::{DataType, Field, Schema, SchemaRef};
-use faceoff_episode::{RallyEntry, GameStepRow, RallyRow, RallyStart};
+use faceoff_episode::{GameStepRow, RallyEntry, RallyRow, RallyStart};
 use faceoff_types::{AgentFault, Side};
 use std::sync::Arc;
 

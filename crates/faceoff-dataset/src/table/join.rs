@@ -146,7 +146,10 @@ fn rewrite(path: &Path, scratch: &Path) -> Result<fs::File, RecordingError> {
         builder.schema().clone()
     };
     let mut writer = TableWriter::new(copy, &schema)?;
-    for batch in builder.build().map_err(RecordingError::unusable(&context))? {
+    for batch in builder
+        .build()
+        .map_err(RecordingError::unusable(&context))?
+    {
         let mut batch = batch.map_err(RecordingError::unusable(&context))?;
         if lacks_host_time {
             batch = with_zero_host_time(&batch).map_err(RecordingError::unusable(&context))?;

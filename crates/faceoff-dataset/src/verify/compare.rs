@@ -19,7 +19,10 @@ pub(crate) struct CellDifference {
 
 /// The first cell, by row and then by column, that differs between `recorded` and `expected`. Columns are matched by
 /// name; rows beyond those of `expected` are not compared.
-pub(crate) fn first_row_difference(recorded: &RecordBatch, expected: &RecordBatch) -> Option<CellDifference> {
+pub(crate) fn first_row_difference(
+    recorded: &RecordBatch,
+    expected: &RecordBatch,
+) -> Option<CellDifference> {
     let schema = expected.schema();
     let mut first: Option<(usize, usize)> = None;
     for (index, field) in schema.fields().iter().enumerate() {
@@ -90,7 +93,11 @@ fn text(array: &dyn Array, row: usize) -> String {
 }
 
 /// The first difference between two JSON files, compared byte for byte.
-pub(crate) fn json_difference(file: &'static str, recorded: &[u8], expected: &[u8]) -> Option<Difference> {
+pub(crate) fn json_difference(
+    file: &'static str,
+    recorded: &[u8],
+    expected: &[u8],
+) -> Option<Difference> {
     if recorded == expected {
         return None;
     }
@@ -123,7 +130,11 @@ pub(crate) fn json_difference(file: &'static str, recorded: &[u8], expected: &[u
     })
 }
 
-fn first_json_difference(recorded: &Value, expected: &Value, at: String) -> Option<(String, String, String)> {
+fn first_json_difference(
+    recorded: &Value,
+    expected: &Value,
+    at: String,
+) -> Option<(String, String, String)> {
     match (recorded, expected) {
         (Value::Object(a), Value::Object(b)) => {
             let missing = a.keys().find(|key| !b.contains_key(*key));

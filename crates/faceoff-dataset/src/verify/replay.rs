@@ -12,7 +12,9 @@ use arrow_array::{
     cast::AsArray,
     types::{Float64Type, Int64Type},
 };
-use faceoff_episode::{AnswerTiming, Arena, RunningEpisode, EpisodeStart, RecordError, StepRow, StepSink};
+use faceoff_episode::{
+    AnswerTiming, Arena, EpisodeStart, RecordError, RunningEpisode, StepRow, StepSink,
+};
 use faceoff_types::{ACTION_LIMIT, AgentFault, EpisodeOutcome, Interpolation, Ruleset};
 
 /// Simulates the episodes of an evaluation again.
@@ -189,22 +191,35 @@ impl EpisodeReplay<'_> {
     }
 
     /// The recorded times.
-    fn read_timing(&self, batch: &RecordBatch, row: usize, step: u32) -> Result<AnswerTiming, Difference> {
+    fn read_timing(
+        &self,
+        batch: &RecordBatch,
+        row: usize,
+        step: u32,
+    ) -> Result<AnswerTiming, Difference> {
         let time = |name: &str| -> Result<Option<i64>, Difference> {
             let column: &Int64Array = batch[name].as_primitive::<Int64Type>();
             if column.is_null(row) {
                 return Ok(None);
             }
             match column.value(row) {
-                negative @ ..0 => {
-                    Err(self.step_difference(step, name, negative.to_string(), "at least 0".to_owned()))
-                }
+                negative @ ..0 => Err(self.step_difference(
+                    step,
+                    name,
+                    negative.to_string(),
+                    "at least 0".to_owned(),
+                )),
                 time => Ok(Some(time)),
             }
         };
         let name = "computation_time_ns";
         let Some(computation_time) = time(name)? else {
-            return Err(self.step_difference(step, name, "nothing".to_owned(), "a time".to_owned()));
+            return Err(self.step_difference(
+                step,
+                name,
+                "nothing".to_owned(),
+                "a time".to_owned(),
+            ));
         };
         Ok(AnswerTiming {
             computation_time_s: seconds(computation_time),
@@ -225,23 +240,36 @@ impl EpisodeReplay<'_> {
             (Some(outcome), None) => outcome,
             (None, Some(fault)) => {
                 let recorded_fault = fault.to_string();
-                self.running.outcome_after_recorded_fault(fault).ok_or_else(|| {
-                    let expected = diverged
-                        .unwrap_or_else(|| format!("a fault of this episode after {steps} steps"));
-                    row_difference(recorded, "fault", recorded_fault, expected)
-                })?
+                self.running
+                    .outcome_after_recorded_fault(fault)
+                    .ok_or_else(|| {
+                        let expected = diverged.unwrap_or_else(|| {
+                            format!("a fault of this episode after {steps} steps")
+                        });
+                        row_difference(recorded, "fault", recorded_fault, expected)
+                    })?
             }
             (Some(outcome), Some(fault)) => {
                 let end = outcome.end.as_str();
                 let expected = format!("none: the episode ended before ({end})");
-                return Err(row_difference(recorded, "fault", fault.to_string(), expected));
+                return Err(row_difference(
+                    recorded,
+                    "fault",
+                    fault.to_string(),
+                    expected,
+                ));
             }
             (None, None) => {
                 if let Some(expected) = diverged {
                     return Err(row_difference(recorded, "fault", "nothing", expected));
                 }
                 let expected = "more: the episode has not ended".to_owned();
-                return Err(row_difference(recorded, "steps", steps.to_string(), expected));
+                return Err(row_difference(
+                    recorded,
+                    "steps",
+                    steps.to_string(),
+                    expected,
+                ));
             }
         };
         // Cannot be simulated.
@@ -249,7 +277,12 @@ impl EpisodeReplay<'_> {
         let host_noise_reruns = reruns.unwrap_or_default();
         let rows = self.running.sink();
         if let Err(error) = rows.end(&outcome, host_noise_reruns) {
-            return Err(row_difference(recorded, "fault", error.to_string(), "a fault"));
+            return Err(row_difference(
+                recorded,
+                "fault",
+                error.to_string(),
+                "a fault",
+            ));
         }
         let played = RecordBatch::try_new(rows.episodes.schema().clone(), rows.episodes.take())
             .expect("the row is built by its own schema");
@@ -259,11 +292,22 @@ impl EpisodeReplay<'_> {
                 steps: std::mem::take(&mut rows.measured),
                 host_noise_reruns,
             }),
-            Some(cell) => Err(row_difference(recorded, &cell.field, cell.recorded, cell.expected)),
+            Some(cell) => Err(row_difference(
+                recorded,
+                &cell.field,
+                cell.recorded,
+                cell.expected,
+            )),
         }
     }
 
-    fn step_difference(&self, step: u32, field: &str, recorded: String, expected: String) -> Difference {
+    fn step_difference(
+        &self,
+        step: u32,
+        field: &str,
+        recorded: String,
+        expected: String,
+    ) -> Difference {
         Difference {
             file: STEPS_FILE,
             task: Some(self.recorded.task),

@@ -1,6 +1,8 @@
 //! Verifies the recording of a shard before it is accepted.
 
-use super::{difference::Difference, error::VerifyError, episode_reader::EpisodeReader, replay::Replayer};
+use super::{
+    difference::Difference, episode_reader::EpisodeReader, error::VerifyError, replay::Replayer,
+};
 use crate::{
     dataset::Columns,
     error::{DatasetError, RecordingError},

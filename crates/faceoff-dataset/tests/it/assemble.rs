@@ -1,4 +1,4 @@
-use crate::recordings::{Agent, Evaluation, hold_still, json, swing_arm, play, spec, table, unzip};
+use crate::recordings::{Agent, Evaluation, hold_still, json, play, spec, swing_arm, table, unzip};
 use arrow_array::{StringArray, cast::AsArray, types::Int64Type};
 use faceoff_dataset::RecordingError;
 use faceoff_scoring::StepTimes;

@@ -193,7 +193,9 @@ fn clip_index_matches_the_dataset_for_each_episode() {
 #[test]
 fn clips_are_at_most_a_quarter_of_the_dataset_size() {
     let fixture = fixture("clips");
-    let dataset_bytes = std::fs::metadata(fixture.evaluation.archive()).unwrap().len();
+    let dataset_bytes = std::fs::metadata(fixture.evaluation.archive())
+        .unwrap()
+        .len();
     let clips_bytes = std::fs::metadata(&fixture.clips).unwrap().len();
     assert!(
         4 * clips_bytes <= dataset_bytes,

@@ -9,7 +9,7 @@ use faceoff_dataset::{
     DatasetError,
     game::{GAME_FILE, GameRecorder, GameRecording, RecordedGame, side_file, verify_game},
 };
-use faceoff_episode::{AnswerTiming, Arena, RallyEntry, RunningGame, Response, SideFault};
+use faceoff_episode::{AnswerTiming, Arena, RallyEntry, Response, RunningGame, SideFault};
 use faceoff_replay::{CHUNK_STEPS, Clip, Key, Pack};
 use faceoff_types::{
     AgentFaultKind, GameLimits, Interpolation, Profile, Ruleset, Seed, Side, SlotTiming,
@@ -240,7 +240,10 @@ fn difference_names_location_and_field() {
     let forged = Forgery::of(unpacked.path());
     forged.text("results.json", "\"goals\": 0", "\"goals\": 7");
     let message = verify(forged.reseal().dir.path()).unwrap_err();
-    assert!(message.contains("results.json, sides[0].goals"), "{message}");
+    assert!(
+        message.contains("results.json, sides[0].goals"),
+        "{message}"
+    );
     let forged = Forgery::of(unpacked.path());
     let seed = spec().seed.to_string();
     forged.text("manifest.json", &seed, &Seed::from_number(12).to_string());
@@ -288,9 +291,7 @@ fn damaged_and_foreign_recordings_have_different_errors() {
     for name in [GAME_FILE, "dataset.zip"] {
         fs::write(empty.path().join(name), "").unwrap();
     }
-    let both = GameRecording::is_at(empty.path())
-        .unwrap_err()
-        .to_string();
+    let both = GameRecording::is_at(empty.path()).unwrap_err().to_string();
     assert!(both.contains("pass one of them"), "{both}");
 }
 
@@ -327,7 +328,10 @@ fn clips_of_a_game_match_its_motion() {
         }
         let positions: Vec<f64> = clip.column("puck_x").unwrap().values().collect();
         if let Some(last) = previous_last {
-            assert_eq!(positions[0], last, "a chunk begins at the end of the previous one");
+            assert_eq!(
+                positions[0], last,
+                "a chunk begins at the end of the previous one"
+            );
         }
         previous_last = positions.last().copied();
         for one in &clip.header.breaks {

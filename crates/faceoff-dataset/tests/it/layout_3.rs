@@ -27,8 +27,11 @@ fn archive_is_read_and_verified() {
         .iter()
         .map(|field| field.name().clone())
         .collect();
-    let current = crate::recordings::Evaluation::play(Some(crate::recordings::hold_still), &[(Task::Hit, 0..1)])
-        .assembled();
+    let current = crate::recordings::Evaluation::play(
+        Some(crate::recordings::hold_still),
+        &[(Task::Hit, 0..1)],
+    )
+    .assembled();
     let current = table(&current.folder().join("steps.parquet"));
     let current_names: Vec<String> = current
         .schema()

@@ -1,7 +1,9 @@
 //! Evaluations of agents that are functions: no process, no clock, the same numbers on every machine.
 
 use arrow_array::RecordBatch;
-use faceoff_dataset::{AssembledDataset, Recorder, RecordingError, ShardFolder, ShardReport, assemble};
+use faceoff_dataset::{
+    AssembledDataset, Recorder, RecordingError, ShardFolder, ShardReport, assemble,
+};
 use faceoff_episode::{AnswerTiming, EpisodeStart, StepRow, StepSink};
 use faceoff_sim::{Episode, Interpolation, Plant};
 use faceoff_types::{

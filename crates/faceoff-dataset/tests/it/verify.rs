@@ -2,7 +2,7 @@
 
 use crate::{
     forgery::{Forgery, concat, flipped},
-    recordings::{Agent, Evaluation, Question, swing_arm, spec, table},
+    recordings::{Agent, Evaluation, Question, spec, swing_arm, table},
 };
 use arrow_array::{
     Array, Float64Array, ListArray, RecordBatch, StringArray, UInt32Array,
@@ -429,7 +429,7 @@ fn damaged_files_in_a_folder_are_refused() {
             bytes[at] ^= 0x10;
             fs::write(forgery.path(name), &bytes).unwrap();
             match Dataset::open(forgery.dir.path()) {
-                Err(DatasetError::Altered(message)) => assert!(message.starts_with(name), "{message}"),
+                Err(DatasetError::Altered(text)) => assert!(text.starts_with(name), "{text}"),
                 other => panic!("{name}, byte {at}: {other:?}"),
             }
         }
@@ -535,20 +535,20 @@ fn seeds_follow_from_the_revealed_secret() {
         day,
     };
     assert_eq!(claim.check(&manifest), Ok(()));
-    let failed_claim =
+    let failed =
         |claim: &SeasonClaim, manifest: &DatasetManifest| claim.check(manifest).unwrap_err().claim;
     let other_day = SeasonClaim {
         day: "2026-11-22".parse().unwrap(),
         ..claim.clone()
     };
-    assert_eq!(failed_claim(&other_day, &manifest), "the evaluation's seed");
+    assert_eq!(failed(&other_day, &manifest), "the evaluation's seed");
     let broken = SeasonClaim {
         commitment: Some("00".repeat(32)),
         ..claim.clone()
     };
-    assert_eq!(failed_claim(&broken, &manifest), "the commitment");
+    assert_eq!(failed(&broken, &manifest), "the commitment");
     manifest.mismatch_seed = manifest.seed;
-    assert_eq!(failed_claim(&claim, &manifest), "the seed of the model mismatch");
+    assert_eq!(failed(&claim, &manifest), "the seed of the model mismatch");
 }
 
 /// An agent that commands extreme positions from its 4th step on.

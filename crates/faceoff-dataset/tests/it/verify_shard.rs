@@ -2,7 +2,7 @@
 
 use crate::{
     forgery::{Forgery, flipped},
-    recordings::{swing_arm, play, spec},
+    recordings::{play, spec, swing_arm},
 };
 use faceoff_dataset::{
     ShardReport,
@@ -80,7 +80,8 @@ fn outcomes_that_differ_from_the_rows_are_found() {
     let all = played();
     let mut claimed = all.report.outcomes.clone();
     claimed[3].success = !claimed[3].success;
-    let verify = |folder: &Path, outcomes| error_text(verify_shard(folder, &all.spec, outcomes, &[]));
+    let verify =
+        |folder: &Path, outcomes| error_text(verify_shard(folder, &all.spec, outcomes, &[]));
     assert!(verify(all.folder.path(), &claimed).contains("different outcomes"));
     // With the same claim in the recording's report.
     let forged = Forgery::of(all.folder.path());

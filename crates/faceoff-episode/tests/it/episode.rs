@@ -1,5 +1,6 @@
 use faceoff_episode::{
-    AnswerTiming, Arena, RunningEpisode, EpisodeStart, NullSink, Question, RecordError, StepRow, StepSink,
+    AnswerTiming, Arena, EpisodeStart, NullSink, Question, RecordError, RunningEpisode, StepRow,
+    StepSink,
 };
 use faceoff_sim::Bounds;
 use faceoff_types::{
@@ -131,9 +132,17 @@ fn inconsistent_recorded_fault_is_refused() {
         with(&|fault| (fault.episode, fault.step) = (None, None)),
         with(&|fault| fault.episode = None),
     ] {
-        assert_eq!(running.outcome_after_recorded_fault(inconsistent.clone()), None, "{inconsistent}");
+        assert_eq!(
+            running.outcome_after_recorded_fault(inconsistent.clone()),
+            None,
+            "{inconsistent}"
+        );
     }
-    assert!(running.outcome_after_recorded_fault(fault.clone()).is_some());
+    assert!(
+        running
+            .outcome_after_recorded_fault(fault.clone())
+            .is_some()
+    );
     assert!(answer(&mut running).is_some());
     let after_the_end = with(&|fault| fault.step = Some(2));
     assert_eq!(running.outcome_after_recorded_fault(after_the_end), None);
@@ -211,7 +220,11 @@ fn divergence_is_an_agent_fault() {
         with(&|fault| fault.step = Some(outcome.steps)),
         with(&|fault| fault.step = None),
     ] {
-        assert_eq!(running.outcome_after_recorded_fault(other.clone()), None, "{other}");
+        assert_eq!(
+            running.outcome_after_recorded_fault(other.clone()),
+            None,
+            "{other}"
+        );
     }
     assert_eq!(running.outcome_after_recorded_fault(fault), Some(outcome));
 

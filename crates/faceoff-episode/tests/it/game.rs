@@ -1,12 +1,13 @@
 //! Games from scripted answers.
 
 use faceoff_episode::{
-    AnswerTiming, Arena, Effect, RallyEntry, FinishedGame, RunningGame, GameSink, GameStepRow, RallyEnding,
-    RallyRow, RallyStart, RecordError, Response, SideFault,
+    AnswerTiming, Arena, Effect, FinishedGame, GameSink, GameStepRow, RallyEnding, RallyEntry,
+    RallyRow, RallyStart, RecordError, Response, RunningGame, SideFault,
 };
 use faceoff_sim::{Bounds, RallyEnd};
 use faceoff_types::{
-    AgentFaultKind, AgentTask, ForfeitCause, GameEnd, GameLimits, Interpolation, Profile, Seed, Side,
+    AgentFaultKind, AgentTask, ForfeitCause, GameEnd, GameLimits, Interpolation, Profile, Seed,
+    Side,
 };
 
 fn arena() -> Arena {
@@ -92,7 +93,12 @@ fn play(steps: u32, limits: GameLimits, scripts: [Script; 2]) -> FinishedGame<Si
     play_in(&arena(), steps, limits, scripts)
 }
 
-fn play_in(arena: &Arena, steps: u32, limits: GameLimits, scripts: [Script; 2]) -> FinishedGame<SinkLog> {
+fn play_in(
+    arena: &Arena,
+    steps: u32,
+    limits: GameLimits,
+    scripts: [Script; 2],
+) -> FinishedGame<SinkLog> {
     let mut running = RunningGame::begin(arena, steps, limits, SinkLog::default());
     let mut speeds = [[0.0; 7]; 2];
     while running.end().is_none() {
@@ -203,7 +209,11 @@ fn fault_holds_the_arm_and_restarts_the_agent() {
     assert_eq!(fault.game_step, 3);
     let agent_task = AgentTask::Game { side: Side::Second };
     assert_eq!(
-        (fault.fault.agent_task, fault.fault.episode, fault.fault.step),
+        (
+            fault.fault.agent_task,
+            fault.fault.episode,
+            fault.fault.step
+        ),
         (agent_task, Some(0), Some(3))
     );
     let faults: Vec<u32> = bad.windows.iter().map(|window| window.faults).collect();

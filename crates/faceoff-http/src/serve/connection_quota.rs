@@ -93,6 +93,9 @@ mod tests {
         assert!(exempt.iter().all(Option::is_some));
         drop((permits, network));
         assert!(acquire("10.0.0.1").is_some());
-        assert!(quota.open().is_empty(), "closed connections are not counted");
+        assert!(
+            quota.open().is_empty(),
+            "closed connections are not counted"
+        );
     }
 }

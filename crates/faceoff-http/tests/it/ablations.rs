@@ -172,7 +172,10 @@ async fn ablation_outcomes_are_summarised_once() {
     stored_summary.await.unwrap();
 
     let again = site.get(&api, Some(ADMIN)).await.json(200);
-    assert_eq!(again, first, "the cached summary is not read from the database again");
+    assert_eq!(
+        again, first,
+        "the cached summary is not read from the database again"
+    );
     site.restart().await;
     let restarted = site.get(&api, Some(ADMIN)).await.json(200);
     assert_eq!(restarted["tasks"]["hit"][4]["successes"], 1);
@@ -188,7 +191,11 @@ async fn perturbed_episode_is_shown_beside_the_ideal_one() {
     site.post(&api, Some(ADMIN), &request).await.json(201);
     run_shards(&site, 18).await;
     let without = site.get(&page, None).await;
-    assert!(!without.body.contains("Episodes with another outcome"), "{}", without.body);
+    assert!(
+        !without.body.contains("Episodes with another outcome"),
+        "{}",
+        without.body
+    );
 
     let submission = api.split('/').nth(4).unwrap().parse().unwrap();
     let ablation = site.store.newest_ablation(submission).await.unwrap();
@@ -212,7 +219,8 @@ async fn perturbed_episode_is_shown_beside_the_ideal_one() {
         .select(&replays)
         .map(|replay| replay.attr("data-motion").unwrap().to_owned())
         .collect();
-    let expected = ["ideal", "tracking_loss"].map(|profile| format!("{api}/{profile}/prepare/0/motion"));
+    let expected =
+        ["ideal", "tracking_loss"].map(|profile| format!("{api}/{profile}/prepare/0/motion"));
     assert_eq!(motions, expected);
     for motion in &motions {
         assert_eq!(site.get(motion, None).await.status, 200, "{motion}");

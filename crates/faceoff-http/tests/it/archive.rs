@@ -90,7 +90,10 @@ impl Season {
                     &json!({ "text": words }),
                 )
                 .await;
-            let path = format!("/api/v1/questions/{}/answer", string(&response.json(201)["id"]));
+            let path = format!(
+                "/api/v1/questions/{}/answer",
+                string(&response.json(201)["id"])
+            );
             let answer = json!({ "text": "an answer", "public": public });
             let request = site.request(Method::PUT, &path, Some(ADMIN)).json(&answer);
             assert!(request.send().await.unwrap().status().is_success());
@@ -108,10 +111,7 @@ impl Season {
                 ("a contact", b"gamma@example.org".to_vec()),
                 ("a private question", b"a private question".to_vec()),
                 ("an agent's log", b"log of ".to_vec()),
-                (
-                    "an agent's output",
-                    b"{\\\"type\\\":\\\"act\\\"}".to_vec(),
-                ),
+                ("an agent's output", b"{\\\"type\\\":\\\"act\\\"}".to_vec()),
                 ("a bundle's name", b"striker.tar.gz".to_vec()),
                 (
                     "a bundle's hash",
@@ -145,8 +145,10 @@ impl Season {
         site.next_day();
         post(site, "/api/v1/days", json!({})).await;
         site.run_shards(10).await;
-        site.run_evaluation(|task, episode| outcome(task, episode, task == Task::Hit && episode == 0))
-            .await;
+        site.run_evaluation(|task, episode| {
+            outcome(task, episode, task == Task::Hit && episode == 0)
+        })
+        .await;
         site.next_day();
         post(site, "/api/v1/days", json!({})).await;
         site.run_shards(10).await;
@@ -279,7 +281,11 @@ async fn imported_archive_is_shown_byte_for_byte() {
         let path = format!("/api/v1/stages/{stage}");
         let mut before = site.get(&path, token).await.json(200);
         let forecast = before.as_object_mut().unwrap().remove("capacity");
-        assert_eq!(forecast.is_some(), token.is_some(), "only organisers see the forecast");
+        assert_eq!(
+            forecast.is_some(),
+            token.is_some(),
+            "only organisers see the forecast"
+        );
         assert_eq!(
             shown.get(&path, token).await.json(200),
             before,
@@ -314,10 +320,7 @@ async fn imported_archive_is_shown_byte_for_byte() {
         ] {
             let page = shown.get(page, None).await;
             assert_eq!(page.status, 200, "{page:?}");
-            assert!(
-                page.body
-                    .contains("Archived season as of 2026-03-01")
-            );
+            assert!(page.body.contains("Archived season as of 2026-03-01"));
         }
         assert!(!site.get("/", None).await.body.contains("Archived season"));
         // An archive of the imported archive shows the same time.
@@ -372,7 +375,10 @@ async fn public_archive_has_no_private_data() {
     for (description, part) in &season.secrets {
         let is_key = matches!(*description, "a password" | "a token's hash" | "the secret");
         if is_key {
-            assert!(!is_found(part), "{description} is in the organiser's archive");
+            assert!(
+                !is_found(part),
+                "{description} is in the organiser's archive"
+            );
         }
     }
     assert!(
@@ -387,7 +393,10 @@ async fn public_archive_has_no_private_data() {
             "a worker's name",
         ];
         if expected.contains(description) {
-            assert!(is_found(part), "{description} is not in the organiser's archive");
+            assert!(
+                is_found(part),
+                "{description} is not in the organiser's archive"
+            );
         }
     }
 
@@ -400,7 +409,11 @@ async fn public_archive_has_no_private_data() {
     for file in files_of(&folder.path().join("archive")) {
         let content = std::fs::read(&file).unwrap();
         for (description, part) in &season.secrets {
-            assert!(!contains_bytes(&content, part), "{description} is in {}", file.display());
+            assert!(
+                !contains_bytes(&content, part),
+                "{description} is in {}",
+                file.display()
+            );
         }
         assert!(
             !contains_bytes(&content, open.to_string().as_bytes()),
@@ -475,7 +488,11 @@ async fn public_archive_hides_blind_stages_and_frozen_results() {
         (&json!(true), &json!([]))
     );
     let days = shown.get("/api/v1/season", Some(ADMIN)).await.json(200);
-    assert_eq!(days["days"][0]["seed"], Value::Null, "the seed of a blind day is hidden");
+    assert_eq!(
+        days["days"][0]["seed"],
+        Value::Null,
+        "the seed of a blind day is hidden"
+    );
 
     let opened = Answer::of(request(json!({ "blind": false })).send().await.unwrap()).await;
     assert_eq!(opened.status, 200, "{opened:?}");
@@ -684,5 +701,8 @@ async fn archive_of_a_closed_season_has_its_secret() {
     let season = shown.get("/api/v1/season", None).await.json(200);
     assert_eq!(season["secret"], closed["secret"]);
     assert_eq!(season["commitment"], closed["commitment"]);
-    assert_eq!(shown.store.archived_season().unwrap().edition, Edition::Public);
+    assert_eq!(
+        shown.store.archived_season().unwrap().edition,
+        Edition::Public
+    );
 }

@@ -53,9 +53,11 @@ fn check_reveals_nothing(answer: &Answer) {
 async fn blind_results_are_visible_to_organisers_only() {
     let site = Site::start().await;
     let ([alpha, beta], [alpha_evaluation, beta_evaluation]) = blind_day(&site).await;
-    site.finish_evaluation(&result([0.511, 0.622, 0.733], 777.5)).await;
+    site.finish_evaluation(&result([0.511, 0.622, 0.733], 777.5))
+        .await;
     site.finish_evaluation(&result([0.1, 0.2, 0.3], 10.0)).await;
-    let ids = [&alpha_evaluation, &beta_evaluation].map(|path| path.rsplit('/').next().unwrap().to_owned());
+    let ids = [&alpha_evaluation, &beta_evaluation]
+        .map(|path| path.rsplit('/').next().unwrap().to_owned());
     let compared = format!("{alpha_evaluation}/compare/{}", ids[1]);
     let pages = [
         "/".to_owned(),
@@ -188,7 +190,10 @@ async fn blind_results_are_visible_to_organisers_only() {
         site.get("/api/v1/season", None).await.json(200)["days"][0]["seed"],
         json!(null)
     );
-    let own = site.get(&alpha_evaluation, Some(&alpha.token)).await.json(200);
+    let own = site
+        .get(&alpha_evaluation, Some(&alpha.token))
+        .await
+        .json(200);
     assert_eq!(
         (own.get("blind"), &own["result"]["penalty_points"]),
         (None, &json!(777.5))
@@ -210,11 +215,17 @@ async fn faults_of_a_blind_stage_are_hidden() {
     let ([alpha, _], [alpha_evaluation, beta_evaluation]) = blind_day(&site).await;
     site.run_shards(2).await;
     site.finish_evaluation(&result([0.1, 0.2, 0.3], 10.0)).await;
-    let own = site.get(&alpha_evaluation, Some(&alpha.token)).await.json(200);
+    let own = site
+        .get(&alpha_evaluation, Some(&alpha.token))
+        .await
+        .json(200);
     assert_eq!(own["state"], "agent_failed");
     assert_ne!(own["released_at"], json!(null));
     assert_eq!((own.get("faults"), own.get("log")), (None, None));
-    let page = site.get(&alpha_evaluation.replace("/api/v1", ""), None).await.body;
+    let page = site
+        .get(&alpha_evaluation.replace("/api/v1", ""), None)
+        .await
+        .body;
     assert!(
         page.contains("results are hidden") && !page.contains("protocol"),
         "{page}"
@@ -225,7 +236,10 @@ async fn faults_of_a_blind_stage_are_hidden() {
     assert_eq!(all["faults"].as_array().unwrap().len(), 2);
     drop(beta_evaluation);
     change(&site, json!({ "blind": false })).await.json(200);
-    let own = site.get(&alpha_evaluation, Some(&alpha.token)).await.json(200);
+    let own = site
+        .get(&alpha_evaluation, Some(&alpha.token))
+        .await
+        .json(200);
     assert_eq!(own["faults"].as_array().unwrap().len(), 2);
 }
 

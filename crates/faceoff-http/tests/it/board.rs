@@ -71,12 +71,7 @@ async fn board_shows_tiers_rates_intervals_points_and_scores() {
     assert!(caption.contains(setting), "{caption}");
     let commitment = site.store.season().await.unwrap().commitment;
     let legend = texts(&html, ".legend").join(" ");
-    for part in [
-        commitment.as_str(),
-        "Wilson",
-        "0.4 × hit",
-        "at most 0.5,",
-    ] {
+    for part in [commitment.as_str(), "Wilson", "0.4 × hit", "at most 0.5,"] {
         assert!(legend.contains(part), "{part:?} is not in the legend");
     }
     for rule in [
@@ -156,7 +151,11 @@ async fn board_shows_only_score_and_points_before_the_release() {
         1,
         "no violations, no times"
     );
-    assert!(texts(&html, ".facts").join(" ").contains("published together"));
+    assert!(
+        texts(&html, ".facts")
+            .join(" ")
+            .contains("published together")
+    );
     let tasks = page(&site, "/tasks/hit").await;
     assert_eq!(texts(&tasks, "td.none").len(), TEAMS.len());
     assert!(!site.get(&evaluation, None).await.body.contains(&seed));

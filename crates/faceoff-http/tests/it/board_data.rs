@@ -38,7 +38,12 @@ fn csv_rows(answer: &Answer) -> Vec<BTreeMap<String, String>> {
         .unwrap()
 }
 
-async fn get_with_headers(site: &Site, path: &str, headers: &[(&str, &str)], token: Option<&str>) -> Answer {
+async fn get_with_headers(
+    site: &Site,
+    path: &str,
+    headers: &[(&str, &str)],
+    token: Option<&str>,
+) -> Answer {
     let mut request = site.request(Method::GET, path, token);
     for (name, value) in headers {
         request = request.header(*name, *value);
@@ -103,7 +108,9 @@ async fn board_csv_matches_the_json() {
         "{agent:?}"
     );
     let json = [("accept", "text/csv, application/json")];
-    get_with_headers(&site, "/api/v1/board", &json, None).await.json(200);
+    get_with_headers(&site, "/api/v1/board", &json, None)
+        .await
+        .json(200);
     let task = csv_rows(&site.get("/api/v1/board/hit?format=csv", None).await);
     assert_eq!(task.len(), 2);
     site.get("/api/v1/board?format=xml", None)
@@ -139,7 +146,10 @@ async fn unchanged_board_answers_not_modified() {
             "{path}{}revision=1",
             if path.contains('?') { "&" } else { "?" }
         );
-        assert_eq!(get_with_headers(&site, &other, &known, None).await.status, 200);
+        assert_eq!(
+            get_with_headers(&site, &other, &known, None).await.status,
+            200
+        );
         let head = site.request(Method::HEAD, path, None).send().await.unwrap();
         assert_eq!(head.headers()["etag"], tag.as_str());
         assert_eq!(
@@ -160,7 +170,9 @@ async fn unchanged_board_answers_not_modified() {
     let again = get_with_headers(&site, "/api/v1/board", &known, None).await;
     assert_eq!(again.status, 304);
     site.finish_evaluation(&result([0.8; 3], 10.0)).await;
-    let changed = get_with_headers(&site, "/api/v1/board", &known, None).await.json(200);
+    let changed = get_with_headers(&site, "/api/v1/board", &known, None)
+        .await
+        .json(200);
     let score = changed["rows"][0]["score"].as_f64().unwrap();
     assert_eq!(score.round(), 80.0);
 }
@@ -180,11 +192,7 @@ async fn board_of_a_past_day_shows_results_up_to_that_day() {
     ] {
         let board = site.get(&format!("/api/v1/board{query}"), None).await;
         let board = board.json(200);
-        assert_eq!(
-            teams(&board),
-            [row(first, 1), row(second, 2)],
-            "{query}"
-        );
+        assert_eq!(teams(&board), [row(first, 1), row(second, 2)], "{query}");
         let by = if query.contains("best") {
             "best"
         } else {
@@ -207,11 +215,7 @@ async fn board_of_a_past_day_shows_results_up_to_that_day() {
             .problem(404, "not-found", &[day, words]);
     }
     let page = site.get("/?day=2026-03-02", None).await;
-    assert!(
-        page.body.contains("up to 2026-03-02"),
-        "{}",
-        page.body
-    );
+    assert!(page.body.contains("up to 2026-03-02"), "{}", page.body);
 }
 
 #[tokio::test]

@@ -38,7 +38,9 @@ pub async fn run_evaluation_slowly(site: &Site, seconds: i64) {
                 finished.await.unwrap();
                 return;
             }
-            Job::Validation { .. } | Job::Game { .. } => panic!("expected a shard or a scoring job"),
+            Job::Validation { .. } | Job::Game { .. } => {
+                panic!("expected a shard or a scoring job")
+            }
         }
     }
 }
@@ -140,8 +142,14 @@ async fn forecast_reports_a_day_that_will_not_fit() {
     site.store.end_overdue_days(site.now()).await.unwrap();
     let view = site.get(&evaluation, Some(&alpha.token)).await.json(200);
     assert_eq!(view["state"], "not_played");
-    assert!(string(&view["reason"]).contains("the server ran out of time"), "{view}");
-    assert!(string(&view["next"]).contains("earlier day stays"), "{view}");
+    assert!(
+        string(&view["reason"]).contains("the server ran out of time"),
+        "{view}"
+    );
+    assert!(
+        string(&view["next"]).contains("earlier day stays"),
+        "{view}"
+    );
     assert_eq!(view["queue"], Value::Null);
     let board = site.get("/api/v1/board?revision=3", None).await.json(200);
     assert_eq!(board["rows"][0]["day"], "2026-03-01", "{board}");

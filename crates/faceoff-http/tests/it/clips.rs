@@ -33,7 +33,8 @@ pub(crate) fn record_clips(folder: &std::path::Path) -> PathBuf {
     let mut clips = ClipRecorder::new(Task::Prepare, File::create(&part).unwrap()).unwrap();
     for episode in 0..EPISODES {
         let interpolation = Some(Interpolation::Cubic);
-        let mut running = RunningEpisode::begin(&arena, Task::Prepare, episode, interpolation, &mut clips);
+        let mut running =
+            RunningEpisode::begin(&arena, Task::Prepare, episode, interpolation, &mut clips);
         let action = running.question().unwrap().observation[6..13].to_vec();
         let outcome = loop {
             if episode == EPISODES - 1 && running.steps() == 3 {
@@ -77,7 +78,8 @@ async fn record_day_on(site: Site, is_over: bool) -> RecordedDay {
     let key = faceoff_store::Artifacts::clips_key(&format!("datasets/{id}.zip"));
     let artifacts = site.store.artifacts();
     artifacts.put_file(&key, &pack).await.unwrap();
-    site.finish_evaluation(&result([0.5, 0.6, 0.7], 100.0)).await;
+    site.finish_evaluation(&result([0.5, 0.6, 0.7], 100.0))
+        .await;
     if is_over {
         site.finish_evaluation(&result([0.1, 0.2, 0.3], 10.0)).await;
     }
@@ -169,7 +171,10 @@ async fn motion_is_public_and_observations_follow_the_dataset() {
         assert_eq!((line.get("longest_s"), line.get("late")), (None, None));
     }
     let (view, last) = view_and_last(day.get("episodes", alpha).await);
-    assert!(last["why"].as_str().unwrap().contains(AGENT_OUTPUT), "{last}");
+    assert!(
+        last["why"].as_str().unwrap().contains(AGENT_OUTPUT),
+        "{last}"
+    );
     let steps: u64 = view["computation_times"]["prepare"]
         .as_array()
         .unwrap()
@@ -268,7 +273,8 @@ async fn evaluation_without_clips_has_no_replays() {
     let team = site.team("Alpha").await;
     let submission = site.valid_submission(&team, "striker").await;
     let path = site.evaluate(&team, &submission).await;
-    site.finish_evaluation(&result([0.5, 0.6, 0.7], 100.0)).await;
+    site.finish_evaluation(&result([0.5, 0.6, 0.7], 100.0))
+        .await;
     let answer = site.get(&format!("{path}/episodes"), None).await;
     answer.problem(409, "conflict", &["no replays", "faceoff replay"]);
 }

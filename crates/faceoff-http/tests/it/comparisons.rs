@@ -29,7 +29,8 @@ fn comparison_path(a: EvaluationId, b: EvaluationId) -> String {
 async fn evaluations_of_a_day_are_compared_by_episode() {
     let site = Site::start().await;
     let alpha = |task, e| episode_outcome(task, e, e < 60, false);
-    let beta = |task, e| episode_outcome(task, e, e < if task == Task::Hit { 40 } else { 60 }, false);
+    let beta =
+        |task, e| episode_outcome(task, e, e < if task == Task::Hit { 40 } else { 60 }, false);
     let [a, b] = site
         .run_day(100, [("Alpha", &alpha), ("Beta", &beta)])
         .await;
@@ -60,7 +61,9 @@ async fn evaluations_of_a_day_are_compared_by_episode() {
     assert_eq!(swapped["tasks"]["hit"]["only_b"], 20);
     assert_eq!(swapped["overall"]["p_value"], view["overall"]["p_value"]);
 
-    let page = site.get(&comparison_path(a, b).replace("/api/v1", ""), None).await;
+    let page = site
+        .get(&comparison_path(a, b).replace("/api/v1", ""), None)
+        .await;
     assert_eq!(page.status, 200, "{}", page.body);
     assert!(!page.body.contains("<script>"));
     let html = scraper::Html::parse_document(&page.body);
@@ -121,10 +124,17 @@ async fn episode_of_two_teams_is_replayed_side_by_side() {
             Some("both"),
             "both replays are synchronised"
         );
-        assert_eq!(replay.attr("data-observed"), None, "observations are not public");
+        assert_eq!(
+            replay.attr("data-observed"),
+            None,
+            "observations are not public"
+        );
     }
     assert_ne!(replays[0].id(), replays[1].id());
-    assert!(page.body.contains(&pair(60)), "a link to the next episode that differs");
+    assert!(
+        page.body.contains(&pair(60)),
+        "a link to the next episode that differs"
+    );
     let list = site
         .get(&format!("/evaluations/{a}/compare/{b}"), None)
         .await;
@@ -155,9 +165,11 @@ async fn unpaired_evaluations_are_refused_with_the_field() {
         .await
         .problem(409, "conflict", &["no result"]);
     let unknown = EvaluationId::new();
-    site.get(&comparison_path(a, unknown), None)
-        .await
-        .problem(404, "not-found", &[&unknown.to_string()]);
+    site.get(&comparison_path(a, unknown), None).await.problem(
+        404,
+        "not-found",
+        &[&unknown.to_string()],
+    );
     site.get("/api/v1/evaluations/1/compare/2", None)
         .await
         .problem(404, "not-found", &[]);
@@ -230,7 +242,10 @@ async fn statistically_tied_teams_share_a_rank_group() {
     let page = site.get("/", None).await.body;
     assert!(page.contains(&format!("bootstrap with {resamples} resamples")));
     let hit_board = site.get("/tasks/hit", None).await.body;
-    assert!(hit_board.contains("statistically tied with Best"), "{hit_board}");
+    assert!(
+        hit_board.contains("statistically tied with Best"),
+        "{hit_board}"
+    );
     // Labels without information are left out: overall all teams differ, and only one tier depends on chance.
     assert!(!page.contains("statistically tied with"), "{page}");
     assert_eq!(page.matches("tier change</abbr>").count(), 1, "{page}");

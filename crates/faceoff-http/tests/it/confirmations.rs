@@ -45,7 +45,8 @@ async fn voided_evaluation_leaves_the_board_with_its_reason() {
     let team = site.team("Alpha").await;
     let submission = site.valid_submission(&team, "a").await;
     let path = site.evaluate(&team, &submission).await;
-    site.finish_evaluation(&result([0.5, 0.6, 0.7], 100.0)).await;
+    site.finish_evaluation(&result([0.5, 0.6, 0.7], 100.0))
+        .await;
     assert_eq!(teams(&site).await, json!(["Alpha"]));
     let words = ["Alpha", "2026-03-01", "disappear from the boards", "rerun"];
     let voided = confirm_decision(&site, &format!("{path}/void"), "Alpha", &words).await;
@@ -78,7 +79,8 @@ async fn voided_day_voids_or_cancels_all_its_evaluations() {
     let submission = site.valid_submission(&alpha, "a").await;
     site.valid_submission(&beta, "b").await;
     site.evaluate(&alpha, &submission).await;
-    site.finish_evaluation(&result([0.5, 0.6, 0.7], 100.0)).await;
+    site.finish_evaluation(&result([0.5, 0.6, 0.7], 100.0))
+        .await;
     let stage = site.stage().await;
     let path = format!("/api/v1/stages/{stage}/days/2026-03-01/void");
     let words = ["1 evaluations of 2026-03-01", "1 unfinished ones"];
@@ -111,7 +113,8 @@ async fn disqualified_team_leaves_the_board_with_the_reason() {
     let team = site.team("Alpha").await;
     let submission = site.valid_submission(&team, "a").await;
     site.evaluate(&team, &submission).await;
-    site.finish_evaluation(&result([0.5, 0.6, 0.7], 100.0)).await;
+    site.finish_evaluation(&result([0.5, 0.6, 0.7], 100.0))
+        .await;
     site.next_day();
     let running = site.evaluate(&team, &submission).await;
     let path = format!("/api/v1/teams/{}/disqualify", team.id);

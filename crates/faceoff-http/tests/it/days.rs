@@ -104,7 +104,10 @@ async fn day_without_submissions_can_still_be_started() {
         .problem(
             409,
             "conflict",
-            &["no team has a valid submission", "its cutoff is still available"],
+            &[
+                "no team has a valid submission",
+                "its cutoff is still available",
+            ],
         );
     let season = site.get("/api/v1/season", None).await.json(200);
     assert_eq!(season["days"], json!([]));

@@ -19,7 +19,11 @@ async fn frozen_board_hides_later_results_from_the_public() {
     for token in [None, Some(team.token.as_str())] {
         for decision in ["freeze", "unfreeze"] {
             let answer = site
-                .post(&decision_path(decision), token, &json!({ "reason": REASON }))
+                .post(
+                    &decision_path(decision),
+                    token,
+                    &json!({ "reason": REASON }),
+                )
                 .await;
             let expected = if token.is_none() {
                 (401, "unauthenticated")
@@ -55,16 +59,24 @@ async fn frozen_board_hides_later_results_from_the_public() {
         .problem(404, "not-found", &["stage"]);
 
     let frozen = site
-        .post(&decision_path("freeze"), Some(ADMIN), &json!({ "reason": REASON }))
+        .post(
+            &decision_path("freeze"),
+            Some(ADMIN),
+            &json!({ "reason": REASON }),
+        )
         .await
         .json(200);
     assert_eq!(
         frozen["frozen"],
         json!({ "at": "2026-03-01T10:00:00Z", "reason": REASON })
     );
-    site.post(&decision_path("freeze"), Some(ADMIN), &json!({ "reason": REASON }))
-        .await
-        .problem(409, "conflict", &["frozen already"]);
+    site.post(
+        &decision_path("freeze"),
+        Some(ADMIN),
+        &json!({ "reason": REASON }),
+    )
+    .await
+    .problem(409, "conflict", &["frozen already"]);
     site.next_day();
     let started = site
         .post("/api/v1/days", Some(ADMIN), &json!({}))
@@ -87,7 +99,10 @@ async fn frozen_board_hides_later_results_from_the_public() {
         .await
         .json(200);
     assert_eq!(live["rows"].as_array().unwrap().len(), 2);
-    assert_eq!(live["frozen"]["reason"], REASON, "the live board shows the freeze, too");
+    assert_eq!(
+        live["frozen"]["reason"], REASON,
+        "the live board shows the freeze, too"
+    );
     let page = site.get("/", None).await.body;
     assert!(page.contains("Frozen") && page.contains(REASON), "{page}");
     let ids: Vec<String> = started["created"]
@@ -188,7 +203,11 @@ async fn missed_day_is_evaluated_later_with_a_public_reason() {
     }
     site.post(&path, Some(ADMIN), &missed("2026-02-28"))
         .await
-        .problem(409, "conflict", &["before the stage's first day", "2026-03-01"]);
+        .problem(
+            409,
+            "conflict",
+            &["before the stage's first day", "2026-03-01"],
+        );
 
     let day = site
         .post(&path, Some(ADMIN), &missed("2026-03-02"))
@@ -276,9 +295,11 @@ async fn extra_evaluation_is_confirmed_when_it_replaces_one() {
         (&created["day"], &created["extra_evaluation"]),
         (&json!("2026-03-01"), &json!("joined late"))
     );
-    site.post(&path, Some(ADMIN), &beta_request)
-        .await
-        .problem(409, "conflict", &["queued or running"]);
+    site.post(&path, Some(ADMIN), &beta_request).await.problem(
+        409,
+        "conflict",
+        &["queued or running"],
+    );
     site.run_evaluation(|task, episode| crate::site::outcome(task, episode, false))
         .await;
     let board = site.get("/api/v1/board", None).await.json(200);

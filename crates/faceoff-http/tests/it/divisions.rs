@@ -105,7 +105,10 @@ async fn board_of_a_division_ranks_its_teams() {
         assert_eq!(teams(&places), ["A", "C"], "{path}");
         let ranks: Vec<_> = places.iter().map(|(rank, ..)| *rank).collect();
         assert_eq!(ranks, [1, 2], "{path}");
-        assert_eq!(places[0].1, 1, "{path}: rank groups are counted within the division");
+        assert_eq!(
+            places[0].1, 1,
+            "{path}: rank groups are counted within the division"
+        );
     }
 
     let open = site.get("/api/v1/board?division=open", None).await;

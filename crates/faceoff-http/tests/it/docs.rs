@@ -186,7 +186,10 @@ async fn search_finds_sections_and_marks_words() {
 
     let page = search(&site, "quidditch").await;
     let message = text_of(all(&page, "main")[0]);
-    assert!(message.contains("No section contains all words of “quidditch”"), "{message}");
+    assert!(
+        message.contains("No section contains all words of “quidditch”"),
+        "{message}"
+    );
     let page = search(&site, "").await;
     let message = text_of(all(&page, "main")[0]);
     assert!(message.contains("Enter one or more words"), "{message}");
@@ -256,7 +259,10 @@ async fn pages_have_metadata_for_link_previews() {
         attributes(page, &format!(r#"meta[property="{property}"]"#), "content")
     };
     let page = fetch_page(&site, "/docs/robot").await;
-    assert_eq!(metadata(&page, "og:title"), ["The robot and the table · Faceoff"]);
+    assert_eq!(
+        metadata(&page, "og:title"),
+        ["The robot and the table · Faceoff"]
+    );
     assert_eq!(metadata(&page, "og:type"), ["website"]);
     assert_eq!(
         metadata(&page, "og:description"),

@@ -14,7 +14,8 @@ async fn finished_evaluation(site: &Site, name: &str) -> (TestTeam, String, Stri
     let team = site.team(name).await;
     let submission = site.valid_submission(&team, "striker").await;
     let path = site.evaluate(&team, &submission).await;
-    site.finish_evaluation(&result([0.5, 0.6, 0.7], 100.0)).await;
+    site.finish_evaluation(&result([0.5, 0.6, 0.7], 100.0))
+        .await;
     (team, path, submission)
 }
 
@@ -104,7 +105,9 @@ async fn link_is_for_one_file_and_cannot_be_forged() {
         answer.problem(403, "link-invalid", &words);
     }
     for incomplete in ["expires=1", "signature=00", &query[..query.len() - 75]] {
-        let answer = site.get(&format!("{alpha_evaluation}/dataset?{incomplete}"), None).await;
+        let answer = site
+            .get(&format!("{alpha_evaluation}/dataset?{incomplete}"), None)
+            .await;
         answer.problem(400, "invalid-request", &["only some of them"]);
     }
     // Only a caller who may download the file may create a link. It expires after a week at most.
@@ -164,7 +167,11 @@ async fn link_is_valid_while_its_creator_may_download() {
     site.get(&again, None)
         .await
         .problem(403, "link-invalid", &["was revoked"]);
-    assert_eq!(status(&organiser_link).await, 200, "the organiser's link stays valid");
+    assert_eq!(
+        status(&organiser_link).await,
+        200,
+        "the organiser's link stays valid"
+    );
 }
 
 #[tokio::test]

@@ -18,7 +18,8 @@ impl FinishedEvaluation {
         let team = site.team("Alpha").await;
         let submission = site.valid_submission(&team, "striker").await;
         let path = site.evaluate(&team, &submission).await;
-        site.finish_evaluation(&result([0.5, 0.6, 0.7], 100.0)).await;
+        site.finish_evaluation(&result([0.5, 0.6, 0.7], 100.0))
+            .await;
         Self {
             dataset: format!("{path}/dataset"),
             archive: format!("{submission}/bundle"),
@@ -60,7 +61,9 @@ async fn download_resumes_with_range_requests() {
         ("bytes=-7", "dataset", "bytes 16-22/23"),
         ("bytes=-999", FILE, "bytes 0-22/23"),
     ] {
-        let part = evaluation.get(&[("range", range), ("if-range", &tag)]).await;
+        let part = evaluation
+            .get(&[("range", range), ("if-range", &tag)])
+            .await;
         assert_eq!(
             (part.status.as_u16(), part.body.as_str()),
             (206, expected),
@@ -150,11 +153,15 @@ async fn head_request_has_the_headers_of_the_file() {
             whole.headers["content-length"].to_str().unwrap()
         );
     }
-    let archive = evaluation.request(Method::GET, &evaluation.archive, &[]).await;
+    let archive = evaluation
+        .request(Method::GET, &evaluation.archive, &[])
+        .await;
     let hash = blake3::hash(&GZIP).to_string();
     assert_eq!(archive.header("x-content-blake3"), hash);
     let part = [("range", "bytes=2-2")];
-    let part = evaluation.request(Method::GET, &evaluation.archive, &part).await;
+    let part = evaluation
+        .request(Method::GET, &evaluation.archive, &part)
+        .await;
     assert_eq!((part.status.as_u16(), part.body.as_str()), (206, "\u{8}"));
     let organiser = evaluation
         .site

@@ -45,7 +45,10 @@ async fn evaluation_shows_progress_result_and_dataset() {
         json!({ "episodes_done": 12, "episodes_total": 12 })
     );
     let published = serde_json::to_value(&score).unwrap();
-    assert_eq!(finished["result"], published, "the day's last evaluation releases the day");
+    assert_eq!(
+        finished["result"], published,
+        "the day's last evaluation releases the day"
+    );
     assert_eq!(finished["released_at"], "2026-03-01T10:00:00Z");
     assert_eq!(finished["dataset"], format!("{path}/dataset"));
     let hash = blake3::hash(b"PK the recorded dataset").to_string();
@@ -183,7 +186,8 @@ async fn cancelled_evaluation_shows_reason_and_can_be_rerun() {
     site.post(missing, Some(ADMIN), &json!({}))
         .await
         .problem(404, "not-found", &[]);
-    site.finish_evaluation(&result([0.5, 0.6, 0.7], 100.0)).await;
+    site.finish_evaluation(&result([0.5, 0.6, 0.7], 100.0))
+        .await;
     let me = site.get("/api/v1/me", Some(&team.token)).await.json(200);
     assert_eq!(me["today"]["evaluation"], again["id"]);
 }
@@ -194,7 +198,8 @@ async fn evaluation_of_another_team_is_not_found() {
     let (owner, other) = (site.team("Owner").await, site.team("Other").await);
     let submission = site.valid_submission(&owner, "striker").await;
     let path = site.evaluate(&owner, &submission).await;
-    site.finish_evaluation(&result([0.5, 0.6, 0.7], 100.0)).await;
+    site.finish_evaluation(&result([0.5, 0.6, 0.7], 100.0))
+        .await;
     let dataset = format!("{path}/dataset");
     for path in [&path, &dataset] {
         let refused = site.get(path, Some(&other.token)).await;

@@ -181,7 +181,11 @@ async fn stream_shows_visible_events_without_scores() {
     let beta_events: Vec<&str> = beta_events
         .map(|event| event.data["kind"].as_str().unwrap())
         .collect();
-    assert_eq!(beta_events, ["team_created", "evaluation_finished"], "{beta_subject}");
+    assert_eq!(
+        beta_events,
+        ["team_created", "evaluation_finished"],
+        "{beta_subject}"
+    );
 }
 
 #[tokio::test]
@@ -268,7 +272,8 @@ async fn stream_is_filtered_by_topics() {
     let beta_events = events_until_announcement(&site, &query, None).await;
     assert_eq!(kinds(&beta_events), ["team_created", "evaluation_finished"]);
     let stage = site.stage().await;
-    let stage_events = events_until_announcement(&site, &format!("?about=stage:{stage},announced"), None).await;
+    let stage_events =
+        events_until_announcement(&site, &format!("?about=stage:{stage},announced"), None).await;
     assert_eq!(
         kinds(&stage_events),
         [
@@ -321,7 +326,11 @@ async fn number_of_event_readers_is_limited() {
     busy.problem(503, "busy", &["1 readers"]);
     assert_eq!(busy.header("retry-after"), "2");
     site.shut_down().await;
-    assert_eq!(stream.next().await, None, "the stream ends without an error");
+    assert_eq!(
+        stream.next().await,
+        None,
+        "the stream ends without an error"
+    );
 }
 
 #[tokio::test]
@@ -334,7 +343,11 @@ async fn stream_ends_when_its_token_is_replaced() {
     assert_eq!(beta_stream.next().await.unwrap().name, "now");
     let replace = format!("/api/v1/teams/{}/token", alpha.id);
     site.post(&replace, Some(ADMIN), &json!({})).await.json(200);
-    assert_eq!(alpha_stream.next().await, None, "the stream ends without an error");
+    assert_eq!(
+        alpha_stream.next().await,
+        None,
+        "the stream ends without an error"
+    );
     announce(&site).await;
     assert_eq!(beta_stream.next().await.unwrap().data["kind"], "announced");
 }

@@ -105,7 +105,10 @@ async fn unchanged_feed_answers_not_modified() {
         ("if-modified-since", modified.to_owned()),
     ] {
         let unchanged = get_with_header(name, &value).await;
-        assert_eq!((unchanged.status.as_u16(), unchanged.body.as_str()), (304, ""));
+        assert_eq!(
+            (unchanged.status.as_u16(), unchanged.body.as_str()),
+            (304, "")
+        );
         assert_eq!(unchanged.header("etag"), tag);
     }
     for (name, value) in [
@@ -120,5 +123,8 @@ async fn unchanged_feed_answers_not_modified() {
     let path = "/api/v1/announcements";
     site.post(path, Some(ADMIN), &announcement).await.json(201);
     assert_eq!(get_with_header("if-none-match", tag).await.status, 200);
-    assert_eq!(get_with_header("if-modified-since", modified).await.status, 200);
+    assert_eq!(
+        get_with_header("if-modified-since", modified).await.status,
+        200
+    );
 }

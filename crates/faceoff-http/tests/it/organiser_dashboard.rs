@@ -2,9 +2,9 @@
 
 use crate::{
     browser::{Browser, forms},
-    team_dashboard::{redirect_target, links, dashboard_page},
     html::texts,
     site::{ADMIN, Answer, Site, TestTeam, result, string},
+    team_dashboard::{dashboard_page, links, redirect_target},
 };
 use reqwest::Method;
 use serde_json::{Value, json};
@@ -55,7 +55,9 @@ async fn organiser_dashboard_is_for_organisers_only() {
     for path in PAGES {
         let page = dashboard_page(&grace.open(path).await, 200);
         assert_eq!(texts(&page, "h1").len(), 1, "{path}");
-        assert!(redirect_target(&visitor.open(path).await).starts_with("/sign-in?next=%2Forganiser"));
+        assert!(
+            redirect_target(&visitor.open(path).await).starts_with("/sign-in?next=%2Forganiser")
+        );
         // The access page exists for members, too: it shows their own users and tokens.
         if path != "/organiser/access" {
             let refused = ada.open(path).await;
@@ -65,7 +67,10 @@ async fn organiser_dashboard_is_for_organisers_only() {
                 "{}",
                 refused.body
             );
-            assert!(refused.body.contains("/desk"), "a link to the member's own dashboard");
+            assert!(
+                refused.body.contains("/desk"),
+                "a link to the member's own dashboard"
+            );
         }
     }
     let member_page = ada.open("/organiser/access").await;
@@ -240,7 +245,10 @@ async fn organiser_approves_changes_and_disqualifies_teams() {
         ("divisions", "Students\r\nOpen"),
     ];
     let changed = grace.submit("/organiser/teams/season", &season).await;
-    assert_eq!(redirect_target(&changed), "/organiser/teams?done=season-changed");
+    assert_eq!(
+        redirect_target(&changed),
+        "/organiser/teams?done=season-changed"
+    );
     let mut visitor = Browser::new(&site);
     for name in ["Alpha", "Beta"] {
         let fields = [("team_name", name), ("contact", "ada at example.org")];
@@ -272,7 +280,10 @@ async fn organiser_approves_changes_and_disqualifies_teams() {
     let changed = grace
         .submit(&format!("/organiser/teams/{id}"), &changes)
         .await;
-    assert_eq!(redirect_target(&changed), "/organiser/teams?done=team-changed");
+    assert_eq!(
+        redirect_target(&changed),
+        "/organiser/teams?done=team-changed"
+    );
     let team = site
         .get(&format!("/api/v1/teams/{id}"), None)
         .await
@@ -292,7 +303,10 @@ async fn organiser_approves_changes_and_disqualifies_teams() {
     dashboard_page(&refused, 409);
 
     let (link, page) = open_decision(&mut grace, "/organiser/teams", "disqualify/").await;
-    assert!(texts(&dashboard_page(&page, 200), "#what")[0].starts_with("Alpha would disappear from all boards"));
+    assert!(
+        texts(&dashboard_page(&page, 200), "#what")[0]
+            .starts_with("Alpha would disappear from all boards")
+    );
     let fields = [("reason", "it read the seed"), ("confirm", "Alpha")];
     assert!(redirect_target(&grace.submit(&link, &fields).await).ends_with("done=disqualified"));
     assert_eq!(
@@ -310,13 +324,7 @@ async fn organiser_approves_changes_and_disqualifies_teams() {
         .submit("/organiser/access/invitations", &founder)
         .await;
     let link = texts(&dashboard_page(&made, 201), ".secret code").remove(0);
-    assert!(
-        visitor
-            .open(&link)
-            .await
-            .body
-            .contains("Create your team")
-    );
+    assert!(visitor.open(&link).await.body.contains("Create your team"));
     let member = [("role", "member"), ("team", ""), ("note", "Ada")];
     let refused = grace.submit("/organiser/access/invitations", &member).await;
     let html = dashboard_page(&refused, 422);
@@ -433,7 +441,10 @@ async fn organiser_creates_changes_freezes_and_signs_off_a_stage() {
     );
 
     let (link, _) = open_decision(&mut grace, &path, "freeze/").await;
-    assert!(redirect_target(&grace.submit(&link, &[("reason", "the final")]).await).ends_with("done=frozen"));
+    assert!(
+        redirect_target(&grace.submit(&link, &[("reason", "the final")]).await)
+            .ends_with("done=frozen")
+    );
     let (link, _) = open_decision(&mut grace, &path, "unfreeze/").await;
     assert!(redirect_target(&grace.submit(&link, &[]).await).ends_with("done=unfrozen"));
     let page = browser.open(&path).await;
@@ -504,12 +515,18 @@ async fn question_is_asked_by_a_team_and_answered_by_an_organiser() {
     );
     let form = forms("/organiser/messages", &page).remove(0);
     let answered = grace.submit(&form.action, &[("text", "You may.")]).await;
-    assert_eq!(redirect_target(&answered), "/organiser/messages?done=answered");
+    assert_eq!(
+        redirect_target(&answered),
+        "/organiser/messages?done=answered"
+    );
     assert_eq!(newest(&site, "answered").await["actor_name"], "Grace");
     let ada_page = dashboard_page(&ada.open("/desk/questions").await, 200);
     assert!(texts(&ada_page, ".entry")[0].contains("You may."));
     let ben_page = dashboard_page(&ben.open("/desk/questions").await, 200);
-    assert!(texts(&ben_page, ".entry").is_empty(), "the answer is not public");
+    assert!(
+        texts(&ben_page, ".entry").is_empty(),
+        "the answer is not public"
+    );
     let public = [("text", "Everybody may."), ("public", "on")];
     redirect_target(&grace.submit(&form.action, &public).await);
     let ben_page = dashboard_page(&ben.open("/desk/questions").await, 200);
@@ -521,7 +538,10 @@ async fn question_is_asked_by_a_team_and_answered_by_an_organiser() {
 
     let news = [("title", "No day on Sunday"), ("text", "The power is off.")];
     let announced = grace.submit("/organiser/messages", &news).await;
-    assert_eq!(redirect_target(&announced), "/organiser/messages?done=announced");
+    assert_eq!(
+        redirect_target(&announced),
+        "/organiser/messages?done=announced"
+    );
     assert!(
         ben.open("/announcements")
             .await
@@ -534,7 +554,10 @@ async fn question_is_asked_by_a_team_and_answered_by_an_organiser() {
     let terms = grace
         .submit("/organiser/messages/terms", &[("text", "Be fair.")])
         .await;
-    assert_eq!(redirect_target(&terms), "/organiser/messages?done=published");
+    assert_eq!(
+        redirect_target(&terms),
+        "/organiser/messages?done=published"
+    );
     let html = dashboard_page(&ben.open("/desk").await, 200);
     assert_eq!(
         texts(&html, "section[aria-labelledby=terms] button"),

@@ -17,9 +17,7 @@ fn solve_first(count: u32) -> impl Fn(Task, u32) -> faceoff_types::EpisodeOutcom
 /// A released day on which Alpha solved three of four episodes and Beta two. Returns their evaluations.
 async fn run_day(site: &Site) -> [String; 2] {
     let [three, two] = [solve_first(3), solve_first(2)];
-    let ids = site
-        .run_day(4, [("Alpha", &three), ("Beta", &two)])
-        .await;
+    let ids = site.run_day(4, [("Alpha", &three), ("Beta", &two)]).await;
     ids.map(|id| id.to_string())
 }
 
@@ -60,7 +58,10 @@ async fn trial_is_visible_to_organisers_only() {
     for (wrong, words) in [
         (json!({}), "reason"),
         (json!({ "reason": "" }), "reason"),
-        (json!({ "reason": REASON, "submission": "mine" }), "submission"),
+        (
+            json!({ "reason": REASON, "submission": "mine" }),
+            "submission",
+        ),
         (json!({ "reason": REASON, "day": "2026-03-01" }), "day"),
     ] {
         post(&site, &path, wrong)
@@ -98,7 +99,10 @@ async fn trial_is_visible_to_organisers_only() {
     assert_eq!(finished["evaluations"][0]["result"]["score"], 100.0);
     assert_eq!(finished["outcome"]["new_board"]["rows"][0]["team"], "Alpha");
     assert_eq!(
-        (&finished["outcome"]["old_board"], &finished["outcome"]["changes"]),
+        (
+            &finished["outcome"]["old_board"],
+            &finished["outcome"]["changes"]
+        ),
         (&Value::Null, &json!([]))
     );
 
@@ -157,9 +161,13 @@ async fn re_evaluation_previews_and_applies_rank_changes() {
     assert_eq!(ranked_teams(&site).await, ["Alpha", "Beta"]);
     let stage = site.stage().await;
     let path = format!("/api/v1/stages/{stage}/proposals");
-    let made = post(&site, &path, json!({ "day": "2026-03-01", "reason": REASON }))
-        .await
-        .json(201);
+    let made = post(
+        &site,
+        &path,
+        json!({ "day": "2026-03-01", "reason": REASON }),
+    )
+    .await
+    .json(201);
     let proposal = format!("/api/v1/proposals/{}", string(&made["id"]));
     let apply = format!("{proposal}/apply");
     post(&site, &apply, json!({ "confirm": "2026-03-01" }))
@@ -176,7 +184,11 @@ async fn re_evaluation_previews_and_applies_rank_changes() {
         Value::Null
     );
     site.run_evaluation(solve_first(2)).await;
-    assert_eq!(ranked_teams(&site).await, ["Alpha", "Beta"], "nothing has changed");
+    assert_eq!(
+        ranked_teams(&site).await,
+        ["Alpha", "Beta"],
+        "nothing has changed"
+    );
 
     let view = site.get(&proposal, Some(ADMIN)).await.json(200);
     assert_eq!(
@@ -189,7 +201,10 @@ async fn re_evaluation_previews_and_applies_rank_changes() {
         .iter()
         .map(|one| string(&one["replaces"]))
         .collect();
-    assert_eq!(replaced, [alpha_evaluation.clone(), beta_evaluation.clone()]);
+    assert_eq!(
+        replaced,
+        [alpha_evaluation.clone(), beta_evaluation.clone()]
+    );
     let outcome = &view["outcome"];
     let teams = |board: &Value| -> Vec<String> {
         let rows = board["rows"].as_array().unwrap().iter();
@@ -224,10 +239,16 @@ async fn re_evaluation_previews_and_applies_rank_changes() {
     );
     assert_eq!(ranked_teams(&site).await, ["Beta", "Alpha"]);
     let old = site
-        .get(&format!("/api/v1/evaluations/{alpha_evaluation}"), Some(ADMIN))
+        .get(
+            &format!("/api/v1/evaluations/{alpha_evaluation}"),
+            Some(ADMIN),
+        )
         .await
         .json(200);
-    assert_eq!(old["voided"]["reason"], format!("evaluated again: {REASON}"));
+    assert_eq!(
+        old["voided"]["reason"],
+        format!("evaluated again: {REASON}")
+    );
     let board = site.get("/api/v1/board", None).await.json(200);
     let new = string(&board["rows"][1]["evaluation"]);
     assert_eq!(json!(new), view["evaluations"][0]["evaluation"]);
@@ -288,9 +309,13 @@ async fn invalid_re_evaluation_is_refused_with_the_reason() {
             .await
             .problem(422, "invalid-content", &[words]);
     }
-    post(&site, &path, json!({ "day": "2026-03-02", "reason": REASON }))
-        .await
-        .problem(404, "not-found", &["day"]);
+    post(
+        &site,
+        &path,
+        json!({ "day": "2026-03-02", "reason": REASON }),
+    )
+    .await
+    .problem(404, "not-found", &["day"]);
     post(
         &site,
         &path,
@@ -460,9 +485,11 @@ async fn proposal_datasets_are_for_organisers_until_dropped() {
         (&json!("finished"), &Value::Null, &Value::Null)
     );
     for _ in ["before the file is removed", "after the file is removed"] {
-        site.get(&trial_dataset, Some(ADMIN))
-            .await
-            .problem(410, "gone", &["was dropped at", &proposal]);
+        site.get(&trial_dataset, Some(ADMIN)).await.problem(
+            410,
+            "gone",
+            &["was dropped at", &proposal],
+        );
         site.store
             .remove_dropped_datasets(site.now())
             .await

@@ -20,7 +20,8 @@ async fn unfinished_day(site: &Site, publishes: &str) -> ([TestTeam; 2], String)
     let settings = json!({ "publishes": publishes, "closes_at": CLOSES });
     change(site, settings).await.json(200);
     let path = site.evaluate(&teams[0], &submission).await;
-    site.finish_evaluation(&result([0.5, 0.6, 0.7], 100.0)).await;
+    site.finish_evaluation(&result([0.5, 0.6, 0.7], 100.0))
+        .await;
     (teams, path)
 }
 
@@ -89,9 +90,11 @@ async fn team_publishes_its_dataset_after_the_release() {
     let ([alpha, beta], path) = unfinished_day(&site, "at_close").await;
     let publish = format!("{path}/publish");
     let post_publish = async |token: Option<&str>| site.post(&publish, token, &json!({})).await;
-    post_publish(Some(&alpha.token))
-        .await
-        .problem(409, "not-yet", &["1 evaluations of 2026-03-01"]);
+    post_publish(Some(&alpha.token)).await.problem(
+        409,
+        "not-yet",
+        &["1 evaluations of 2026-03-01"],
+    );
     let running = site
         .get("/api/v1/evaluations", Some(&beta.token))
         .await
@@ -104,12 +107,21 @@ async fn team_publishes_its_dataset_after_the_release() {
         .await
         .problem(409, "conflict", &["only a finished evaluation"]);
     site.finish_evaluation(&result([0.1, 0.2, 0.3], 10.0)).await;
-    post_publish(None).await.problem(401, "unauthenticated", &[]);
-    post_publish(Some(ADMIN)).await.problem(403, "forbidden", &["team"]);
-    post_publish(Some(&beta.token)).await.problem(404, "not-found", &[]);
+    post_publish(None)
+        .await
+        .problem(401, "unauthenticated", &[]);
+    post_publish(Some(ADMIN))
+        .await
+        .problem(403, "forbidden", &["team"]);
+    post_publish(Some(&beta.token))
+        .await
+        .problem(404, "not-found", &[]);
     assert!(!is_public(&site, &path).await);
     for _ in 0..2 {
-        assert_eq!(post_publish(Some(&alpha.token)).await.json(200)["public"], true);
+        assert_eq!(
+            post_publish(Some(&alpha.token)).await.json(200)["public"],
+            true
+        );
     }
     assert!(is_public(&site, &path).await);
     post_publish(Some(&beta.token))
@@ -134,7 +146,11 @@ async fn published_failure_hides_faults_and_log() {
     assert!(team_view["log"].as_str().unwrap().contains("log of"));
     let public_view = site.get(&path, None).await.json(200);
     assert_eq!(
-        (&public_view["state"], public_view.get("log"), public_view.get("faults")),
+        (
+            &public_view["state"],
+            public_view.get("log"),
+            public_view.get("faults")
+        ),
         (&json!("agent_failed"), None, None)
     );
 }

@@ -14,7 +14,11 @@ fn at_once(burst: u32) -> Option<RateLimit> {
 }
 
 /// Sends requests until one is refused. Returns that response.
-async fn request_until_refused(site: &Site, token: Option<&str>, forwarded: Option<&str>) -> Answer {
+async fn request_until_refused(
+    site: &Site,
+    token: Option<&str>,
+    forwarded: Option<&str>,
+) -> Answer {
     // So many requests take a minute on a slow machine.
     for _ in 0..100_000 {
         let mut request = site.request(Method::GET, "/api/v1/season", token);

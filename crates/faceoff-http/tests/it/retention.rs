@@ -106,7 +106,10 @@ async fn retention_is_confirmed_applied_and_reported() {
         "{}",
         page.body
     );
-    assert!(!page.body.contains("/dataset\""), "the removed dataset is not linked");
+    assert!(
+        !page.body.contains("/dataset\""),
+        "the removed dataset is not linked"
+    );
 
     // Keeping more removes nothing, so no confirmation is needed.
     let all = change(&site, json!({ "retention": {} })).await.json(200);
@@ -275,17 +278,18 @@ async fn deleted_submission_keeps_its_results() {
     site.get(&archive, own).await.problem(
         410,
         "removed",
-        &[
-            "the bundle of the submission was removed on",
-            "by its team",
-        ],
+        &["the bundle of the submission was removed on", "by its team"],
     );
     delete(&site, &submission, own, confirm)
         .await
         .problem(409, "conflict", &["was deleted on"]);
     site.post(&format!("{submission}/activate"), own, &json!({}))
         .await
-        .problem(409, "conflict", &["was removed", "cannot be evaluated again"]);
+        .problem(
+            409,
+            "conflict",
+            &["was removed", "cannot be evaluated again"],
+        );
     let view = site.get(&evaluation, own).await.json(200);
     assert_eq!(view["state"], "finished");
     let board = site.get("/api/v1/board", None).await.json(200);
@@ -314,11 +318,9 @@ async fn organiser_deletes_with_a_reason_but_not_evidence() {
     let ruling = json!({ "reason": "it spied", "confirm": "Alpha" });
     site.post(&disqualify, Some(ADMIN), &ruling).await.json(200);
     for token in [own, Some(ADMIN)] {
-        delete(&site, &second, token, request.clone()).await.problem(
-            409,
-            "conflict",
-            &["it spied", "kept as evidence"],
-        );
+        delete(&site, &second, token, request.clone())
+            .await
+            .problem(409, "conflict", &["it spied", "kept as evidence"]);
     }
     // An organiser can still download a recently deleted archive; its team cannot.
     let archive = format!("{first}/bundle");

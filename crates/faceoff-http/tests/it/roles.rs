@@ -309,7 +309,8 @@ impl RoleFixture {
         };
         let submission = site.valid_submission(&alpha, "a").await;
         let evaluation = site.evaluate(&alpha, &submission).await;
-        site.finish_evaluation(&crate::site::result([0.5; 3], 10.0)).await;
+        site.finish_evaluation(&crate::site::result([0.5; 3], 10.0))
+            .await;
         let game = played_test_game(&site, &alpha).await;
         let question = site
             .post(

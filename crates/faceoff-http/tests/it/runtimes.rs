@@ -70,9 +70,17 @@ async fn runtimes_of_open_stages_are_sent_to_validation_runs() {
     assert_eq!(sent_runtimes().await.len(), 1);
     let second_open = json!({ "name": "Beside", "runtimes": ["native"] });
     create_stage(second_open).await;
-    assert_eq!(sent_runtimes().await.len(), 2, "one of the two stages may accept it");
+    assert_eq!(
+        sent_runtimes().await.len(),
+        2,
+        "one of the two stages may accept it"
+    );
     create_stage(json!({ "name": "Open", "runtimes": null })).await;
-    assert_eq!(sent_runtimes().await, [""; 0], "one of the open stages accepts all runtimes");
+    assert_eq!(
+        sent_runtimes().await,
+        [""; 0],
+        "one of the open stages accepts all runtimes"
+    );
 
     let all = set_runtimes(&site, Value::Null).await;
     assert_eq!((all.get("runtimes"), &all["revision"]), (None, &json!(3)));
@@ -162,7 +170,11 @@ async fn excluded_runtime_is_not_evaluated_and_says_why() {
         .problem(409, "conflict", &[why]);
     site.finish_evaluation(&result([0.5; 3], 10.0)).await;
     let me = site.get("/api/v1/me", Some(&alpha.token)).await.json(200);
-    assert_eq!(me["today"]["evaluation"], Value::Null, "no evaluation was created");
+    assert_eq!(
+        me["today"]["evaluation"],
+        Value::Null,
+        "no evaluation was created"
+    );
 
     // Rules that accept none of the day's agents allow no re-evaluation.
     set_runtimes(&site, json!(["native"])).await;

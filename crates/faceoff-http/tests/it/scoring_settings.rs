@@ -21,9 +21,11 @@ async fn scoring_settings_are_rules_and_apply_to_the_board() {
         "tier_bounds": { "deployable": 0.1, "improvable": 1.6 },
         "perturbations": { "tracking_loss": { "probability": 0.5 } },
     });
-    change(&site, settings.clone())
-        .await
-        .problem(409, "not-confirmed", &["revision 2", "empty board"]);
+    change(&site, settings.clone()).await.problem(
+        409,
+        "not-confirmed",
+        &["revision 2", "empty board"],
+    );
     let mut confirmed = settings;
     confirmed["confirm"] = json!("Qualifying");
     let changed = change(&site, confirmed).await.json(200);
@@ -123,10 +125,7 @@ async fn board_without_settings_shows_those_of_the_ruleset() {
         page.contains("0.4 × hit + 0.4 × defend + 0.2 × prepare"),
         "{page}"
     );
-    assert!(
-        !page.contains("own perturbation magnitudes"),
-        "{page}"
-    );
+    assert!(!page.contains("own perturbation magnitudes"), "{page}");
 }
 
 #[tokio::test]

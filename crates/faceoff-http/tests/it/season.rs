@@ -27,7 +27,8 @@ async fn closing_the_season_reveals_its_secret() {
         "conflict",
         &["1 evaluations", "cancel"],
     );
-    site.finish_evaluation(&result([0.5, 0.6, 0.7], 100.0)).await;
+    site.finish_evaluation(&result([0.5, 0.6, 0.7], 100.0))
+        .await;
 
     let closed = site.post(CLOSE, Some(ADMIN), &confirm).await.json(200);
     let season = site.get("/api/v1/season", Some(ADMIN)).await.json(200);
@@ -91,7 +92,8 @@ async fn season_page_explains_how_to_verify_seeds() {
     let submission = site.valid_submission(&early, "e").await;
     site.valid_submission(&late, "l").await;
     site.evaluate(&early, &submission).await;
-    site.finish_evaluation(&result([0.5, 0.6, 0.7], 100.0)).await;
+    site.finish_evaluation(&result([0.5, 0.6, 0.7], 100.0))
+        .await;
     let season: Value = site.get("/api/v1/season", None).await.json(200);
     let commitment = string(&season["commitment"]);
     let check_html = |body: &str| {
@@ -113,7 +115,8 @@ async fn season_page_explains_how_to_verify_seeds() {
     ] {
         assert!(open.body.contains(part), "{part:?} is not in {}", open.body);
     }
-    site.finish_evaluation(&result([0.5, 0.6, 0.7], 100.0)).await;
+    site.finish_evaluation(&result([0.5, 0.6, 0.7], 100.0))
+        .await;
     site.post(CLOSE, Some(ADMIN), &json!({ "confirm": "Test season" }))
         .await
         .json(200);

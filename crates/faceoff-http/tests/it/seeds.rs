@@ -140,7 +140,8 @@ async fn faults_log_and_comparison_appear_with_the_release() {
         panic!("three evaluations")
     };
     site.run_shards(2).await;
-    site.finish_evaluation(&result([0.5, 0.6, 0.7], 100.0)).await;
+    site.finish_evaluation(&result([0.5, 0.6, 0.7], 100.0))
+        .await;
     let compare = format!("{early}/compare/{}", late.rsplit('/').next().unwrap());
     for token in [&*teams[0].token, ADMIN] {
         let failed = site.get(failing, Some(token)).await;
@@ -174,7 +175,8 @@ async fn comparison_is_refused_while_the_day_is_open() {
         paths.push(site.evaluate(team, submission).await);
     }
     for _ in 0..2 {
-        site.finish_evaluation(&result([0.5, 0.6, 0.7], 100.0)).await;
+        site.finish_evaluation(&result([0.5, 0.6, 0.7], 100.0))
+            .await;
     }
     let compare = format!(
         "{}/compare/{}",
@@ -199,7 +201,8 @@ async fn mismatch_seed_is_hidden_until_the_season_closes() {
     let team = site.team("Alpha").await;
     let submission = site.valid_submission(&team, "a").await;
     let path = site.evaluate(&team, &submission).await;
-    site.finish_evaluation(&result([0.5, 0.6, 0.7], 100.0)).await;
+    site.finish_evaluation(&result([0.5, 0.6, 0.7], 100.0))
+        .await;
     site.next_day();
     let secret = site.store.season().await.unwrap().secret;
     let visible_text = visible_text(&site, &team, &path).await;

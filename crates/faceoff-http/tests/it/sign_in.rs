@@ -141,7 +141,10 @@ async fn registration_link_shows_its_status() {
     assert_eq!(done.status, 201);
     let link = first_text(&done, "section a");
     let registered = browser.open(&link).await;
-    assert_eq!(first_text(&registered, "h1"), "Alpha is waiting for approval");
+    assert_eq!(
+        first_text(&registered, "h1"),
+        "Alpha is waiting for approval"
+    );
     let listed = site
         .get("/api/v1/registrations", Some(ADMIN))
         .await

@@ -24,9 +24,11 @@ async fn signed_off_stage_does_not_change() {
     let sign = format!("/api/v1/stages/{stage}/finalise");
     let post_sign_off = async |body: Value| site.post(&sign, Some(ADMIN), &body).await;
     let confirmed = json!({ "confirm": "Qualifying" });
-    post_sign_off(confirmed.clone())
-        .await
-        .problem(409, "conflict", &["has not closed", "no end yet"]);
+    post_sign_off(confirmed.clone()).await.problem(
+        409,
+        "conflict",
+        &["has not closed", "no end yet"],
+    );
     change(
         &site,
         &stage,
@@ -34,9 +36,11 @@ async fn signed_off_stage_does_not_change() {
     )
     .await
     .json(200);
-    post_sign_off(confirmed.clone())
-        .await
-        .problem(409, "conflict", &["2026-03-01 at 12:00:00 UTC"]);
+    post_sign_off(confirmed.clone()).await.problem(
+        409,
+        "conflict",
+        &["2026-03-01 at 12:00:00 UTC"],
+    );
     site.advance(3 * 3600);
     post_sign_off(confirmed.clone()).await.problem(
         409,
@@ -44,13 +48,15 @@ async fn signed_off_stage_does_not_change() {
         &["2 evaluations", "wait until they are over"],
     );
     for score in [0.5, 0.6] {
-        site.finish_evaluation(&result([score, 0.6, 0.7], 100.0)).await;
+        site.finish_evaluation(&result([score, 0.6, 0.7], 100.0))
+            .await;
     }
     for body in [json!({}), json!({ "confirm": "qualifying" })] {
-        let problem =
-            post_sign_off(body)
-                .await
-                .problem(409, "not-confirmed", &["Qualifying", "for good", "confirm"]);
+        let problem = post_sign_off(body).await.problem(
+            409,
+            "not-confirmed",
+            &["Qualifying", "for good", "confirm"],
+        );
         assert_eq!(problem["confirm"], "Qualifying");
     }
     post_sign_off(json!({ "confirm": 7 }))
@@ -91,7 +97,9 @@ async fn signed_off_stage_does_not_change() {
     assert!(site.get("/season", None).await.body.contains("signed off"));
 
     let words = ["signed off on 2026-03-01 at 13:00:00 UTC"];
-    post_sign_off(confirmed).await.problem(409, "conflict", &words);
+    post_sign_off(confirmed)
+        .await
+        .problem(409, "conflict", &words);
     let void = json!({ "reason": "why", "confirm": "Alpha" });
     site.post(&format!("{path}/void"), Some(ADMIN), &void)
         .await
@@ -119,7 +127,10 @@ async fn signed_off_stage_does_not_change() {
     .await
     .json(200);
     let after = site.get("/api/v1/board", None).await.json(200);
-    assert_eq!(after["rows"], board["rows"], "the signed-off board does not change");
+    assert_eq!(
+        after["rows"], board["rows"],
+        "the signed-off board does not change"
+    );
     assert_eq!(after["disqualified"], json!([]));
     let log = site
         .get("/api/v1/events?kind=stage_finalised", Some(ADMIN))

@@ -3,8 +3,8 @@
 
 use faceoff_api::token::hash_token;
 use faceoff_http::{
-    Capacity, CapacityMonitor, ConnectionLimits, HttpConfig, HttpLimits, MinTransferRate, LinkKey, AgentResources,
-    RateLimits, router,
+    AgentResources, Capacity, CapacityMonitor, ConnectionLimits, HttpConfig, HttpLimits, LinkKey,
+    MinTransferRate, RateLimits, router,
 };
 use faceoff_metrics::{Metrics, Process};
 use faceoff_notify::WebhookRules;
@@ -482,7 +482,10 @@ impl Site {
 
     /// Runs the next evaluation with the outcomes that `outcome_fn` returns for its episodes, and scores it by the rules.
     /// Returns the evaluation's id.
-    pub async fn run_evaluation(&self, outcome_fn: impl Fn(Task, u32) -> EpisodeOutcome) -> EvaluationId {
+    pub async fn run_evaluation(
+        &self,
+        outcome_fn: impl Fn(Task, u32) -> EpisodeOutcome,
+    ) -> EvaluationId {
         let mut outcomes = Vec::new();
         loop {
             let ClaimedJob { claim, job } = self.claim().await;
@@ -517,7 +520,12 @@ impl Site {
     }
 
     /// Commits the result of an evaluation with a dataset.
-    pub async fn commit_evaluation(&self, claim: &JobClaim, id: EvaluationId, result: &EvaluationResult) {
+    pub async fn commit_evaluation(
+        &self,
+        claim: &JobClaim,
+        id: EvaluationId,
+        result: &EvaluationResult,
+    ) {
         let dataset = self.folder.path().join("dataset.zip");
         let archive = b"PK the recorded dataset";
         std::fs::write(&dataset, archive).unwrap();

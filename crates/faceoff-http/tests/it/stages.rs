@@ -90,7 +90,8 @@ async fn stage_is_created_changed_and_played() {
         (&day["stage"], &day["day"]),
         (&created["id"], &json!("2026-03-02"))
     );
-    site.finish_evaluation(&result([0.5, 0.6, 0.7], 100.0)).await;
+    site.finish_evaluation(&result([0.5, 0.6, 0.7], 100.0))
+        .await;
     let board = site.get("/api/v1/board", None).await.json(200);
     assert_eq!(
         (
@@ -109,7 +110,8 @@ async fn changed_rules_need_confirmation_and_have_their_own_board() {
     let team = site.team("Alpha").await;
     let submission = site.valid_submission(&team, "a").await;
     site.evaluate(&team, &submission).await;
-    site.finish_evaluation(&result([0.5, 0.6, 0.7], 100.0)).await;
+    site.finish_evaluation(&result([0.5, 0.6, 0.7], 100.0))
+        .await;
     let stage = site.get("/api/v1/stages", None).await.json(200)[0].clone();
     let harder = json!({ "episodes_per_task": 9 });
     let problem = change(&site, &stage, harder).await;

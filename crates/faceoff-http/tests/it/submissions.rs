@@ -355,19 +355,21 @@ async fn team_labels_and_withdraws_its_submission() {
         &["label, note, or both", "got neither"],
     );
     let note = "line one\nline two";
-    let with_note = describe(&team.token, json!({ "note": note })).await.json(200);
+    let with_note = describe(&team.token, json!({ "note": note }))
+        .await
+        .json(200);
     assert_eq!(
         (&with_note["note"], &with_note["label"]),
         (&json!(note), &json!("baseline"))
     );
     for wrong in [json!(" "), json!("x".repeat(2001))] {
-        describe(&team.token, json!({ "note": wrong })).await.problem(
-            422,
-            "invalid-content",
-            &["note", "1 to 2000"],
-        );
+        describe(&team.token, json!({ "note": wrong }))
+            .await
+            .problem(422, "invalid-content", &["note", "1 to 2000"]);
     }
-    let labelled = describe(&team.token, json!({ "label": null })).await.json(200);
+    let labelled = describe(&team.token, json!({ "label": null }))
+        .await
+        .json(200);
     assert_eq!(labelled.get("label"), None);
     assert_eq!(labelled["note"], note, "omitted fields do not change");
 

@@ -5,7 +5,7 @@ use crate::{
     html::texts,
     site::{ADMIN, Answer, GZIP, MAX_BUNDLE, Site, TestTeam, result, string},
 };
-use faceoff_types::{ValidationOutcome, ValidationTiming, Task};
+use faceoff_types::{Task, ValidationOutcome, ValidationTiming};
 use scraper::{Html, Selector};
 use serde_json::json;
 
@@ -136,7 +136,10 @@ async fn member_uploads_and_selects_the_active_submission() {
 
     let words = [("label", "Fast one"), ("note", "two\r\nlines")];
     let described = ada.submit(&format!("{page}/describe"), &words).await;
-    assert_eq!(described.header("location"), format!("{page}?done=described"));
+    assert_eq!(
+        described.header("location"),
+        format!("{page}?done=described")
+    );
     let html = dashboard_page(&ada.open(&page).await, 200);
     assert_eq!(texts(&html, "h1"), ["Fast one"]);
     let long = "x".repeat(81);
@@ -172,7 +175,11 @@ async fn invalid_archive_is_refused_on_the_page() {
         let html = dashboard_page(&refused, status);
         let alert = &texts(&html, "[role=alert]")[0];
         assert!(alert.contains(words), "{alert}");
-        assert_eq!(texts(&html, "form[data-upload]").len(), 1, "the form is shown again");
+        assert_eq!(
+            texts(&html, "form[data-upload]").len(),
+            1,
+            "the form is shown again"
+        );
     }
     // An archive of exactly the maximum size is accepted.
     let most = [&GZIP[..], &vec![0; MAX_BUNDLE as usize - GZIP.len()]].concat();
@@ -208,7 +215,10 @@ async fn visitor_is_redirected_to_sign_in_and_back() {
     ] {
         let redirected = browser.open(path).await;
         assert_eq!(redirected.status, 303);
-        assert_eq!(redirected.header("location"), format!("/sign-in?next={next}"));
+        assert_eq!(
+            redirected.header("location"),
+            format!("/sign-in?next={next}")
+        );
     }
     let sent = browser
         .submit("/desk/access/tokens", &[("name", "a")])
@@ -415,7 +425,11 @@ async fn dashboard_lists_evaluations_with_their_files() {
     let row = texts(&html, "section[aria-labelledby=evaluations] tbody tr").remove(0);
     assert!(row.starts_with("2026-03-01finished 50.0"), "{row}");
     let dataset = links(&html, "a[href$='/dataset']").remove(0);
-    assert_eq!(ada.open(&dataset).await.status, 200, "authenticated by the session");
+    assert_eq!(
+        ada.open(&dataset).await.status,
+        200,
+        "authenticated by the session"
+    );
     let archive = links(&html, "a[href$='/archive']").remove(0);
     assert_eq!(ada.open(&archive).await.status, 200);
 }

@@ -2,14 +2,14 @@
 
 mod archive;
 pub mod cup;
+mod decisions;
 mod downloads;
+pub mod fake_slot;
 mod formats;
-mod test_games;
 mod game_page;
+mod invalid_input;
 mod live;
 mod pages;
 mod paper_results;
 mod replays;
-mod decisions;
-pub mod fake_slot;
-mod invalid_input;
+mod test_games;

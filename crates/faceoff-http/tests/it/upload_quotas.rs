@@ -60,7 +60,10 @@ async fn concurrent_uploads_are_limited_per_team() {
     })
     .await;
     let (busy, other) = (site.team("Busy").await, site.team("Other").await);
-    let open_uploads = [OpenUpload::begin(&site, &busy), OpenUpload::begin(&site, &busy)];
+    let open_uploads = [
+        OpenUpload::begin(&site, &busy),
+        OpenUpload::begin(&site, &busy),
+    ];
     wait_for_uploads(&site, 2).await;
     let third = site.upload(&busy.token, bundle(100)).await;
     let problem = third.problem(429, "too-many-uploads", &["2 uploads of your team"]);

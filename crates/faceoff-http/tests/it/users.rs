@@ -196,7 +196,9 @@ async fn tokens_are_created_rotated_and_revoked_at_once() {
         .problem(403, "forbidden", &["cannot create tokens"]);
     let soon = (site.now() + jiff::SignedDuration::from_secs(60)).to_string();
     let team_token = json!({ "name": "ci", "team": alpha.id, "expires_at": soon });
-    let ci = post(&site, "/tokens", &ada.token, &team_token).await.json(201);
+    let ci = post(&site, "/tokens", &ada.token, &team_token)
+        .await
+        .json(201);
     let ci_token = string(&ci["secret"]);
     assert!(ci_token.starts_with("fo_team_"));
     assert_eq!(get(&site, "/whoami", &ci_token).await["role"], "team");
@@ -371,11 +373,7 @@ async fn session_expires_and_ends_with_a_new_password() {
         .await
         .problem(403, "forbidden", &["only the user", "return"]);
     set(&ada.token, new).await.json(200);
-    assert_eq!(
-        whoami(&first).await,
-        401,
-        "earlier sessions have ended"
-    );
+    assert_eq!(whoami(&first).await, 401, "earlier sessions have ended");
     get(&site, "/whoami", &ada.token).await;
     let second = sign_in("battery horse correct").await;
     site.advance(14 * 24 * 3600 - 1);

@@ -70,7 +70,12 @@ impl Drop for Receiver {
     }
 }
 
-async fn receive(State(state): State<ReceiverState>, uri: Uri, headers: HeaderMap, body: Bytes) -> Response {
+async fn receive(
+    State(state): State<ReceiverState>,
+    uri: Uri,
+    headers: HeaderMap,
+    body: Bytes,
+) -> Response {
     assert_eq!(uri.path(), "/hook", "no other path is requested");
     assert_eq!(headers[header::CONTENT_TYPE], "application/json");
     let header_text = |name: &str| headers[name].to_str().unwrap().to_owned();
@@ -124,7 +129,8 @@ impl Receiver {
     /// Waits until at least `count` requests have arrived.
     pub async fn wait_for(&self, count: usize) -> Vec<ReceivedRequest> {
         let mut requests = self.state.requests.subscribe();
-        requests.wait_for(|all| all.len() >= count)
+        requests
+            .wait_for(|all| all.len() >= count)
             .await
             .unwrap()
             .clone()
@@ -132,6 +138,9 @@ impl Receiver {
 
     pub fn types(&self) -> Vec<String> {
         let requests = self.requests();
-        requests.iter().map(|one| string(&one.json()["type"])).collect()
+        requests
+            .iter()
+            .map(|one| string(&one.json()["type"]))
+            .collect()
     }
 }

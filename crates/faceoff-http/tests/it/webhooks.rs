@@ -1,8 +1,8 @@
 //! Webhooks, with a receiver on a real port that verifies the signatures.
 
 use crate::{
-    webhook_receiver::{Behaviour, Receiver},
     site::{ADMIN, Answer, Site, TestTeam, result, string},
+    webhook_receiver::{Behaviour, Receiver},
 };
 use faceoff_notify::{Deliverer, WebhookRules};
 use reqwest::Method;
@@ -30,7 +30,10 @@ fn deliverer(site: &Site, rules: WebhookRules) -> Deliverer {
 }
 
 async fn deliver(site: &Site) {
-    deliverer(site, rules_for_loopback()).deliver_due().await.unwrap();
+    deliverer(site, rules_for_loopback())
+        .deliver_due()
+        .await
+        .unwrap();
 }
 
 async fn member(site: &Site, team: &TestTeam, name: &str) -> String {
@@ -76,7 +79,13 @@ async fn webhook_gets_the_events_visible_to_its_owner() {
     let ada = member(&site, &alpha, "Ada").await;
     let (team_receiver, organiser_receiver) = (Receiver::start().await, Receiver::start().await);
     let (path, secret) = create_webhook(&site, &ada, &team_receiver.url, &[]).await;
-    create_webhook(&site, ADMIN, &organiser_receiver.url, &["evaluations", "submissions"]).await;
+    create_webhook(
+        &site,
+        ADMIN,
+        &organiser_receiver.url,
+        &["evaluations", "submissions"],
+    )
+    .await;
     let alpha_submission = site.valid_submission(&alpha, "a").await;
     site.valid_submission(&beta, "b").await;
     site.evaluate(&alpha, &alpha_submission).await;
@@ -109,10 +118,16 @@ async fn webhook_gets_the_events_visible_to_its_owner() {
     assert_eq!(events.len(), received, "each event once");
     let organiser_types = organiser_receiver.types();
     for (kind, times) in [("submission_uploaded", 2), ("evaluation_queued", 2)] {
-        let found = organiser_types.iter().filter(|found| *found == kind).count();
+        let found = organiser_types
+            .iter()
+            .filter(|found| *found == kind)
+            .count();
         assert_eq!(found, times, "{organiser_types:?}");
     }
-    assert!(!organiser_types.contains(&"day_started".to_owned()), "the topic was not requested");
+    assert!(
+        !organiser_types.contains(&"day_started".to_owned()),
+        "the topic was not requested"
+    );
 
     // Everything was delivered, and nothing is sent twice.
     deliver(&site).await;
@@ -154,7 +169,10 @@ async fn failed_delivery_is_retried_and_finally_given_up() {
     deliver(&site).await;
     let requests = receiver.requests();
     assert_eq!(requests.len(), 2);
-    assert_eq!((&requests[0].id, &requests[0].body), (&requests[1].id, &requests[1].body));
+    assert_eq!(
+        (&requests[0].id, &requests[0].body),
+        (&requests[1].id, &requests[1].body)
+    );
     assert_ne!(requests[0].timestamp, requests[1].timestamp);
     let view = site.get(&path, Some(ADMIN)).await.json(200);
     assert_eq!(view["state"], "alive");
@@ -229,7 +247,11 @@ async fn webhook_that_answers_gone_is_dead_until_revived() {
     assert_eq!(revived.json(200)["state"], "alive");
     announce(&site).await;
     deliver(&site).await;
-    assert_eq!(receiver.requests().len(), 2, "only events after the revival are sent");
+    assert_eq!(
+        receiver.requests().len(),
+        2,
+        "only events after the revival are sent"
+    );
 }
 
 #[tokio::test]
@@ -335,7 +357,10 @@ async fn interrupted_delivery_is_repeated_with_the_same_id() {
     deliver(&site).await;
     let requests = receiver.requests();
     assert_eq!(requests.len(), 2);
-    assert_eq!((&requests[0].id, &requests[0].body), (&requests[1].id, &requests[1].body));
+    assert_eq!(
+        (&requests[0].id, &requests[0].body),
+        (&requests[1].id, &requests[1].body)
+    );
     assert!(requests[1].is_signed_by(&secret));
     assert_eq!(deliveries(&site, &path).await.len(), 1);
 }

@@ -1,9 +1,9 @@
 //! A season of three months with forty teams in one test. The clock is set from cutoff to cutoff. Requests, database,
 //! schedule and clean-up are real; a fake worker commits random outcomes without running agents.
 
+mod fake_worker;
 mod organiser_actions;
 mod season;
-mod fake_worker;
 
 use season::{DAYS, Season};
 use serde_json::json;

@@ -5,7 +5,7 @@ use faceoff_store::{ClaimedJob, Job};
 use faceoff_types::{BundleRef, PerturbationSettings};
 use faceoff_wire::{
     game::GameSpec,
-    grant::{Grant, GrantKey, ExpectedRecording, WriteScope},
+    grant::{ExpectedRecording, Grant, GrantKey, WriteScope},
 };
 use reqwest::Method;
 use serde_json::json;

@@ -2,9 +2,9 @@
 
 use crate::{
     browser::Browser,
-    team_dashboard::{redirect_target, links, dashboard_page},
     html::texts,
     site::{ADMIN, Site},
+    team_dashboard::{dashboard_page, links, redirect_target},
 };
 use faceoff_store::{SlotReport, WorkerInfo};
 use serde_json::{Value, json};

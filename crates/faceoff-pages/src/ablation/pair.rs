@@ -54,7 +54,10 @@ pub(crate) async fn page(
     let mut sides = Vec::new();
     for (element_id, shown) in [("replay-a", Profile::Ideal), ("replay-b", profile)] {
         let clip = clips.episode(&app, shown, task, episode).await?;
-        let api = format!("{}/ablation/{shown}/{task}/{episode}", paths::submission(id));
+        let api = format!(
+            "{}/ablation/{shown}/{task}/{episode}",
+            paths::submission(id)
+        );
         sides.push(Side::new(element_id, &clip, &api, shown.to_string()));
     }
     let differing = clips.differing_episodes(&app).await?;

@@ -4,7 +4,7 @@ use crate::frame::PageProblem;
 use faceoff_api::views::evaluation::{EvaluationStatus, EvaluationView, Progress};
 use faceoff_service::{
     app::AppState,
-    views::{evaluation, visibility::Visibility, team},
+    views::{evaluation, team, visibility::Visibility},
 };
 use faceoff_types::{DivisionName, EvaluationId, StageDay};
 use jiff::Timestamp;
@@ -92,10 +92,13 @@ impl DayProgress {
                 "Agent failed; the team sees the reason when the day is released",
                 &mut self.ended,
             ),
-            EvaluationStatus::PlatformFailed { .. } => ("Stopped by a platform fault", &mut self.ended),
-            EvaluationStatus::NotPlayed { .. } => {
-                ("Not evaluated in time: the server was at capacity", &mut self.ended)
+            EvaluationStatus::PlatformFailed { .. } => {
+                ("Stopped by a platform fault", &mut self.ended)
             }
+            EvaluationStatus::NotPlayed { .. } => (
+                "Not evaluated in time: the server was at capacity",
+                &mut self.ended,
+            ),
             EvaluationStatus::Cancelled { .. } => ("Cancelled by the organisers", &mut self.ended),
         };
         list.push(Run {

@@ -1,7 +1,7 @@
 //! The heading of a board: stage, notices, rules, and links to other boards.
 
 use super::address::Address;
-use crate::{figures::utc_minute, frame::PageProblem, board_status};
+use crate::{board_status, figures::utc_minute, frame::PageProblem};
 use faceoff_api::views::{
     board::BoardView,
     day::NextCutoff,
@@ -11,7 +11,7 @@ use faceoff_api::views::{
 use faceoff_service::{
     app::App,
     problem::Problem,
-    views::{visibility::Visibility, stage},
+    views::{stage, visibility::Visibility},
 };
 use faceoff_types::{DivisionName, Task, TaskWeights, TierBounds};
 use jiff::Timestamp;
@@ -108,7 +108,11 @@ impl Heading {
                     times: times(&stage),
                     next: stage.next_cutoff.as_ref().map(NextEvaluation::new),
                     rules: (stage.revisions.len() > 1).then(|| {
-                        format!("revision {}, since {}", board.revision, utc_minute(board.since))
+                        format!(
+                            "revision {}, since {}",
+                            board.revision,
+                            utc_minute(board.since)
+                        )
                     }),
                     stage: stage.name.to_string(),
                     others: Vec::new(),

@@ -104,7 +104,11 @@ pub(super) struct Context<'a> {
 
 impl<'a> Context<'a> {
     /// `is_by_rank`: rows are grouped by tier.
-    pub(super) fn new(board: &'a BoardView, before: Option<&'a EarlierBoard>, is_by_rank: bool) -> Self {
+    pub(super) fn new(
+        board: &'a BoardView,
+        before: Option<&'a EarlierBoard>,
+        is_by_rank: bool,
+    ) -> Self {
         let mut groups: BTreeMap<u32, Vec<&BoardRow>> = BTreeMap::new();
         for row in &board.rows {
             groups.entry(row.rank_group).or_default().push(row);
@@ -282,10 +286,7 @@ impl TaskRow {
             team: context.team_cell(row),
             rate: Rate::new(result),
             penalty_points: figures::one_decimal(result.penalty_points),
-            per_episode: figures::per_episode(
-                result.penalty_points,
-                per_day(row, result.episodes),
-            ),
+            per_episode: figures::per_episode(result.penalty_points, per_day(row, result.episodes)),
             details: TaskDetails::new(result),
         }
     }

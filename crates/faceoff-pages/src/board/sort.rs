@@ -87,10 +87,7 @@ impl Sort {
         if !columns.iter().any(|(column, ..)| *column == key.column) {
             return Err(Problem::new(
                 ProblemKind::InvalidRequest,
-                format!(
-                    "this board cannot be sorted by {:?}",
-                    key.column.as_str()
-                ),
+                format!("this board cannot be sorted by {:?}", key.column.as_str()),
             ));
         }
         let head = |(column, title, unit, class)| {

@@ -104,6 +104,10 @@ mod tests {
         assert_eq!((&*first.middle, &*first.x), ("115.0", "101.0"));
         assert_eq!((&*first.low_y, &*first.high_y), ("124.0", "12.0"));
         assert_eq!(bars.bars[1].middle, "269.0");
-        assert!(bars.description.contains("one 25, two 100"), "{}", bars.description);
+        assert!(
+            bars.description.contains("one 25, two 100"),
+            "{}",
+            bars.description
+        );
     }
 }

@@ -92,7 +92,8 @@ impl Histogram {
         let filled = || counts.iter().enumerate().filter(|(_, count)| **count > 0);
         let columns = filled().map(|(column, count)| {
             let top = figures::one_decimal(scale.y(*count as f64));
-            let [left, right] = [bins.x(column) + 0.5, bins.x(column + 1) - 0.5].map(figures::one_decimal);
+            let [left, right] =
+                [bins.x(column) + 0.5, bins.x(column + 1) - 0.5].map(figures::one_decimal);
             format!("M{left} {BOTTOM}V{top}H{right}V{BOTTOM}z")
         });
         let texts: Vec<String> = filled()

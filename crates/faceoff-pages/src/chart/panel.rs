@@ -225,7 +225,11 @@ mod tests {
         ];
         let low = Panel::from_zero("Points", "per episode", &[value(1, 0.1)], &bounds);
         let words: Vec<_> = low.bounds.iter().map(|tick| tick.label.as_str()).collect();
-        assert_eq!(words, ["deployable"], "the other bound is outside the scale");
+        assert_eq!(
+            words,
+            ["deployable"],
+            "the other bound is outside the scale"
+        );
         assert_eq!(low.grid.last().map(|tick| tick.label.as_str()), Some("0.8"));
         let high = Panel::from_zero("Points", "per episode", &[value(1, 3.0)], &bounds);
         assert_eq!(high.bounds.len(), 2);

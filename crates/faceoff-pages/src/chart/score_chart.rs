@@ -37,7 +37,13 @@ impl ScoreChart {
             LEFT + (RIGHT - LEFT) * (f64::from(step) / f64::from(steps.max(1))).clamp(0.0, 1.0)
         };
         let foul_y = [0.0, 1.0].map(|row| BOTTOM + FOUL_ROW * (0.75 + row));
-        let mut paths = [0, 1].map(|_| format!("M{} {}", figures::one_decimal(LEFT), figures::one_decimal(BOTTOM)));
+        let mut paths = [0, 1].map(|_| {
+            format!(
+                "M{} {}",
+                figures::one_decimal(LEFT),
+                figures::one_decimal(BOTTOM)
+            )
+        });
         let mut fouls = [String::new(), String::new()];
         for (step, score, foul_by) in &changes {
             for (path, score) in paths.iter_mut().zip(score) {
@@ -101,10 +107,7 @@ mod tests {
             "half of the time, a quarter of the height"
         );
         assert_eq!(chart.paths[1], "M38.0 140.0H192.0V140.0H346.0V108.0H346.0");
-        assert_eq!(
-            chart.fouls,
-            ["M346.0 148.0l4 7h-8z", ""].map(str::to_owned)
-        );
+        assert_eq!(chart.fouls, ["M346.0 148.0l4 7h-8z", ""].map(str::to_owned));
         assert!(
             chart.description.contains("A 1, B 1; fouls 1 and 0"),
             "{}",

@@ -83,7 +83,8 @@ impl Strip {
         let mut y = 0;
         let rows = summaries.iter().map(|summary| {
             y += if has_shapes { TALL_ROW } else { ROW };
-            let [mean, p99, max] = [summary.mean, summary.p99, summary.max].map(|ms| figures::one_decimal(x(ms)));
+            let [mean, p99, max] =
+                [summary.mean, summary.p99, summary.max].map(|ms| figures::one_decimal(x(ms)));
             StripRow {
                 name: summary.name,
                 y,
@@ -147,11 +148,7 @@ fn count_rows(summaries: &[TimeSummary]) -> Vec<CountRow> {
 /// Columns above `bottom`. Heights are logarithmic, so that a few slow answers among thousands stay visible.
 fn shape(bins: &[TimeBin], bottom: u32) -> String {
     let height = |count: u64| (1.0 + count as f64).ln();
-    let max = bins
-        .iter()
-        .map(|bin| bin.count)
-        .max()
-        .map_or(1.0, height);
+    let max = bins.iter().map(|bin| bin.count).max().map_or(1.0, height);
     let columns = bins.iter().filter(|bin| bin.count > 0).map(|bin| {
         let top = f64::from(bottom) - SHAPE * height(bin.count) / max;
         let [left, right, top] = [x(bin.from), x(bin.to), top].map(figures::one_decimal);
@@ -184,11 +181,7 @@ mod tests {
         assert!(!strip.has_shapes && strip.height == 56, "{strip:?}");
         let bin = |from, to, count| TimeBin { from, to, count };
         let with_bins = TimeSummary {
-            bins: vec![
-                bin(0.1, 1.0, 99),
-                bin(1.0, 10.0, 0),
-                bin(10.0, 100.0, 9),
-            ],
+            bins: vec![bin(0.1, 1.0, 99), bin(1.0, 10.0, 0), bin(10.0, 100.0, 9)],
             ..summary
         };
         let tall = Strip::new(&[with_bins], None);

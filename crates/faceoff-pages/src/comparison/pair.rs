@@ -43,7 +43,12 @@ pub(crate) async fn page(
     path: Result<PathParams<String, 4>, Problem>,
 ) -> Result<Response, PageProblem> {
     let PathParams([a, b, task, episode]) = path?;
-    let not_found = || Problem::new(ProblemKind::NotFound, "the evaluations have no such common episode");
+    let not_found = || {
+        Problem::new(
+            ProblemKind::NotFound,
+            "the evaluations have no such common episode",
+        )
+    };
     let id = |text: &str| text.parse::<EvaluationId>().map_err(|_| not_found());
     let ids = [id(&a)?, id(&b)?];
     let task: Task = task.parse().map_err(|_| not_found())?;

@@ -1,7 +1,7 @@
 //! `/desk/access` and `/organiser/access`: users, invitations, tokens and sessions.
 
 use crate::{
-    dashboard_frame::{DoneQuery, DashboardHeader, Notice, redirect_done, render_dashboard},
+    dashboard_frame::{DashboardHeader, DoneQuery, Notice, redirect_done, render_dashboard},
     figures::utc_minute,
     frame::{Frame, PageProblem},
     page_auth::PageUser,
@@ -19,14 +19,14 @@ use faceoff_api::{
     views::{invitation::InvitationView, token::TokenView},
 };
 use faceoff_service::{
-    services::{invitations, tokens, users},
     app::App,
     auth::Caller,
     extract::{PageForm, PathParam},
     problem::Problem,
-    views::{event, invitation, user, season::SeasonHead, token},
+    services::{invitations, tokens, users},
+    views::{event, invitation, season::SeasonHead, token, user},
 };
-use faceoff_types::{InvitationId, UserId, TeamId, TeamName, TokenId};
+use faceoff_types::{InvitationId, TeamId, TeamName, TokenId, UserId};
 use jiff::{SignedDuration, Timestamp};
 use serde::Deserialize;
 use std::collections::BTreeMap;

@@ -104,9 +104,7 @@ fn evaluation_row(visibility: &Visibility, view: EvaluationView) -> EvaluationRo
         }
     };
     if let Some(ruling) = view.voided {
-        row
-            .state
-            .push_str(&format!("; voided: {}", ruling.reason));
+        row.state.push_str(&format!("; voided: {}", ruling.reason));
     }
     row
 }

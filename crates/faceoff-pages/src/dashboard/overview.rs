@@ -2,10 +2,10 @@
 
 use super::evaluations::{self, EvaluationRow};
 use crate::{
-    dashboard_frame::{self, DoneQuery, DashboardHeader, Notice, redirect_done, render_dashboard},
-    submission_row::SubmissionRow,
+    dashboard_frame::{self, DashboardHeader, DoneQuery, Notice, redirect_done, render_dashboard},
     frame::{Frame, PageProblem},
     page_auth::{PageMember, PageUser},
+    submission_row::SubmissionRow,
 };
 use askama::Template;
 use axum::{
@@ -14,10 +14,10 @@ use axum::{
 };
 use faceoff_api::views::me::MeView;
 use faceoff_service::{
-    services::users,
     app::App,
     extract::PageForm,
     problem::Problem,
+    services::users,
     views::{me, season::SeasonHead, submission},
 };
 use faceoff_types::EvaluationId;

@@ -1,7 +1,7 @@
 //! `/desk/questions`: questions of the team, and published answers.
 
 use crate::{
-    dashboard_frame::{DoneQuery, DashboardHeader, Notice, redirect_done, render_dashboard},
+    dashboard_frame::{DashboardHeader, DoneQuery, Notice, redirect_done, render_dashboard},
     figures::utc_minute,
     frame::{Frame, PageProblem},
     page_auth::PageMember,
@@ -13,7 +13,8 @@ use axum::{
 };
 use faceoff_api::{requests::NewQuestion, views::announcement::QuestionView};
 use faceoff_service::{
-    services::announcements, app::App, extract::PageForm, problem::Problem, views::season::SeasonHead,
+    app::App, extract::PageForm, problem::Problem, services::announcements,
+    views::season::SeasonHead,
 };
 
 const PATH: &str = "/desk/questions";

@@ -1,10 +1,10 @@
 //! `/desk/submissions/{id}`: validation result, log and actions of a submission.
 
 use crate::{
-    dashboard_frame::{DoneQuery, DashboardHeader, Notice, redirect_done, render_dashboard},
-    submission_row::SubmissionRow,
+    dashboard_frame::{DashboardHeader, DoneQuery, Notice, redirect_done, render_dashboard},
     frame::{Frame, PageProblem},
     page_auth::PageMember,
+    submission_row::SubmissionRow,
 };
 use askama::Template;
 use axum::{
@@ -16,13 +16,13 @@ use faceoff_api::{
     views::submission::{SubmissionStatus, SubmissionView},
 };
 use faceoff_service::{
-    services::submissions,
     app::App,
     extract::{PageForm, PathParam},
     problem::Problem,
+    services::submissions,
     views::{season::SeasonHead, submission},
 };
-use faceoff_types::{ValidationTiming, SubmissionId};
+use faceoff_types::{SubmissionId, ValidationTiming};
 use serde::Deserialize;
 
 #[derive(Template)]
@@ -161,8 +161,6 @@ pub(super) async fn describe(
     };
     match submissions::describe_submission(&app, &member.team, id, &change).await {
         Ok(_) => Ok(redirect_done(&path(id), "described")),
-        Err(problem) => {
-            page_with(&app, &member, id, Notice::Refused(&problem), Some(form)).await
-        }
+        Err(problem) => page_with(&app, &member, id, Notice::Refused(&problem), Some(form)).await,
     }
 }

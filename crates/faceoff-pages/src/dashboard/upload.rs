@@ -9,9 +9,9 @@ use crate::{
 };
 use axum::{body::Body, extract::State, http::HeaderMap, response::Response};
 use faceoff_service::{
-    services::uploads::{IncomingBundle, upload},
     app::App,
     problem::{Problem, ProblemKind},
+    services::uploads::{IncomingBundle, upload},
     session,
 };
 use faceoff_store::Submission;

@@ -87,7 +87,10 @@ pub(super) async fn image(
     let tag = ETag::new("picture", &[blake3::hash(image.bytes()).to_hex().as_str()]);
     let headers = [
         (header::ETAG, tag.header()),
-        (header::CACHE_CONTROL, HeaderValue::from_static(CACHE_CONTROL)),
+        (
+            header::CACHE_CONTROL,
+            HeaderValue::from_static(CACHE_CONTROL),
+        ),
     ];
     if let Some(not_modified) = conditions.not_modified(&tag) {
         return Ok((headers, not_modified).into_response());

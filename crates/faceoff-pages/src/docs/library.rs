@@ -99,10 +99,7 @@ static SOURCES: LazyLock<[(&str, Vec<Source>); 4]> = LazyLock::new(|| {
                     "replay",
                     "Replay pages of episodes and games, their visibility, and the clip format."
                 ),
-                source!(
-                    "verifying",
-                    "How to recompute a score from its dataset."
-                ),
+                source!("verifying", "How to recompute a score from its dataset."),
                 source!(
                     "archive",
                     "The files of a whole season, for storage and for a read-only server."
@@ -112,14 +109,8 @@ static SOURCES: LazyLock<[(&str, Vec<Source>); 4]> = LazyLock::new(|| {
         (
             "Reference",
             vec![
-                source!(
-                    "cli",
-                    "Commands with their exit codes and files."
-                ),
-                source!(
-                    "api",
-                    "The API explained by topic."
-                ),
+                source!("cli", "Commands with their exit codes and files."),
+                source!("api", "The API explained by topic."),
                 source!(
                     "simulator",
                     "The physics behind the scores, and its accuracy against the reference."
@@ -169,10 +160,7 @@ static SOURCES: LazyLock<[(&str, Vec<Source>); 4]> = LazyLock::new(|| {
                     "monitoring",
                     "Health, metrics, log, full disks, host interference and the queue."
                 ),
-                source!(
-                    "workers",
-                    "Evaluating on other machines over NATS."
-                ),
+                source!("workers", "Evaluating on other machines over NATS."),
                 source!(
                     "capacity",
                     "How many teams, shards and workers a server can carry, measured."

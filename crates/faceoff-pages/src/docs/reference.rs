@@ -135,8 +135,12 @@ impl Reference {
             }
         });
         let components = &document["components"];
-        let tokens = entries(&components["securitySchemes"])
-            .map(|(name, scheme)| (name.clone(), markdown::render_prose(&text(&scheme["description"]))));
+        let tokens = entries(&components["securitySchemes"]).map(|(name, scheme)| {
+            (
+                name.clone(),
+                markdown::render_prose(&text(&scheme["description"])),
+            )
+        });
         Self {
             about: markdown::render_prose(&text(&document["info"]["description"])),
             groups: groups.collect(),
@@ -197,8 +201,8 @@ impl Operation {
             about: about(body),
             media: media(body),
         });
-        let (shared, own): (Vec<_>, Vec<_>) =
-            entries(&operation["responses"]).partition(|(_, response)| response["$ref"].is_string());
+        let (shared, own): (Vec<_>, Vec<_>) = entries(&operation["responses"])
+            .partition(|(_, response)| response["$ref"].is_string());
         let shared = shared
             .into_iter()
             .map(|(status, response)| (status.clone(), reference_name(&response["$ref"])));
@@ -246,7 +250,8 @@ impl Tokens {
         let names: Vec<&str> = list(security)
             .flat_map(|requirement| entries(requirement).map(|(name, _)| name.as_str()))
             .collect();
-        let is_optional = list(security).any(|requirement| requirement.as_object().is_some_and(Map::is_empty));
+        let is_optional =
+            list(security).any(|requirement| requirement.as_object().is_some_and(Map::is_empty));
         match (names.join(" or "), is_optional) {
             (names, _) if names.is_empty() => Self::None,
             (names, true) => Self::Optional(names),

@@ -61,7 +61,10 @@ impl Index {
             .filter_map(|section| section.rank(&words).map(|rank| (Reverse(rank), section)))
             .collect();
         results.sort_by_key(|(rank, _)| *rank);
-        let shown = results.iter().take(MAX_RESULTS).map(|(_, section)| section.result(&words));
+        let shown = results
+            .iter()
+            .take(MAX_RESULTS)
+            .map(|(_, section)| section.result(&words));
         (shown.collect(), results.len())
     }
 }
@@ -202,7 +205,11 @@ mod tests {
         let filler = "äöü … ".repeat(200);
         let index = Index::new([section("Long", &format!("{filler}here {filler}"))]);
         let (results, _) = index.search("here");
-        let texts: Vec<&str> = results[0].snippet.iter().map(|piece| &*piece.text).collect();
+        let texts: Vec<&str> = results[0]
+            .snippet
+            .iter()
+            .map(|piece| &*piece.text)
+            .collect();
         assert_eq!(texts[0], "…");
         assert_eq!(texts[2], "here");
         assert_eq!(*texts.last().unwrap(), "…");
@@ -210,7 +217,11 @@ mod tests {
         // A single long word.
         let index = Index::new([section("Word", &"ä".repeat(5000))]);
         let (results, _) = index.search("ä");
-        let shown: usize = results[0].snippet.iter().map(|piece| piece.text.len()).sum();
+        let shown: usize = results[0]
+            .snippet
+            .iter()
+            .map(|piece| piece.text.len())
+            .sum();
         assert!(shown < 4 * SNIPPET_BYTES);
     }
 

@@ -44,7 +44,8 @@ impl Sections {
             href: format!("{}#{id}", self.path),
             text: String::new(),
         };
-        self.finished.push(std::mem::replace(&mut self.current, next));
+        self.finished
+            .push(std::mem::replace(&mut self.current, next));
     }
 
     pub(super) fn push_text(&mut self, text: &str) {

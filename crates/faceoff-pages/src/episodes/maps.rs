@@ -1,9 +1,9 @@
 //! Start positions and violations of episodes on the table.
 
 use crate::{
-    violation_map::ViolationMarks,
     figures,
     table_drawing::{self, Position},
+    violation_map::ViolationMarks,
 };
 use faceoff_replay::{EpisodeLine, Group};
 use faceoff_types::Task;
@@ -47,7 +47,9 @@ impl StartMap {
         }
         let starts = |success: bool| -> Vec<Position> {
             let episodes = lines.iter().filter(|line| line.success == success);
-            episodes.map(|line| [line.start[0], line.start[1]]).collect()
+            episodes
+                .map(|line| [line.start[0], line.start[1]])
+                .collect()
         };
         let (solved, failed) = (starts(true), starts(false));
         Some(Self {
@@ -141,8 +143,8 @@ impl ViolationMap {
             matching.map(|violation| violation.at).collect()
         });
         let count = |group, joint| {
-            let matching =
-                violations().filter(|violation| violation.group == group && violation.joint == Some(joint));
+            let matching = violations()
+                .filter(|violation| violation.group == group && violation.joint == Some(joint));
             matching.count()
         };
         let joints = (1..=7)

@@ -51,7 +51,8 @@ impl SlowAnswers {
         view: &EvaluationView,
         result: &ResultView,
     ) -> Result<Self, Problem> {
-        let has_slow_answers = |task: &TaskView| task.violations.is_some_and(|v| v.computation_time > 0);
+        let has_slow_answers =
+            |task: &TaskView| task.violations.is_some_and(|v| v.computation_time > 0);
         if !result.tasks.values().any(has_slow_answers) {
             return Ok(Self::default());
         }

@@ -2,13 +2,13 @@
 
 use super::live::{game_clock, replay_link};
 use crate::{
-    violation_map::ViolationMarks,
     chart::{Bins, Histogram},
     episode_text::group_label,
     figures,
     table_drawing::{self, Position},
+    violation_map::ViolationMarks,
 };
-use faceoff_replay::{LocatedViolation, GameAnalysis, Group, Shot, model::CONTROL_STEP_S};
+use faceoff_replay::{GameAnalysis, Group, LocatedViolation, Shot, model::CONTROL_STEP_S};
 
 /// Shares of the playing time in percent, per side.
 pub(super) struct Possession {
@@ -72,8 +72,9 @@ const MAX_ROWS: usize = 500;
 
 impl Possession {
     pub(super) fn new(analysis: &GameAnalysis) -> Self {
-        let share =
-            |steps: u32| figures::one_decimal(100.0 * f64::from(steps) / f64::from(analysis.steps.max(1)));
+        let share = |steps: u32| {
+            figures::one_decimal(100.0 * f64::from(steps) / f64::from(analysis.steps.max(1)))
+        };
         Self {
             halves: analysis.halves.map(share),
             touched: analysis.touched.map(share),

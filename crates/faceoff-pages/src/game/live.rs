@@ -50,7 +50,9 @@ impl LiveGame {
             puck,
             mallets: [home, away],
             events: events
-                .filter_map(|event| Some((game_clock(event.step), event_text(&event.event, teams)?)))
+                .filter_map(|event| {
+                    Some((game_clock(event.step), event_text(&event.event, teams)?))
+                })
                 .collect(),
         }
     }

@@ -2,7 +2,7 @@
 
 use super::live::{game_clock, replay_link};
 use crate::{chart::ScoreChart, table_drawing::path};
-use faceoff_replay::{RallyEndEvent, RallyEndKind, GameAnalysis};
+use faceoff_replay::{GameAnalysis, RallyEndEvent, RallyEndKind};
 
 pub(super) struct ScoreTimeline {
     pub(super) chart: ScoreChart,
@@ -30,7 +30,8 @@ impl ScoreTimeline {
             let goals = analysis.goals.iter().filter(|goal| goal.side == side);
             goals.map(|goal| path(&goal.positions)).collect()
         });
-        let changes_score = |end: &&RallyEndEvent| matches!(end.what, RallyEndKind::Goal | RallyEndKind::Foul);
+        let changes_score =
+            |end: &&RallyEndEvent| matches!(end.what, RallyEndKind::Goal | RallyEndKind::Foul);
         let rows: Vec<Row> = breaks
             .iter()
             .filter(|end| end.what != RallyEndKind::GameOver)

@@ -1,11 +1,11 @@
 //! `/organiser`: open tasks of the organisers and the status of the season.
 
 use crate::{
-    dashboard_frame::{self, DoneQuery, DashboardHeader, Notice},
+    board_status,
+    dashboard_frame::{self, DashboardHeader, DoneQuery, Notice},
     figures::utc_minute,
     frame::{Frame, PageProblem, render},
     page_auth::PageOrganiser,
-    board_status,
 };
 use askama::Template;
 use axum::{
@@ -17,8 +17,8 @@ use faceoff_service::{
     app::App,
     problem::Problem,
     views::{
-        capacity, day, evaluation, health, queue, season::SeasonHead, visibility::Visibility, stage, storage,
-        workers,
+        capacity, day, evaluation, health, queue, season::SeasonHead, stage, storage,
+        visibility::Visibility, workers,
     },
 };
 use faceoff_store::{RegistrationState, Stage, StagePhase};
@@ -140,7 +140,11 @@ async fn request_items(app: &App) -> Result<Vec<Item>, Problem> {
         items.push(Item {
             class: "waiting",
             title: format!("{} has registered", registration.team_name),
-            detail: format!("Registered {}. Contact: {}", utc_minute(registration.created_at), registration.contact),
+            detail: format!(
+                "Registered {}. Contact: {}",
+                utc_minute(registration.created_at),
+                registration.contact
+            ),
             links: vec![
                 (
                     format!("/organiser/decide/approve/{}", registration.id),
@@ -154,7 +158,10 @@ async fn request_items(app: &App) -> Result<Vec<Item>, Problem> {
         });
     }
     let questions = app.store.questions().await?;
-    let open = questions.iter().filter(|question| question.answer.is_none()).count();
+    let open = questions
+        .iter()
+        .filter(|question| question.answer.is_none())
+        .count();
     if open > 0 {
         items.push(Item {
             class: "waiting",
@@ -232,17 +239,21 @@ async fn stage_items(app: &App, stage: Stage) -> Result<(Vec<Item>, StageSummary
             class: "waiting",
             title: format!("{} has closed; its result is provisional", stage.name),
             detail: "It is provisional until you sign it off.".to_owned(),
-            links: vec![(
-                format!("/organiser/stages/{}", stage.id),
-                "Stage".into(),
-            )],
+            links: vec![(format!("/organiser/stages/{}", stage.id), "Stage".into())],
         });
     }
-    let latest = app.store.newest_day(stage.id).await?.map(|day| day.stage_day);
+    let latest = app
+        .store
+        .newest_day(stage.id)
+        .await?
+        .map(|day| day.stage_day);
     let mut latest_day = None;
     if let Some(latest) = latest {
         let evaluations = app.store.evaluations_of_day(latest).await?;
-        let done = evaluations.iter().filter(|evaluation| evaluation.state.is_over()).count();
+        let done = evaluations
+            .iter()
+            .filter(|evaluation| evaluation.state.is_over())
+            .count();
         let done = u32::try_from(done).unwrap_or(u32::MAX);
         latest_day = Some((latest.date, done, evaluations.len()));
         if stage.sign_off.is_none() {

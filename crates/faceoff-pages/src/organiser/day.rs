@@ -1,7 +1,7 @@
 //! `/organiser/day`: an evaluation day of a stage: cutoff, load, evaluations and decisions.
 
 use crate::{
-    dashboard_frame::{DoneQuery, DashboardHeader, Notice},
+    dashboard_frame::{DashboardHeader, DoneQuery, Notice},
     figures::{self, utc_minute},
     frame::{Frame, PageProblem, render},
     page_auth::PageOrganiser,
@@ -80,16 +80,15 @@ fn row(view: EvaluationView, replaced: &BTreeSet<EvaluationId>) -> Row {
         EvaluationStatus::Running => ("running", "waiting", None, None),
         EvaluationStatus::Finalising => ("scoring", "waiting", None, None),
         EvaluationStatus::Finished { ref result, .. } => {
-            let score = result.as_ref().map(|result| figures::one_decimal(result.score));
+            let score = result
+                .as_ref()
+                .map(|result| figures::one_decimal(result.score));
             ("finished", "good", None, score)
         }
         EvaluationStatus::AgentFailed { .. } => ("agent failed", "bad", None, None),
-        EvaluationStatus::PlatformFailed { ref reason, .. } => (
-            "platform fault",
-            "bad",
-            Some(reason.clone()),
-            None,
-        ),
+        EvaluationStatus::PlatformFailed { ref reason, .. } => {
+            ("platform fault", "bad", Some(reason.clone()), None)
+        }
         EvaluationStatus::NotPlayed { ref reason, .. } => {
             ("not finished in time", "bad", Some(reason.clone()), None)
         }
@@ -158,8 +157,11 @@ pub(super) async fn page(
     };
     let day = days.iter().find(|day| day.stage_day == stage_day);
     let view = day::build(&app, stage_day).await?;
-    let replaced: BTreeSet<EvaluationId> =
-        view.created.iter().filter_map(|evaluation| evaluation.rerun_of).collect();
+    let replaced: BTreeSet<EvaluationId> = view
+        .created
+        .iter()
+        .filter_map(|evaluation| evaluation.rerun_of)
+        .collect();
     let rows: Vec<Row> = view
         .created
         .into_iter()
@@ -171,7 +173,9 @@ pub(super) async fn page(
         .map(|team| (team.id, team.name, "no valid submission".to_owned()))
         .collect();
     let excluded_teams = view.excluded.into_iter();
-    excluded.extend(excluded_teams.map(|exclusion| (exclusion.team, exclusion.team_name, exclusion.reason)));
+    excluded.extend(
+        excluded_teams.map(|exclusion| (exclusion.team, exclusion.team_name, exclusion.reason)),
+    );
     let is_archive = store.archived_season().is_some();
     let load = match is_archive {
         true => None,

@@ -1,23 +1,23 @@
 //! Decisions of organisers: a preview of the effects, and the execution.
 
 mod day;
-mod queue;
+mod evaluation;
 mod preview;
+mod queue;
 mod stage;
 mod team;
-mod evaluation;
 mod worker;
 
 use day::DayDecision;
+use evaluation::EvaluationDecision;
 use faceoff_api::requests;
 use faceoff_service::{app::AppState, problem::Problem};
 use faceoff_store::Actor;
-use queue::QueueDecision;
 pub(super) use preview::DecisionPreview;
+use queue::QueueDecision;
 use stage::StageDecision;
 use std::{fmt, str::FromStr};
 use team::TeamDecision;
-use evaluation::EvaluationDecision;
 use worker::WorkerDecision;
 
 /// A decision, parsed from the path of its page.

@@ -3,8 +3,8 @@
 use crate::{
     dashboard_frame::{DashboardHeader, Notice, render_dashboard},
     frame::{Frame, PageProblem},
-    query::with_query,
     page_auth::PageOrganiser,
+    query::with_query,
 };
 use askama::Template;
 use axum::{

@@ -1,7 +1,7 @@
 //! `/organiser/messages`: questions of teams, announcements and terms.
 
 use crate::{
-    dashboard_frame::{DoneQuery, DashboardHeader, Notice, redirect_done, render_dashboard},
+    dashboard_frame::{DashboardHeader, DoneQuery, Notice, redirect_done, render_dashboard},
     figures::utc_minute,
     frame::{Frame, PageProblem},
     page_auth::PageOrganiser,
@@ -16,10 +16,10 @@ use faceoff_api::{
     views::announcement::{AnnouncementView, QuestionView, TermsView},
 };
 use faceoff_service::{
-    services::announcements,
     app::App,
     extract::{PageForm, PathParam},
     problem::Problem,
+    services::announcements,
     views::{announcement, event, season::SeasonHead},
 };
 use faceoff_types::QuestionId;
@@ -78,7 +78,9 @@ async fn page_with(
     values: FormValues,
 ) -> Result<Response, PageProblem> {
     let all = announcements::questions(app, Some(&user.caller)).await?;
-    let (open, answered) = all.into_iter().partition(|question| question.answer.is_none());
+    let (open, answered) = all
+        .into_iter()
+        .partition(|question| question.answer.is_none());
     let announcements = app.store.announcements(LISTED_ANNOUNCEMENTS).await;
     let announcements = announcements.map_err(Problem::from)?.into_iter();
     let terms = app.store.terms().await.map_err(Problem::from)?;

@@ -2,7 +2,7 @@
 
 use super::stage_form::StageForm;
 use crate::{
-    dashboard_frame::{DoneQuery, DashboardHeader, Notice, redirect_done, render_dashboard},
+    dashboard_frame::{DashboardHeader, DoneQuery, Notice, redirect_done, render_dashboard},
     figures::utc_minute,
     frame::{Frame, PageProblem},
     page_auth::PageOrganiser,
@@ -14,14 +14,14 @@ use axum::{
 };
 use faceoff_api::views::stage::{PhaseView, StageView};
 use faceoff_service::{
-    services::stages,
     app::App,
     extract::{PageForm, PathParam},
     problem::{Problem, ProblemKind},
+    services::stages,
     viewer::Viewer,
     views::{season::SeasonHead, stage},
 };
-use faceoff_types::{Profile, StageId, CountingResult};
+use faceoff_types::{CountingResult, Profile, StageId};
 
 #[derive(Template)]
 #[template(path = "organiser_stage.html")]
@@ -94,7 +94,10 @@ pub(super) async fn change(
         Err(problem) => Err(problem),
     };
     match changed {
-        Ok(_) => Ok(redirect_done(&format!("/organiser/stages/{id}"), "stage-changed")),
+        Ok(_) => Ok(redirect_done(
+            &format!("/organiser/stages/{id}"),
+            "stage-changed",
+        )),
         Err(problem) => page_with(&app, &user, id, Notice::Refused(&problem), Some(form)).await,
     }
 }

@@ -45,7 +45,11 @@ fn datetime_local(at: Timestamp) -> String {
 const TICKED: &str = "on";
 
 fn checkbox_value(is_ticked: bool) -> String {
-    if is_ticked { TICKED.to_owned() } else { String::new() }
+    if is_ticked {
+        TICKED.to_owned()
+    } else {
+        String::new()
+    }
 }
 
 fn invalid_field(field: &str, error: impl Display) -> Problem {
@@ -58,7 +62,9 @@ fn parse_time(field: &str, text: &str) -> Result<Option<Timestamp>, Problem> {
     }
     let at: DateTime = text.parse().map_err(|error| invalid_field(field, error))?;
     let at = at.to_zoned(TimeZone::UTC);
-    Ok(Some(at.map_err(|error| invalid_field(field, error))?.timestamp()))
+    Ok(Some(
+        at.map_err(|error| invalid_field(field, error))?.timestamp(),
+    ))
 }
 
 fn parse_number(field: &str, text: &str) -> Result<u32, Problem> {
@@ -152,7 +158,9 @@ impl StageForm {
         let dates: Vec<&str> = dates.filter(|date| !date.is_empty()).collect();
         let fields = json!({ kind: at, "days_off": dates });
         let parsed = serde_json::from_value(fields);
-        parsed.map(Some).map_err(|error| invalid_field("schedule", error))
+        parsed
+            .map(Some)
+            .map_err(|error| invalid_field("schedule", error))
     }
 
     /// The differences between the form and the stage. Unchanged settings are omitted, since many of them cannot be changed at
@@ -179,7 +187,8 @@ impl StageForm {
             change.tasks = Some(self.tasks());
         }
         if self.episodes_per_task != current.episodes_per_task {
-            change.episodes_per_task = Some(parse_number("episodes_per_task", &self.episodes_per_task)?);
+            change.episodes_per_task =
+                Some(parse_number("episodes_per_task", &self.episodes_per_task)?);
         }
         if self.max_faults != current.max_faults {
             change.max_faults = Some(parse_number("max_faults", &self.max_faults)?);
@@ -200,7 +209,8 @@ impl StageForm {
             change.blind = Some(!self.blind.is_empty());
         }
         if self.ablation_episodes != current.ablation_episodes {
-            change.ablation_episodes = Some(parse_number("ablation_episodes", &self.ablation_episodes)?);
+            change.ablation_episodes =
+                Some(parse_number("ablation_episodes", &self.ablation_episodes)?);
         }
         change.confirm = Some(self.confirm.clone()).filter(|name| !name.is_empty());
         Ok(change)

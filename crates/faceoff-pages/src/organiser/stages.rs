@@ -2,11 +2,11 @@
 
 use super::stage_form::StageForm;
 use crate::{
-    dashboard_frame::{DoneQuery, DashboardHeader, Notice, redirect_done, render_dashboard},
+    board_status,
+    dashboard_frame::{DashboardHeader, DoneQuery, Notice, redirect_done, render_dashboard},
     figures::utc_minute,
     frame::{Frame, PageProblem},
     page_auth::PageOrganiser,
-    board_status,
 };
 use askama::Template;
 use axum::{
@@ -15,10 +15,10 @@ use axum::{
 };
 use faceoff_api::views::stage::StageView;
 use faceoff_service::{
-    services::stages,
     app::App,
     extract::PageForm,
     problem::Problem,
+    services::stages,
     views::{season::SeasonHead, stage},
 };
 use faceoff_types::Profile;

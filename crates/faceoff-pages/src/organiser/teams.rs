@@ -1,7 +1,7 @@
 //! `/organiser/teams`: teams, registrations and divisions.
 
 use crate::{
-    dashboard_frame::{DoneQuery, DashboardHeader, Notice, redirect_done, render_dashboard},
+    dashboard_frame::{DashboardHeader, DoneQuery, Notice, redirect_done, render_dashboard},
     figures::utc_minute,
     frame::{Frame, PageProblem},
     page_auth::PageOrganiser,
@@ -16,10 +16,10 @@ use faceoff_api::{
     views::{invitation::RegistrationView, team::TeamView},
 };
 use faceoff_service::{
-    services::teams,
     app::App,
     extract::{PageForm, PathParam},
     problem::Problem,
+    services::teams,
     views::{invitation, season::SeasonHead, team},
 };
 use faceoff_types::{DivisionName, TeamId};
@@ -53,7 +53,8 @@ async fn page_with(
 ) -> Result<Response, PageProblem> {
     let registrations = app.store.registrations().await.map_err(Problem::from)?;
     let registrations = registrations.into_iter().map(invitation::registration);
-    let (waiting, decided) = registrations.partition(|registration| registration.state == "waiting");
+    let (waiting, decided) =
+        registrations.partition(|registration| registration.state == "waiting");
     let divisions = app.store.divisions().await.map_err(Problem::from)?;
     let season = app.store.season().await.map_err(Problem::from)?;
     let form = form.unwrap_or_else(|| SeasonForm {

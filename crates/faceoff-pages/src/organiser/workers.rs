@@ -1,7 +1,7 @@
 //! `/organiser/workers`: local slots, remote workers and bans.
 
 use crate::{
-    dashboard_frame::{DoneQuery, DashboardHeader, Notice},
+    dashboard_frame::{DashboardHeader, DoneQuery, Notice},
     frame::{Frame, PageProblem, render},
     page_auth::PageOrganiser,
 };

@@ -1,7 +1,7 @@
 //! Results of a team by day: the latest result, charts, and violations.
 
 use crate::{
-    chart::{Bound, Panel, DayValue},
+    chart::{Bound, DayValue, Panel},
     figures::{self, Rate},
 };
 use faceoff_api::views::history::HistoryRow;
@@ -160,11 +160,14 @@ pub(super) fn violations(rows: &[HistoryRow]) -> Vec<TaskViolations> {
             sum(|counts| counts.joint_vel),
             sum(|counts| counts.computation_time),
         ];
-        kinds.iter().any(|count| *count > 0).then(|| TaskViolations {
-            task,
-            episodes,
-            kinds: kinds.map(|count| figures::count_with_share(count, episodes)),
-        })
+        kinds
+            .iter()
+            .any(|count| *count > 0)
+            .then(|| TaskViolations {
+                task,
+                episodes,
+                kinds: kinds.map(|count| figures::count_with_share(count, episodes)),
+            })
     };
     Task::ALL.into_iter().filter_map(task_violations).collect()
 }

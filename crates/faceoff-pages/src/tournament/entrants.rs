@@ -70,7 +70,10 @@ fn rounds_of(
         if is_hidden(view, round.number, spoilers) {
             continue;
         }
-        let own = round.submissions.iter().find(|submission| submission.team == team);
+        let own = round
+            .submissions
+            .iter()
+            .find(|submission| submission.team == team);
         let Some(own) = own else { continue };
         match played.iter_mut().find(|(id, _)| *id == own.submission) {
             Some((_, rounds)) => rounds.push(round.number),

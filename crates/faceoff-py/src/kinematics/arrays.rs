@@ -97,5 +97,9 @@ fn check_rows<const N: usize>(is_contiguous: bool, shape: &[usize]) -> PyResult<
         return Ok(());
     }
     let expected = format!("rows of {N} numbers, one after the other");
-    Err(argument_error("array", expected, format!("shape {shape:?}")))
+    Err(argument_error(
+        "array",
+        expected,
+        format!("shape {shape:?}"),
+    ))
 }

@@ -2,7 +2,7 @@
 
 use super::{
     constants::{Arm, DAMPING, GOAL_M, ITERATIONS, LOWEST_M, STEP_LIMIT_RAD},
-    pose::{kinematics_at, jacobian},
+    pose::{jacobian, kinematics_at},
 };
 use faceoff_sim::{JOINTS, dynamics::spatial::Vec3};
 use std::array::from_fn;
@@ -74,7 +74,9 @@ impl Linearisation {
             .columns
             .iter()
             .zip(desired)
-            .fold(Vec3::zero(), |sum, (column, desired)| sum + column.scale(desired));
+            .fold(Vec3::zero(), |sum, (column, desired)| {
+                sum + column.scale(desired)
+            });
         let held = least_change(&self.columns, moved, weight);
         let free: [f64; JOINTS] = from_fn(|joint| desired[joint] - held[joint]);
         let share = self.deficit / inner(&self.rise, &free).max(1e-3);
@@ -99,7 +101,8 @@ pub fn least_change(
     }
     // The inverse of a symmetric matrix by its rows' vector products.
     let (bc, ca, ab) = (b.cross(c), c.cross(a), a.cross(b));
-    let force = (bc.scale(desired.x) + ca.scale(desired.y) + ab.scale(desired.z)).scale(1.0 / a.dot(bc));
+    let force =
+        (bc.scale(desired.x) + ca.scale(desired.y) + ab.scale(desired.z)).scale(1.0 / a.dot(bc));
     from_fn(|joint| weight[joint] * columns[joint].dot(force))
 }
 

@@ -5,20 +5,22 @@
 //! platform's mathematics are not used: the same arguments give the same bits on every machine, alone or in a batch.
 
 mod arrays;
-mod least_squares;
 mod constants;
+mod least_squares;
 mod pose;
 mod posture;
 
-use arrays::{Input, Output, without_gil, map_rows, map_row_pairs, rows, rows_mut, check_same_length};
+use arrays::{
+    Input, Output, check_same_length, map_row_pairs, map_rows, rows, rows_mut, without_gil,
+};
+use constants::{ARM, Arm, LOWEST_M, TOLERANCE_M, X_MIN_M, Y_MAX_M};
 use faceoff_sim::{
     JOINTS,
     dynamics::spatial::Vec3,
     episode::constraints::{HEIGHT_TOLERANCE_M, LINK_HEIGHT_M},
     model::{EE_DESIRED_HEIGHT_M, LIMIT_FRACTION, LINKS},
 };
-use constants::{ARM, Arm, LOWEST_M, TOLERANCE_M, X_MIN_M, Y_MAX_M};
-use pose::{kinematics_at, elbow_and_wrist_m, jacobian};
+use pose::{elbow_and_wrist_m, jacobian, kinematics_at};
 use pyo3::{prelude::*, types::PyDict};
 use std::array::from_fn;
 
@@ -28,13 +30,17 @@ const CONSTRAINTS: usize = 5 + 2 + 2 * JOINTS + 2 * JOINTS;
 /// End effectors (…, 3), m, at poses (…, 7), rad.
 #[pyfunction]
 pub fn arm_forward(py: Python<'_>, q: Input<'_>, mut ee: Output<'_>) -> PyResult<()> {
-    map_rows(py, &q, &mut ee, |q| kinematics_at(q).end_effector.origin.lane(0))
+    map_rows(py, &q, &mut ee, |q| {
+        kinematics_at(q).end_effector.origin.lane(0)
+    })
 }
 
 /// Heights of elbow and wrist (…, 2), m, at poses (…, 7), rad.
 #[pyfunction]
 pub fn arm_heights(py: Python<'_>, q: Input<'_>, mut heights: Output<'_>) -> PyResult<()> {
-    map_rows(py, &q, &mut heights, |q| elbow_and_wrist_m(&kinematics_at(q)))
+    map_rows(py, &q, &mut heights, |q| {
+        elbow_and_wrist_m(&kinematics_at(q))
+    })
 }
 
 /// Derivatives of the end effector (…, 3, 7), m/rad, at poses (…, 7), rad.
@@ -133,7 +139,11 @@ pub fn arm_velocities(
 ) -> PyResult<()> {
     let arm = &*ARM;
     map_row_pairs(py, (&q, &velocity), &mut dq, |q, &velocity| {
-        least_squares::least_change(&jacobian(&kinematics_at(q)), Vec3::splat(velocity), &arm.weight)
+        least_squares::least_change(
+            &jacobian(&kinematics_at(q)),
+            Vec3::splat(velocity),
+            &arm.weight,
+        )
     })
 }
 

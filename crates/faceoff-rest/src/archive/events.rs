@@ -3,8 +3,8 @@
 use super::files::Files;
 use faceoff_service::{
     app::AppState,
-    problem::Problem,
     free_space,
+    problem::Problem,
     views::event::{self, actor_names},
 };
 use tokio::io::{AsyncWriteExt, BufWriter};
@@ -31,7 +31,10 @@ pub(super) async fn put(app: &AppState, files: &mut Files) -> Result<(), Problem
             view.actor_name = names.get(&view.actor).cloned();
             let mut line = serde_json::to_vec(&view).map_err(Problem::internal)?;
             line.push(b'\n');
-            writer.write_all(&line).await.map_err(free_space::write_problem)?;
+            writer
+                .write_all(&line)
+                .await
+                .map_err(free_space::write_problem)?;
         }
     }
     writer.flush().await.map_err(free_space::write_problem)?;

@@ -1,7 +1,7 @@
 //! The files of an archive while it is prepared.
 
 use faceoff_archive::Entry;
-use faceoff_service::{problem::Problem, free_space};
+use faceoff_service::{free_space, problem::Problem};
 use serde::Serialize;
 use std::{
     fs::File,

@@ -6,8 +6,8 @@ use faceoff_scoring::EpisodeSummary;
 use faceoff_service::{
     app::{App, AppState},
     config::HttpConfig,
-    problem::{Problem, ProblemKind},
     free_space,
+    problem::{Problem, ProblemKind},
     viewer::Viewer,
 };
 use faceoff_store::{ArtifactOwner, Snapshot};
@@ -111,9 +111,15 @@ pub(crate) async fn prepare(app: &App, edition: Edition) -> Result<Prepared, Pro
     if edition == Edition::Organiser {
         for artifact in snapshot.artifacts_to_archive().await? {
             artifacts.push(match artifact.owner {
-                ArtifactOwner::Bundle(id) => ArtifactRow::without_team("submission", id, artifact.key, artifact.blake3),
-                ArtifactOwner::ProposedEvaluation(id) => ArtifactRow::without_team("proposal", id, artifact.key, artifact.blake3),
-                ArtifactOwner::Game(id) => ArtifactRow::without_team("game", id, artifact.key, artifact.blake3),
+                ArtifactOwner::Bundle(id) => {
+                    ArtifactRow::without_team("submission", id, artifact.key, artifact.blake3)
+                }
+                ArtifactOwner::ProposedEvaluation(id) => {
+                    ArtifactRow::without_team("proposal", id, artifact.key, artifact.blake3)
+                }
+                ArtifactOwner::Game(id) => {
+                    ArtifactRow::without_team("game", id, artifact.key, artifact.blake3)
+                }
             });
         }
     }

@@ -16,8 +16,8 @@ use faceoff_service::{
     problem::Problem,
     viewer::Viewer,
     views::{
-        announcement, board, evaluation, game, season, visibility::Visibility, stage, team, tournament,
-        tournament_state::TournamentState,
+        announcement, board, evaluation, game, season, stage, team, tournament,
+        tournament_state::TournamentState, visibility::Visibility,
     },
 };
 use faceoff_store::{Artifacts, EvaluationState, Stage};
@@ -148,7 +148,10 @@ async fn boards(
         .put_json(&format!("{folder}/board.json"), &newest)
         .await?;
     files
-        .put(&format!("{folder}/board.csv"), board_csv::board_table(&newest))
+        .put(
+            &format!("{folder}/board.csv"),
+            board_csv::board_table(&newest),
+        )
         .await?;
     for task in &stage.rules.rules.tasks {
         let board = board::query(app, visibility, query(None), Some(*task)).await?;

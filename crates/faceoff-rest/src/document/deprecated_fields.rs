@@ -118,6 +118,9 @@ mod tests {
         assert_eq!(old["deprecated"], true);
         assert_eq!(old["$ref"], "#/components/schemas/Job");
         assert_eq!(schema["oneOf"][1]["required"], json!(["job"]));
-        assert_eq!(schema["oneOf"][0]["properties"].as_object().unwrap().len(), 1);
+        assert_eq!(
+            schema["oneOf"][0]["properties"].as_object().unwrap().len(),
+            1
+        );
     }
 }

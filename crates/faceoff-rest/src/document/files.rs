@@ -66,7 +66,11 @@ pub(super) fn complete(operation: &mut Operation) {
     }
     let mut whole = whole;
     add_header(&mut whole, "Accept-Ranges", "`bytes`");
-    add_header(&mut whole, "Content-Disposition", "file name for the download");
+    add_header(
+        &mut whole,
+        "Content-Disposition",
+        "file name for the download",
+    );
     add_header(
         &mut whole,
         "X-Content-BLAKE3",
@@ -74,12 +78,9 @@ pub(super) fn complete(operation: &mut Operation) {
     );
     let mut part = whole.clone();
     part.description = "the requested range".to_owned();
-    add_header(
-        &mut part,
-        "Content-Range",
-        "`bytes FIRST-LAST/LENGTH`",
-    );
-    let mut unsatisfiable = Response::new("the range begins behind the end; `bytes` states the length of the file");
+    add_header(&mut part, "Content-Range", "`bytes FIRST-LAST/LENGTH`");
+    let mut unsatisfiable =
+        Response::new("the range begins behind the end; `bytes` states the length of the file");
     add_header(&mut unsatisfiable, "Content-Range", "`bytes */LENGTH`");
     let responses = &mut operation.responses.responses;
     responses.insert("200".to_owned(), whole.into());

@@ -474,7 +474,10 @@ mod tests {
         budget.count_entry().unwrap();
         cancelled.set(true);
         let message = budget.own_failure_or(budget.count_entry());
-        assert!(matches!(message, Err(BundleError::Cancelled)), "{message:?}");
+        assert!(
+            matches!(message, Err(BundleError::Cancelled)),
+            "{message:?}"
+        );
     }
 
     #[test]
@@ -484,8 +487,14 @@ mod tests {
         let almost = usize::try_from(LINK_BYTES - 2 * LOOKUP_BYTES_PER_NAME).unwrap();
         budget.count_link_bytes(almost).unwrap();
         budget.count_link_bytes(0).unwrap();
-        let message = budget.own_failure_or(budget.count_link_bytes(0)).unwrap_err().to_string();
-        assert!(message.contains("lead through too many others"), "{message}");
+        let message = budget
+            .own_failure_or(budget.count_link_bytes(0))
+            .unwrap_err()
+            .to_string();
+        assert!(
+            message.contains("lead through too many others"),
+            "{message}"
+        );
     }
 
     #[test]

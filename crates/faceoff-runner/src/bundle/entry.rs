@@ -93,10 +93,7 @@ pub(super) fn write_new(
     budget: &Budget<'_>,
 ) -> Result<(), BundleError> {
     let file_mode = if mode & 0o111 == 0 { 0o644 } else { 0o755 };
-    let mut file = OpenOptions::new()
-        .write(true)
-        .create_new(true)
-        .open(path)?;
+    let mut file = OpenOptions::new().write(true).create_new(true).open(path)?;
     file.set_permissions(Permissions::from_mode(file_mode))?;
     let mut buffer = vec![0; 64 << 10];
     loop {

@@ -5,8 +5,8 @@ mod digest;
 mod documents;
 mod env;
 mod layer;
-mod root;
 mod messages;
+mod root;
 
 pub(super) use archive::Archive;
 
@@ -70,5 +70,11 @@ pub(super) fn unpack<'a>(
     }
     archive.clear()?;
     let agent = root.finish(manifest)?;
-    Ok((Image { root: root_dir, env }, agent))
+    Ok((
+        Image {
+            root: root_dir,
+            env,
+        },
+        agent,
+    ))
 }

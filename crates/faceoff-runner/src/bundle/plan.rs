@@ -80,7 +80,10 @@ impl Plan {
         let is_missing = |folder: &str| {
             matches!(
                 self.nodes.get(folder),
-                Some(Node::Folder { is_created: false, .. })
+                Some(Node::Folder {
+                    is_created: false,
+                    ..
+                })
             )
         };
         let mut missing = Vec::new();

@@ -1,6 +1,6 @@
 use super::{
     budget::Budget,
-    entry::{FOLDER_MODE, check_target, invalid, make_folder, unusable, add_hard_link, write_new},
+    entry::{FOLDER_MODE, add_hard_link, check_target, invalid, make_folder, unusable, write_new},
     error::BundleError,
     links,
     node::Node,
@@ -119,7 +119,10 @@ impl<'a> Tree<'a> {
         }
         // The sort order puts a folder before its content.
         for (path, node) in nodes {
-            if let Node::Folder { is_created: false, .. } = node {
+            if let Node::Folder {
+                is_created: false, ..
+            } = node
+            {
                 self.budget.check()?;
                 make_folder(&self.into.join(path))?;
             }

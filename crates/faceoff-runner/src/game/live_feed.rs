@@ -1,7 +1,7 @@
 //! Live feed of a game for viewers: all events, and positions at intervals.
 
 use super::report::{GameObserver, GameReport};
-use faceoff_episode::{RallyEntry, GameStepRow, RallyEnding, RallyRow, RallyStart};
+use faceoff_episode::{GameStepRow, RallyEnding, RallyEntry, RallyRow, RallyStart};
 use faceoff_sim::{GameState, RallyEnd, table::frames::table_from_robot};
 use faceoff_types::{GameEvent, LiveEvent, LivePosition, Side};
 use std::time::{Duration, Instant};

@@ -4,7 +4,7 @@
 
 use super::side_player::SidePlayer;
 use crate::{calibration::Calibration, fault::PlatformFault, session::Session};
-use faceoff_episode::{RunningGame, GameSink, Question};
+use faceoff_episode::{GameSink, Question, RunningGame};
 use faceoff_sandbox::{Layer, SandboxError};
 use faceoff_types::{Side, TimeLimits};
 use std::time::{Duration, Instant};
@@ -92,10 +92,7 @@ fn step<S: GameSink>(
     sides: &mut [SidePlayer<'_>; 2],
     after_answer: AfterAnswer,
 ) -> Result<(), PlatformFault> {
-    let questions = [
-        game.question(Side::First)?,
-        game.question(Side::Second)?,
-    ];
+    let questions = [game.question(Side::First)?, game.question(Side::Second)?];
     ask_both(sides, |side, player| match questions[side.index()] {
         Some(Question { step, observation }) => {
             player.ask(|session| session.send_step(step, observation))
@@ -185,10 +182,7 @@ fn no_freezer() -> SandboxError {
 
 /// Checks one side for its answer. Diagnosing the exit of an agent may take seconds, which must not count for the
 /// other side.
-fn poll_side(
-    polled: &mut SidePlayer<'_>,
-    other: &mut SidePlayer<'_>,
-) -> Result<(), PlatformFault> {
+fn poll_side(polled: &mut SidePlayer<'_>, other: &mut SidePlayer<'_>) -> Result<(), PlatformFault> {
     let before = Instant::now();
     polled.poll(before)?;
     record_absence(other, before);

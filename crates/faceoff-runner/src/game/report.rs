@@ -7,11 +7,11 @@ use crate::{
     calibration::Calibration,
     config::AgentEnvironment,
     fault::PlatformFault,
-    host_interference::{KernelCounters, InterferenceMonitor},
+    host_interference::{InterferenceMonitor, KernelCounters},
 };
 use faceoff_dataset::game::{GameArchives, GameRecorder, RecordedGame, remove_game};
 use faceoff_episode::{
-    Arena, FinishedGame, RunningGame, GameSink, GameStepRow, RallyRow, RallyStart, RecordError,
+    Arena, FinishedGame, GameSink, GameStepRow, RallyRow, RallyStart, RecordError, RunningGame,
 };
 use faceoff_sandbox::affinity::AffinityGuard;
 use faceoff_types::Side;
@@ -152,12 +152,12 @@ pub fn play_game<S: GameSink>(
     };
     let mut game = RunningGame::begin(&arena, spec.steps, spec.limits.clone(), observed);
     // Without a sandbox no CPU time is counted, so freezing is not needed.
-    let after_answer = if AgentEnvironment::share_cpus(envs) && envs.iter().all(|env| env.has_cpu_accounting())
-    {
-        AfterAnswer::Freeze
-    } else {
-        AfterAnswer::Continue
-    };
+    let after_answer =
+        if AgentEnvironment::share_cpus(envs) && envs.iter().all(|env| env.has_cpu_accounting()) {
+            AfterAnswer::Freeze
+        } else {
+            AfterAnswer::Continue
+        };
     let played = lock_step::play(
         &mut game,
         &mut sides,

@@ -74,7 +74,13 @@ fn sleeping_agent_is_not_excused() {
     let out = tempfile::tempdir().unwrap();
     let env = with_reruns(sandboxed(), 2, 100);
     let agent = Agent::with(SLEEPS);
-    let report = run_monitored(&spec(Task::Hit, 0..2), &agent, &env, &FixedShare(0.0), out.path());
+    let report = run_monitored(
+        &spec(Task::Hit, 0..2),
+        &agent,
+        &env,
+        &FixedShare(0.0),
+        out.path(),
+    );
     assert_eq!(report.timing.host_noise_reruns, 0);
     for outcome in &report.outcomes {
         assert!(outcome.computation_time.max_s >= 0.15, "{outcome:?}");
@@ -90,7 +96,13 @@ fn late_answer_counts_without_host_interference() {
     let out = tempfile::tempdir().unwrap();
     let env = with_reruns(sandboxed(), 2, 100);
     let agent = Agent::with(SLEEPS);
-    let report = run_monitored(&spec(Task::Hit, 0..1), &agent, &env, &FixedShare(0.5), out.path());
+    let report = run_monitored(
+        &spec(Task::Hit, 0..1),
+        &agent,
+        &env,
+        &FixedShare(0.5),
+        out.path(),
+    );
     assert_eq!(report.timing.host_noise_reruns, 0);
     let steps = read(&out.path().join("steps.parquet"));
     let (counted, host) = (
@@ -160,12 +172,19 @@ fn episode_ended_by_the_host_is_rerun_by_a_new_process() {
 #[test]
 fn reruns_are_bounded_and_the_last_try_counts() {
     let out = tempfile::tempdir().unwrap();
-    for (per_episode, per_100, expected) in [(0, 100, [0, 0, 0]), (2, 100, [2, 1, 0]), (2, 5, [1, 0, 0])]
+    for (per_episode, per_100, expected) in
+        [(0, 100, [0, 0, 0]), (2, 100, [2, 1, 0]), (2, 5, [1, 0, 0])]
     {
         let env = with_reruns(impatient(0.1), per_episode, per_100);
         let mut spec = spec(Task::Hit, 0..3);
         spec.max_faults = 10;
-        let report = run_monitored(&spec, &Agent::with(HANGS), &env, &FixedShare(1.0), out.path());
+        let report = run_monitored(
+            &spec,
+            &Agent::with(HANGS),
+            &env,
+            &FixedShare(1.0),
+            out.path(),
+        );
         assert_eq!(report.outcomes.len(), 3);
         for outcome in &report.outcomes {
             let fault = outcome.fault.as_ref().map(|fault| &fault.fault);

@@ -699,7 +699,10 @@ fn image_of_the_hosts_platform_is_chosen() {
         let entry = json!({"mediaType": "application/vnd.oci.image.index.v1+json", "digest": name});
         index(tar, &[entry]).bytes()
     };
-    let (_dir, _, image) = accepted(&nested(tar.clone(), json!([for_riscv, for_host, attestation])));
+    let (_dir, _, image) = accepted(&nested(
+        tar.clone(),
+        json!([for_riscv, for_host, attestation]),
+    ));
     assert_eq!(image.text("usr/bin/tool"), "tool");
     let mut for_windows = for_host.clone();
     for_windows["platform"] = platform(host, "windows");
@@ -1143,7 +1146,10 @@ fn limits_hold_over_all_layers() {
     let padded = Tar::new().entry(EntryType::Directory, "x", 0o755, "", &vec![0; 30 << 20]);
     let padded = TestImage::agent([padded]).packed(Packing::Zstd).docker();
     let message = refusal(&padded.gz(), limits);
-    assert!(message.contains("more bytes than its files explain"), "{message}");
+    assert!(
+        message.contains("more bytes than its files explain"),
+        "{message}"
+    );
     let files = |count: usize, of_layer: usize| {
         (0..count).fold(Tar::new(), |tar, index| {
             tar.file(&format!("f{of_layer}-{index}"), 0o644, b"")

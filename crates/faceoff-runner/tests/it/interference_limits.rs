@@ -6,8 +6,8 @@ use crate::{
     shard::{RecordingObserver, spec},
 };
 use faceoff_runner::{
-    AgentEnvironment, InterferenceMonitor, PlatformFault, ValidationFailure, ValidationReport, ValidationSpec,
-    run_shard_monitored, validate_monitored,
+    AgentEnvironment, InterferenceMonitor, PlatformFault, ValidationFailure, ValidationReport,
+    ValidationSpec, run_shard_monitored, validate_monitored,
 };
 use faceoff_types::{AgentFaultKind, Phase, Seed, Task};
 use std::time::{Duration, Instant};
@@ -69,7 +69,10 @@ fn validation_timeout_by_the_host_is_a_platform_fault() {
     for reruns in [0, 2] {
         env.time.host_noise_reruns = reruns;
         let result = validated(&agent, &env, &NEARLY_ALL);
-        assert!(matches!(result, Err(PlatformFault::HostBusy(_))), "{result:?}");
+        assert!(
+            matches!(result, Err(PlatformFault::HostBusy(_))),
+            "{result:?}"
+        );
     }
     let report = validated(&agent, &env, &NONE).unwrap();
     let Some(
@@ -130,7 +133,10 @@ fn start_up_limit_excludes_host_interference() {
         &env,
         &NEARLY_ALL,
     );
-    assert!(matches!(result, Err(PlatformFault::HostBusy(_))), "{result:?}");
+    assert!(
+        matches!(result, Err(PlatformFault::HostBusy(_))),
+        "{result:?}"
+    );
 }
 
 #[test]

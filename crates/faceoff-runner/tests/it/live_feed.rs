@@ -4,7 +4,7 @@ use crate::{
     agents::{Agent, sandboxed},
     game::spec,
 };
-use faceoff_runner::{LiveFeed, LiveFeedSink, GameReport, run_game};
+use faceoff_runner::{GameReport, LiveFeed, LiveFeedSink, run_game};
 use faceoff_types::{GameEvent, LiveEvent, LivePosition, Side};
 use std::time::Duration;
 
@@ -37,14 +37,7 @@ fn run_with_feed(steps: u32, position_interval: Duration) -> (RecordingSink, Gam
     let mut sink = RecordingSink::default();
     let mut feed = LiveFeed::new(&mut sink, position_interval);
     let bundles = [&hold.bundle, &crashes.bundle];
-    let report = run_game(
-        &spec(steps),
-        bundles,
-        [&env; 2],
-        out.path(),
-        &mut feed,
-    )
-    .unwrap();
+    let report = run_game(&spec(steps), bundles, [&env; 2], out.path(), &mut feed).unwrap();
     feed.end(&report);
     (sink, report)
 }
@@ -89,7 +82,18 @@ fn live_feed_has_all_events_in_order_and_all_positions() {
     assert_eq!(kinds, expected.iter().collect::<Vec<_>>());
     let restart_step = sink.events[2].step;
     let steps: Vec<u32> = sink.events.iter().map(|event| event.step).collect();
-    assert_eq!(steps, [0, 3, restart_step, restart_step, restart_step, restart_step + 3, 800]);
+    assert_eq!(
+        steps,
+        [
+            0,
+            3,
+            restart_step,
+            restart_step,
+            restart_step,
+            restart_step + 3,
+            800
+        ]
+    );
 
     let mut seen: Vec<u32> = sink.positions.iter().map(|at| at.step).collect();
     assert!(seen.is_sorted());

@@ -2,7 +2,8 @@
 
 use crate::agents::{Agent, impatient, sandboxed};
 use faceoff_runner::{
-    AgentEnvironment, PlatformFault, VALIDATION_STEPS, ValidationFailure, ValidationReport, ValidationSpec, validate,
+    AgentEnvironment, PlatformFault, VALIDATION_STEPS, ValidationFailure, ValidationReport,
+    ValidationSpec, validate,
 };
 use faceoff_types::{AgentFault, AgentFaultKind, Phase, Seed, Task};
 

@@ -49,7 +49,13 @@ pub fn run(
     env: &AgentEnvironment,
     out: &Path,
 ) -> Result<ShardReport, PlatformFault> {
-    run_shard(spec, &agent.bundle, env, out, &mut RecordingObserver::default())
+    run_shard(
+        spec,
+        &agent.bundle,
+        env,
+        out,
+        &mut RecordingObserver::default(),
+    )
 }
 
 /// The outcomes without times, which depend on the host.

@@ -5,8 +5,8 @@ use crate::{
     shard::{RecordingObserver, spec},
 };
 use faceoff_runner::{
-    AgentEnvironment, InterferenceMonitor, PlatformFault, Supervision, run_shard, run_shard_monitored,
-    stuck_threads,
+    AgentEnvironment, InterferenceMonitor, PlatformFault, Supervision, run_shard,
+    run_shard_monitored, stuck_threads,
 };
 use faceoff_types::{AgentFaultKind, Phase, Task};
 use std::{

@@ -139,7 +139,12 @@ impl AgentCgroup {
     }
 
     /// The agent's folder in a hierarchy, created if missing.
-    fn leaf(&mut self, hierarchy: &Hierarchy, controllers: &[&str], name: &str) -> io::Result<PathBuf> {
+    fn leaf(
+        &mut self,
+        hierarchy: &Hierarchy,
+        controllers: &[&str],
+        name: &str,
+    ) -> io::Result<PathBuf> {
         // Another service in the same cgroup may remove the empty parent folder between the two calls.
         for _ in 0..8 {
             let leaf = hierarchy.prepare_folder(controllers)?.join(name);

@@ -88,8 +88,7 @@ impl InterferenceEstimator<'_> {
         };
         let ran = to.agent.saturating_sub(from.agent);
         let stolen = stolen_time(from, to).min(wait + ran);
-        wait
-            .saturating_sub(ran)
+        wait.saturating_sub(ran)
             .saturating_sub(to.throttled.saturating_sub(from.throttled))
             .max(stolen)
             .min(wall)
@@ -172,7 +171,11 @@ mod tests {
         };
         let one = [cpu(0, 0, 0)];
         assert_eq!(others_time(0, 60, &one, 100), MS(60));
-        assert_eq!(others_time(40, 100, &one, 100), MS(60), "less its own run time");
+        assert_eq!(
+            others_time(40, 100, &one, 100),
+            MS(60),
+            "less its own run time"
+        );
         assert_eq!(
             others_time(90, 90, &one, 100),
             MS(0),
@@ -219,14 +222,26 @@ mod tests {
         assert_eq!(run_delay(1, 26, &one), MS(25));
         assert_eq!(run_delay(30, 29, &one), MS(0), "its other threads ran");
         assert_eq!(run_delay(1, 0, &one), MS(0), "it slept");
-        assert_eq!(run_delay(1, 26, &[cpu(0, 0, 0); 2]), MS(0), "another was free");
+        assert_eq!(
+            run_delay(1, 26, &[cpu(0, 0, 0); 2]),
+            MS(0),
+            "another was free"
+        );
         assert_eq!(
             run_delay(25, 0, &[cpu(0, 0, 2)]),
             MS(20),
             "steal time while it seemed to run"
         );
-        assert_eq!(run_delay(1, 0, &[cpu(0, 0, 2)]), MS(1), "it slept in between");
-        assert_eq!(run_delay(20, 25, &[cpu(0, 0, 9)]), MS(30), "never more than all");
+        assert_eq!(
+            run_delay(1, 0, &[cpu(0, 0, 2)]),
+            MS(1),
+            "it slept in between"
+        );
+        assert_eq!(
+            run_delay(20, 25, &[cpu(0, 0, 9)]),
+            MS(30),
+            "never more than all"
+        );
         assert_eq!(run_delay(1, 0, &[cpu(0, 0, 2), cpu(0, 0, 0)]), MS(0));
         let mut from = reading(begun, 500, 700, &one);
         let mut to = reading(begun + MS(250), 501, 700, &[cpu(0, 0, 15)]);
@@ -256,7 +271,9 @@ mod tests {
         let first = at(10, 3, 7, 5, true);
         let pending = |samples: &CpuSamples, now: &CpuReading| {
             let waits = now.waits.as_ref().unwrap();
-            samples.ledger.longest_observed_wait(waits, AnswerState::Pending)
+            samples
+                .ledger
+                .longest_observed_wait(waits, AnswerState::Pending)
         };
         let observed_wait = |later: &CpuReading| {
             let mut samples = CpuSamples::begin(first.clone(), None, begun);
@@ -264,20 +281,32 @@ mod tests {
             pending(&samples, later)
         };
         assert_eq!(observed_wait(&at(15, 3, 7, 5, true)), MS(5));
-        assert_eq!(observed_wait(&at(15, 5, 7, 5, true)), MS(3), "less its run time");
+        assert_eq!(
+            observed_wait(&at(15, 5, 7, 5, true)),
+            MS(3),
+            "less its run time"
+        );
         assert_eq!(
             observed_wait(&at(15, 9, 7, 5, true)),
             MS(0),
             "with its other threads"
         );
-        assert_eq!(observed_wait(&at(15, 3, 8, 5, true)), MS(0), "it may have slept");
+        assert_eq!(
+            observed_wait(&at(15, 3, 8, 5, true)),
+            MS(0),
+            "it may have slept"
+        );
         assert_eq!(observed_wait(&at(15, 3, 7, 5, false)), MS(0), "it sleeps");
         let mut throttled = at(15, 3, 7, 5, true);
         throttled.throttled = MS(4);
         assert_eq!(observed_wait(&throttled), MS(1), "its own quota");
         let mut ended = at(15, 3, 7, 5, true);
         (ended.clocks, ended.agent) = (MS(0), MS(7));
-        assert_eq!(observed_wait(&ended), MS(1), "a process that ended ran, too");
+        assert_eq!(
+            observed_wait(&ended),
+            MS(1),
+            "a process that ended ran, too"
+        );
 
         // A baseline does not contain the states of threads.
         let baseline = at(0, 3, 7, 4, false);
@@ -301,7 +330,11 @@ mod tests {
         assert_eq!(upper_bound(&from, &to, true), MS(30 + 30));
         assert_eq!(upper_bound(&from, &to, false), MS(20 + 30));
         to.throttled = MS(45);
-        assert_eq!(upper_bound(&from, &to, true), MS(15), "its own quota does not count");
+        assert_eq!(
+            upper_bound(&from, &to, true),
+            MS(15),
+            "its own quota does not count"
+        );
         assert_eq!(upper_bound(&from, &from, true), MS(0));
     }
 
@@ -324,7 +357,11 @@ mod tests {
         };
         assert_eq!(others_time(0, cpu(20, 0, 0)), MS(180));
         assert_eq!(others_time(50, cpu(20, 0, 0)), MS(130));
-        assert_eq!(others_time(0, cpu(1, 18, 0)), MS(0), "a tick proves nothing");
+        assert_eq!(
+            others_time(0, cpu(1, 18, 0)),
+            MS(0),
+            "a tick proves nothing"
+        );
         assert_eq!(others_time(0, cpu(10, 0, 10)), MS(180), "steal counts");
         // It runs at each tick and sleeps in between, which counts as idle.
         assert_eq!(others_time(20, cpu(20, 17, 0)), MS(0));

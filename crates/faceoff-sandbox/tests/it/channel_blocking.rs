@@ -1,7 +1,7 @@
 //! Agents that block the channel to the service in every known way: no call on the channel waits for them, in any
 //! order of calls.
 
-use crate::harness::{LINE_CAP, TIMEOUT, Subject, expect_line, processes_marked};
+use crate::harness::{LINE_CAP, Subject, TIMEOUT, expect_line, processes_marked};
 use faceoff_sandbox::AgentProcess;
 use proptest::{prelude::*, test_runner::TestRunner};
 use std::{

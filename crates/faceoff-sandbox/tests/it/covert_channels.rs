@@ -2,7 +2,7 @@
 //! Covert channels: no agent sees any effect of another agent on shared files, at the same time or later. The test
 //! program knows the system call numbers of this architecture only.
 
-use crate::harness::{TIMEOUT, Subject, expect_echo, expect_line};
+use crate::harness::{Subject, TIMEOUT, expect_echo, expect_line};
 use std::{
     collections::BTreeMap,
     fs::{self, File, FileTimes},
@@ -159,14 +159,13 @@ fn advice_neither_loads_nor_drops_a_shared_file() {
     let pages = 2048;
     drop_from_memory(&file);
     if pages_in_memory(&file) > 0 {
-        println!("this test checks only half on this host: the temporary folder is always in memory");
+        println!(
+            "this test checks only half on this host: the temporary folder is always in memory"
+        );
     } else {
         subject.report();
         let found = pages_in_memory(&file);
-        assert!(
-            found < pages / 2,
-            "{found} of {pages} pages were loaded"
-        );
+        assert!(found < pages / 2, "{found} of {pages} pages were loaded");
     }
     // Only most of the pages must be in memory: a host may reclaim a page at any time, as hosts that share memory do.
     // An agent that could drop the file would drop all of it.

@@ -1,4 +1,4 @@
-use crate::harness::{LINE_CAP, TIMEOUT, Subject, expect_line, has, is_root};
+use crate::harness::{LINE_CAP, Subject, TIMEOUT, expect_line, has, is_root};
 use faceoff_sandbox::{
     AgentProcess, Isolation, Layer, ReadLine, SandboxError, SpawnError, WriteError,
 };
@@ -10,9 +10,7 @@ fn end_of(arguments: &[&str]) -> (AgentFaultKind, String) {
     let subject = Subject::new("exits", arguments);
     let mut agent = subject.spawn();
     assert_eq!(expect_line(&mut agent), "ready");
-    let outcome = agent
-        .read_line(LINE_CAP, Instant::now() + TIMEOUT)
-        .unwrap();
+    let outcome = agent.read_line(LINE_CAP, Instant::now() + TIMEOUT).unwrap();
     assert!(matches!(outcome, ReadLine::Closed), "{outcome:?}");
     let end = subject.end(&mut agent);
     (end, subject.finish(agent).stderr_tail)
@@ -100,9 +98,7 @@ fn cannot_start(command: &[&str]) -> String {
         Err(SpawnError::Agent(fault)) => fault,
         Err(SpawnError::Platform(error)) => panic!("{error}"),
         Ok(mut agent) => {
-            let outcome = agent
-                .read_line(LINE_CAP, Instant::now() + TIMEOUT)
-                .unwrap();
+            let outcome = agent.read_line(LINE_CAP, Instant::now() + TIMEOUT).unwrap();
             assert!(matches!(outcome, ReadLine::Closed), "{outcome:?}");
             subject.end(&mut agent)
         }

@@ -168,10 +168,7 @@ pub fn agents_dir() -> PathBuf {
 
 /// The next line as text; panics with any other outcome.
 pub fn expect_line(agent: &mut AgentProcess) -> String {
-    match agent
-        .read_line(LINE_CAP, Instant::now() + TIMEOUT)
-        .unwrap()
-    {
+    match agent.read_line(LINE_CAP, Instant::now() + TIMEOUT).unwrap() {
         ReadLine::Line { bytes, .. } => String::from_utf8(bytes).unwrap(),
         other => {
             let end = agent.diagnose_end(Duration::from_secs(1));

@@ -1,6 +1,6 @@
 //! Agents that are container images: with their own root folder, as unpacked from a bundle.
 
-use crate::harness::{TIMEOUT, Subject, expect_echo, expect_line};
+use crate::harness::{Subject, TIMEOUT, expect_echo, expect_line};
 use faceoff_sandbox::{AgentProcess, Isolation, Layer, Runtime, SpawnError};
 use faceoff_types::AgentFaultKind;
 use std::{

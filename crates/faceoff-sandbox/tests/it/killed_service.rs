@@ -1,6 +1,6 @@
 //! When a service is killed, its agents die with it, and the next service removes the remains.
 
-use crate::harness::{TIMEOUT, Subject, agent_cgroups, expect_line, processes_marked};
+use crate::harness::{Subject, TIMEOUT, agent_cgroups, expect_line, processes_marked};
 use faceoff_sandbox::{AgentProcess, sweep_stale};
 use rustix::{
     event::{PollFd, PollFlags, Timespec, poll},
@@ -14,10 +14,7 @@ use std::{
 /// In cgroup version 1 a frozen process does not die, so the sweep must thaw it.
 #[test]
 fn frozen_agent_of_a_killed_service_is_removed() {
-    assert_ends_with_its_service(
-        "killed_service::service_waits_with_a_frozen_agent",
-        true,
-    );
+    assert_ends_with_its_service("killed_service::service_waits_with_a_frozen_agent", true);
 }
 
 #[test]

@@ -9,23 +9,23 @@
     reason = "a test prints what it cannot check on this host"
 )]
 
-mod network_access;
-mod process_cleanup;
-mod cpu_count;
-mod no_sandbox;
-mod exit_causes;
-mod output_floods;
-mod harness;
-mod resource_limits;
 mod channel_blocking;
+mod covert_channels;
+mod cpu_count;
+mod cpu_limits;
+mod exit_causes;
+mod file_writes;
+mod harness;
+mod host_visibility;
 mod images;
 mod killed_service;
-mod host_visibility;
-mod cpu_limits;
-mod process_limits;
-mod covert_channels;
+mod network_access;
+mod no_sandbox;
+mod normal_operation;
+mod output_floods;
 mod probe;
+mod process_cleanup;
+mod process_limits;
+mod resource_limits;
 mod runtimes;
 mod system_calls;
-mod normal_operation;
-mod file_writes;

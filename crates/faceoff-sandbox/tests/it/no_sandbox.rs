@@ -1,6 +1,6 @@
 //! `--no-sandbox`: a developer's own agent.
 
-use crate::harness::{LINE_CAP, TIMEOUT, Subject, expect_echo, expect_line};
+use crate::harness::{LINE_CAP, Subject, TIMEOUT, expect_echo, expect_line};
 use faceoff_sandbox::{AgentProcess, Isolation, ReadLine, SpawnError};
 use faceoff_types::AgentFaultKind;
 use std::time::{Duration, Instant};
@@ -24,9 +24,7 @@ fn agent_runs_in_the_developers_environment() {
 fn agent_is_capped_and_killed_without_a_sandbox() {
     let subject = unsandboxed("floods", &["endless"]);
     let mut agent = subject.spawn();
-    let outcome = agent
-        .read_line(LINE_CAP, Instant::now() + TIMEOUT)
-        .unwrap();
+    let outcome = agent.read_line(LINE_CAP, Instant::now() + TIMEOUT).unwrap();
     assert!(matches!(outcome, ReadLine::TooLong { .. }));
     subject.finish(agent);
     for kind in ["ignores", "group"] {
@@ -57,9 +55,7 @@ fn exit_causes_are_distinguished_without_a_sandbox() {
     let subject = unsandboxed("exits", &["close"]);
     let mut agent = subject.spawn();
     assert_eq!(expect_line(&mut agent), "ready");
-    let outcome = agent
-        .read_line(LINE_CAP, Instant::now() + TIMEOUT)
-        .unwrap();
+    let outcome = agent.read_line(LINE_CAP, Instant::now() + TIMEOUT).unwrap();
     assert!(matches!(outcome, ReadLine::Closed));
     assert_eq!(agent.diagnose_end(Duration::ZERO).unwrap(), None);
     subject.finish(agent);

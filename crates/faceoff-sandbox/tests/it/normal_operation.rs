@@ -1,4 +1,4 @@
-use crate::harness::{LINE_CAP, TIMEOUT, Subject, expect_echo, expect_line, has};
+use crate::harness::{LINE_CAP, Subject, TIMEOUT, expect_echo, expect_line, has};
 use faceoff_sandbox::{Layer, ReadLine};
 use std::time::{Duration, Instant};
 

@@ -1,4 +1,4 @@
-use crate::harness::{LINE_CAP, TIMEOUT, Subject, expect_echo, expect_line};
+use crate::harness::{LINE_CAP, Subject, TIMEOUT, expect_echo, expect_line};
 use faceoff_sandbox::ReadLine;
 use std::time::Instant;
 
@@ -6,10 +6,7 @@ use std::time::Instant;
 fn endless_line_is_cut() {
     let subject = Subject::new("floods", &["endless"]);
     let mut agent = subject.spawn();
-    match agent
-        .read_line(LINE_CAP, Instant::now() + TIMEOUT)
-        .unwrap()
-    {
+    match agent.read_line(LINE_CAP, Instant::now() + TIMEOUT).unwrap() {
         ReadLine::TooLong { head } => {
             assert!(head.len() <= 1024 && head.iter().all(|byte| *byte == b'x'))
         }

@@ -1,4 +1,4 @@
-use crate::harness::{TIMEOUT, Subject, expect_line, processes_marked};
+use crate::harness::{Subject, TIMEOUT, expect_line, processes_marked};
 use faceoff_types::AgentFaultKind;
 use std::time::Duration;
 

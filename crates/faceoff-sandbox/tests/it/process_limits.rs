@@ -1,4 +1,4 @@
-use crate::harness::{TIMEOUT, Subject, expect_echo, expect_line, has, processes_marked};
+use crate::harness::{Subject, TIMEOUT, expect_echo, expect_line, has, processes_marked};
 use faceoff_sandbox::Layer;
 use faceoff_types::AgentFaultKind;
 

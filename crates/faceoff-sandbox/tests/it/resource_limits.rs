@@ -1,4 +1,4 @@
-use crate::harness::{LINE_CAP, TIMEOUT, Subject, expect_echo, expect_line, has};
+use crate::harness::{LINE_CAP, Subject, TIMEOUT, expect_echo, expect_line, has};
 use faceoff_sandbox::{Layer, ReadLine};
 use faceoff_types::AgentFaultKind;
 use std::time::Instant;
@@ -7,11 +7,10 @@ fn assert_memory_limit_kills(kind: &str) {
     if !has(Layer::CgroupMemory) {
         return;
     }
-    let subject = Subject::new("exceeds_limits", &[kind]).limits(|limits| limits.memory_bytes = 64 << 20);
+    let subject =
+        Subject::new("exceeds_limits", &[kind]).limits(|limits| limits.memory_bytes = 64 << 20);
     let mut agent = subject.spawn();
-    let outcome = agent
-        .read_line(LINE_CAP, Instant::now() + TIMEOUT)
-        .unwrap();
+    let outcome = agent.read_line(LINE_CAP, Instant::now() + TIMEOUT).unwrap();
     assert!(matches!(outcome, ReadLine::Closed), "{outcome:?}");
     match subject.end(&mut agent) {
         AgentFaultKind::LimitExceeded { limit, allowed, .. } => {

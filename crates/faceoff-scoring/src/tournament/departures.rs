@@ -70,9 +70,7 @@ impl Departures {
 
     /// The games that still count.
     pub fn counting<'a>(&'a self, games: &'a [PlayedGame]) -> impl Iterator<Item = &'a PlayedGame> {
-        games
-            .iter()
-            .filter(|game| self.excluded_by(game).is_none())
+        games.iter().filter(|game| self.excluded_by(game).is_none())
     }
 
     /// How a team left; `None` if it did not.

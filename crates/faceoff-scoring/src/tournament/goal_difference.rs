@@ -120,7 +120,10 @@ mod tests {
         let [low, high] = result.mean_ci95.unwrap();
         assert!((low - (1.0 - 0.277)).abs() < 0.05, "{low}");
         assert!((high - (1.0 + 0.277)).abs() < 0.05, "{high}");
-        assert_eq!(GoalDifference::from_differences(all.into_iter().rev()), result);
+        assert_eq!(
+            GoalDifference::from_differences(all.into_iter().rev()),
+            result
+        );
     }
 
     #[test]

@@ -87,7 +87,9 @@ pub fn find_mirrored_pairs<'a>(
             .zip(pairs)
             .map(|(submissions, pairs)| SubmissionPairing {
                 submissions,
-                goal_difference: GoalDifference::from_differences(pairs.iter().map(|[home, away]| home + away)),
+                goal_difference: GoalDifference::from_differences(
+                    pairs.iter().map(|[home, away]| home + away),
+                ),
             })
             .collect(),
     })

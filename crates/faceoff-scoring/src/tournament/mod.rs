@@ -22,7 +22,7 @@ mod submission_label;
 pub use bye::{Bye, POINTS_BYE};
 pub use champion_shares::{ChampionShare, compute_champion_shares};
 pub use departures::{Departure, Departures, DuplicateDeparture};
-pub use faceoff_types::{InvalidRoundNumber, DepartureKind, RoundNumber};
+pub use faceoff_types::{DepartureKind, InvalidRoundNumber, RoundNumber};
 pub use game::{GameEntry, InvalidGame, PlayedGame, ScoredGame};
 pub use goal_difference::{GoalDifference, MIN_FOR_INTERVAL};
 pub use head_to_head::{HeadToHead, head_to_head};

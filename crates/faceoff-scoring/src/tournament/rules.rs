@@ -127,7 +127,11 @@ mod tests {
         for (score, penalty_points, expected) in [
             ([3, 2], [135.0, 135.0], won(Home, WinReason::Score)),
             ([2, 3], [0.0, 134.5], won(Away, WinReason::Score)),
-            ([2, 2], [0.0, 100.0], GameResult::Drawn(DrawReason::EqualScore)),
+            (
+                [2, 2],
+                [0.0, 100.0],
+                GameResult::Drawn(DrawReason::EqualScore),
+            ),
             ([9, 0], [135.5, 135.0], won(Away, tier(false))),
             ([0, 9], [135.0, 990.0], won(Home, tier(false))),
             ([9, 0], [135.0, 135.5], won(Home, tier(true))),

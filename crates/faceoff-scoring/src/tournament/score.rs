@@ -217,7 +217,8 @@ fn total_penalty(side: &SideOutcome) -> f64 {
 }
 
 fn count_violations(windows: &[GameWindow]) -> ViolationCounts {
-    let windows_with = |test: fn(&GameWindow) -> bool| count(windows.iter().filter(|w| test(w)).count());
+    let windows_with =
+        |test: fn(&GameWindow) -> bool| count(windows.iter().filter(|w| test(w)).count());
     ViolationCounts {
         ee: windows_with(|window| window.violations.ee),
         link: windows_with(|window| window.violations.link),

@@ -125,7 +125,8 @@ pub fn score_tournament_with(
     // Sorted by name; the stable sort keeps that for ties.
     let mut standings: Vec<_> = teams.into_values().collect();
     standings.sort_by(|a, b| {
-        let is_disqualified = |row: &StandingsRow| row.departure == Some(DepartureKind::Disqualified);
+        let is_disqualified =
+            |row: &StandingsRow| row.departure == Some(DepartureKind::Disqualified);
         is_disqualified(a)
             .cmp(&is_disqualified(b))
             .then_with(|| b.points.cmp(&a.points))

@@ -1,7 +1,7 @@
 use crate::support::episode;
 use faceoff_scoring::{
-    EpisodeSummary, NotComparable, PairedTally, PairingError, ComparedEvaluation, StepTimes, overall_p_value,
-    overall_score, score_task,
+    ComparedEvaluation, EpisodeSummary, NotComparable, PairedTally, PairingError, StepTimes,
+    overall_p_value, overall_score, score_task,
 };
 use faceoff_types::{
     EpisodeOutcome, Profile, RULESET, Seed, Task, TierBounds, Variation, Violations,
@@ -222,7 +222,10 @@ fn unpaired_evaluations_are_compared_by_rates() {
     let b = summary(&outcomes(1000, |task, e| task == Task::Hit && e < 480));
     let c = summary(&outcomes(1000, |task, e| task == Task::Hit && e < 400));
     let (first, second) = (evaluation(&a), evaluation(&b));
-    assert!(first.differs_significantly(&second, None) && first.differs_significantly(&second, Some(Task::Hit)));
+    assert!(
+        first.differs_significantly(&second, None)
+            && first.differs_significantly(&second, Some(Task::Hit))
+    );
     assert!(!first.differs_significantly(&second, Some(Task::Defend)));
     let another_day = |summary| ComparedEvaluation {
         seed: Seed::from_number(9),

@@ -5,6 +5,7 @@
 mod boards;
 mod comparison;
 mod evaluation;
+mod input_files;
 mod mirrored;
 mod most_pairs;
 mod pairing;
@@ -12,7 +13,6 @@ mod paper_qualifying;
 mod paper_ratings;
 mod paper_tournament;
 mod ratings;
-mod tournament_results;
 mod schedule;
-mod input_files;
 mod support;
+mod tournament_results;

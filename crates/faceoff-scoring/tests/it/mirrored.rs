@@ -53,7 +53,10 @@ fn opposite_luck_in_both_halves_cancels() {
 #[test]
 fn equal_luck_in_both_halves_doubles_variance() {
     let all: Vec<_> = (0..20).map(|n| [n % 3, n % 3]).collect();
-    let variances = find_mirrored_pairs(&games(&pairs(&all))).unwrap().variances.unwrap();
+    let variances = find_mirrored_pairs(&games(&pairs(&all)))
+        .unwrap()
+        .variances
+        .unwrap();
     assert!((variances.ratio.unwrap() - 2.0).abs() < 1e-12);
 }
 

@@ -37,7 +37,10 @@ fn assert_ratings(pool: &Pool, expected: &[Expected]) {
             assert_eq!(got.is_some(), other.is_some(), "{team}: {:?}", row.ci95);
             if let (Some(got), Some(other)) = (got, other) {
                 // Two bootstraps with a thousand samples may differ by this much.
-                assert!((got - other).abs() < 30.0, "{team}: {got}, expected {other}");
+                assert!(
+                    (got - other).abs() < 30.0,
+                    "{team}: {got}, expected {other}"
+                );
             }
         }
     }

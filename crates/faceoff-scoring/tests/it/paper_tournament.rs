@@ -1,5 +1,7 @@
 use crate::support::{read, rows};
-use faceoff_scoring::tournament::{DrawReason, GameResult, PlayedGame, WinReason, score_tournament};
+use faceoff_scoring::tournament::{
+    DrawReason, GameResult, PlayedGame, WinReason, score_tournament,
+};
 use serde_json::{Value, json};
 
 const GOLDEN: &str = include_str!(concat!(
@@ -72,7 +74,8 @@ fn tier_decided_19_games_and_9_winners_did_not_lead() {
                 ..
             } => by_tier.push((game.round(), home, away, led)),
             GameResult::Won {
-                reason: WinReason::Score, ..
+                reason: WinReason::Score,
+                ..
             } => others[0] += 1,
             GameResult::Drawn(DrawReason::BothNonDeployable) => others[1] += 1,
             other => panic!("{home} against {away}: {other:?}"),

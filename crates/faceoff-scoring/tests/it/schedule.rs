@@ -5,7 +5,7 @@ use crate::{
     support::{read, team},
 };
 use faceoff_scoring::tournament::{
-    Departure, Departures, DepartureKind, POINTS_BYE, PlayedGame, RoundNumber,
+    Departure, DepartureKind, Departures, POINTS_BYE, PlayedGame, RoundNumber,
     schedule::{Entrants, Format, Progress, Round, Schedule, ScheduleError, TableScope},
     score_tournament_with,
 };
@@ -75,7 +75,9 @@ impl SimulatedTournament {
 }
 
 /// Number of games of each two teams, sorted by name.
-fn game_counts<'a>(rounds: impl IntoIterator<Item = &'a Round>) -> BTreeMap<[&'a TeamName; 2], usize> {
+fn game_counts<'a>(
+    rounds: impl IntoIterator<Item = &'a Round>,
+) -> BTreeMap<[&'a TeamName; 2], usize> {
     let mut all = BTreeMap::new();
     for pairing in rounds.into_iter().flat_map(Round::pairings) {
         let mut teams = pairing.teams();
@@ -466,7 +468,8 @@ fn impossible_schedule_is_refused_with_reason() {
             "advance: expected 2 to 5, the size of the smallest group, got 1",
         ),
     ] {
-        let mut tournament = SimulatedTournament::new(Format::Groups { groups, advance }, names(5), 1);
+        let mut tournament =
+            SimulatedTournament::new(Format::Groups { groups, advance }, names(5), 1);
         assert_eq!(tournament.draw().unwrap_err().to_string(), words);
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::support::{read, team};
 use faceoff_scoring::tournament::{
-    Bye, Departure, Departures, DepartureKind, PlayedGame, RoundNumber, Tournament, head_to_head,
+    Bye, Departure, DepartureKind, Departures, PlayedGame, RoundNumber, Tournament, head_to_head,
     score_tournament, score_tournament_with,
 };
 use serde_json::{Value, json};
@@ -143,7 +143,8 @@ fn disqualified_team_is_last_and_may_lose_all_games() {
         game(1, "C", "A", [0, 3]),
     ]));
     let table_from = |from| {
-        let departures = Departures::new([departure("B", DepartureKind::Disqualified, from)]).unwrap();
+        let departures =
+            Departures::new([departure("B", DepartureKind::Disqualified, from)]).unwrap();
         table(&score_tournament_with(&played, &departures, &[]))
     };
     assert_eq!(

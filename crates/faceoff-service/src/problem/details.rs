@@ -107,7 +107,8 @@ impl Problem {
         if confirmed == Some(name) {
             return Ok(());
         }
-        let detail = format!("nothing is done yet: {effect}. To do it, send “confirm” with {name:?}");
+        let detail =
+            format!("nothing is done yet: {effect}. To do it, send “confirm” with {name:?}");
         Err(Self::new(ProblemKind::NotConfirmed, detail).with("confirm", name))
     }
 

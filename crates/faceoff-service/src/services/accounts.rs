@@ -15,7 +15,8 @@ const AFFILIATION_CHARS: usize = 120;
 
 /// When an invitation that is created now expires by default.
 pub(crate) fn default_expiry(now: Timestamp) -> Timestamp {
-    now.saturating_add(DEFAULT_VALIDITY).unwrap_or(Timestamp::MAX)
+    now.saturating_add(DEFAULT_VALIDITY)
+        .unwrap_or(Timestamp::MAX)
 }
 
 /// The page of an invitation code: a URL, or a path if the server's public URL is not configured.
@@ -32,7 +33,8 @@ pub fn checked_profile(team: FoundedTeam) -> Result<(TeamName, TeamProfile), Pro
         link,
         division,
     } = team;
-    let affiliation = affiliation.map(|line| text::single_line("affiliation", &line, AFFILIATION_CHARS));
+    let affiliation =
+        affiliation.map(|line| text::single_line("affiliation", &line, AFFILIATION_CHARS));
     let profile = TeamProfile {
         affiliation: affiliation.transpose()?,
         link: link.map(|link| text::link("link", &link)).transpose()?,

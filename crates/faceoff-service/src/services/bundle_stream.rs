@@ -2,10 +2,9 @@
 //! in memory and never unpacked here.
 
 use crate::{
-    boxed,
-    transfer_rate::{MinTransferRate, TransferRateGuard},
+    boxed, free_space,
     problem::{Problem, ProblemKind},
-    free_space,
+    transfer_rate::{MinTransferRate, TransferRateGuard},
 };
 use axum::body::{Body, BodyDataStream};
 use faceoff_types::ArchiveFormat;

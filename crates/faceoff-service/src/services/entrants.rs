@@ -44,8 +44,9 @@ pub async fn find_by_names(
 /// Refuses more entrants than a schedule supports; teams that left count.
 pub fn check_count(teams: usize) -> Result<(), Problem> {
     if teams > MAX_ENTRANTS {
-        let detail =
-            format!("expected at most {MAX_ENTRANTS} teams, got {teams}; split them into several tournaments");
+        let detail = format!(
+            "expected at most {MAX_ENTRANTS} teams, got {teams}; split them into several tournaments"
+        );
         return Err(Problem::invalid("teams", detail));
     }
     Ok(())

@@ -5,7 +5,7 @@ use crate::{
     app::AppState,
     boxed,
     problem::{Problem, ProblemKind},
-    views::{day, evaluation, visibility::Visibility, stage},
+    views::{day, evaluation, stage, visibility::Visibility},
 };
 use faceoff_api::{
     requests::NewExtraEvaluation,
@@ -93,7 +93,11 @@ pub async fn start_missed_day(
     let now = app.config.clock.now();
     let stage = app.store.stage(stage_day.stage).await?;
     let day = stage_day.date;
-    match app.store.start_missed_day(actor, stage_day, reason, now).await {
+    match app
+        .store
+        .start_missed_day(actor, stage_day, reason, now)
+        .await
+    {
         Ok(created) => tracing::info!(
             stage = %stage.name, %day, evaluations = created.len(), reason, "a missed day was started"
         ),

@@ -58,10 +58,7 @@ fn invited_as(caller: &Caller, new: &requests::NewInvitation) -> Result<Invitati
         (_, InvitedRole::Organiser) => Ok(InvitationRole::Organiser),
         (_, InvitedRole::Founder) => Ok(InvitationRole::Founder),
         (_, InvitedRole::Member) => new.team.map(InvitationRole::Member).ok_or_else(|| {
-            Problem::invalid(
-                "team",
-                "expected the id of the invited member's team",
-            )
+            Problem::invalid("team", "expected the id of the invited member's team")
         }),
         (_, InvitedRole::Return) => new
             .person

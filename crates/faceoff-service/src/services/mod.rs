@@ -1,21 +1,21 @@
 //! Operations that the API and the pages share.
 
+pub mod accounts;
+pub mod announcements;
 pub mod bundle_stream;
 pub mod decisions;
-pub mod tournament_rounds;
 pub mod entrants;
-pub mod submissions;
+pub mod evaluations;
 pub mod invitations;
-pub mod accounts;
-pub mod tokens;
-pub mod users;
 pub mod registrations;
 pub mod rulings;
-pub mod stage_results;
 pub mod sessions;
+pub mod stage_results;
 pub mod stages;
+pub mod submissions;
 pub mod teams;
-pub mod announcements;
-pub mod evaluations;
+pub mod tokens;
+pub mod tournament_rounds;
 pub mod uploads;
+pub mod users;
 pub mod workers;

@@ -1,8 +1,8 @@
 //! Registrations of teams.
 
 use super::{
+    accounts::{checked_profile, default_expiry, join_link},
     decisions::checked_reason,
-    accounts::{default_expiry, join_link, checked_profile},
 };
 use crate::{app::AppState, boxed, problem::Problem, text, views::invitation};
 use faceoff_api::{

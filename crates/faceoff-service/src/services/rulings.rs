@@ -5,7 +5,7 @@ use crate::{
     app::AppState,
     boxed,
     problem::Problem,
-    views::{day, evaluation, visibility::Visibility, team},
+    views::{day, evaluation, team, visibility::Visibility},
 };
 use faceoff_api::{
     requests::Decision,

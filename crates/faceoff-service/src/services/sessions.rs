@@ -15,7 +15,8 @@ const NAME: &str = "browser";
 
 /// When a session that begins now expires.
 pub fn session_expiry(now: Timestamp) -> Timestamp {
-    now.saturating_add(SESSION_LIFETIME).unwrap_or(Timestamp::MAX)
+    now.saturating_add(SESSION_LIFETIME)
+        .unwrap_or(Timestamp::MAX)
 }
 
 /// Signs a user in; returns the user and the session's secret.

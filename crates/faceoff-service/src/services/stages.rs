@@ -7,8 +7,8 @@ use faceoff_api::{
 };
 use faceoff_store::{Actor, Stage, StagePhase};
 use faceoff_types::{
-    MismatchSettings, PerturbationSettings, Retention, Ruleset, Runtimes, StageId, StageName,
-    StageRules, StageSettings, CountingResult, Variation,
+    CountingResult, MismatchSettings, PerturbationSettings, Retention, Ruleset, Runtimes, StageId,
+    StageName, StageRules, StageSettings, Variation,
 };
 
 fn name(text: &str) -> Result<StageName, Problem> {
@@ -87,7 +87,9 @@ pub async fn create_stage(
             .unwrap_or(template.rules.rules.episodes_per_task),
         max_faults: new.max_faults.unwrap_or(template.rules.rules.max_faults),
         variation: Variation {
-            weights: new.weights.unwrap_or(template.rules.rules.variation.weights),
+            weights: new
+                .weights
+                .unwrap_or(template.rules.rules.variation.weights),
             tier_bounds: new
                 .tier_bounds
                 .unwrap_or(template.rules.rules.variation.tier_bounds),
@@ -162,7 +164,9 @@ pub async fn change_stage(
         },
         profile: change.profile.unwrap_or(current.profile),
         tasks: change.tasks.unwrap_or_else(|| current.tasks.clone()),
-        episodes_per_task: change.episodes_per_task.unwrap_or(current.episodes_per_task),
+        episodes_per_task: change
+            .episodes_per_task
+            .unwrap_or(current.episodes_per_task),
         max_faults: change.max_faults.unwrap_or(current.max_faults),
         variation: Variation {
             weights: change.weights.unwrap_or(current.variation.weights),

@@ -71,12 +71,18 @@ pub async fn describe_submission(
         return Err(Problem::new(ProblemKind::InvalidContent, detail));
     }
     let (actor, now) = (caller.actor(), app.config.clock.now());
-    let submission = app.store.describe_submission(actor, id, description, now).await?;
+    let submission = app
+        .store
+        .describe_submission(actor, id, description, now)
+        .await?;
     submission::build(app, submission).await
 }
 
 /// The trimmed text, if it is not too long.
-#[expect(clippy::option_option, reason = "null differs from a field that is left out")]
+#[expect(
+    clippy::option_option,
+    reason = "null differs from a field that is left out"
+)]
 fn checked_text<'t>(
     field: &str,
     text: &'t Option<Option<String>>,

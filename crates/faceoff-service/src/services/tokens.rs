@@ -13,7 +13,7 @@ use faceoff_api::{
     token::{Secret, SecretKind},
     views::token::{NewTokenView, TokenView},
 };
-use faceoff_store::{NewToken, StoreError, Token, TokenKind, TokenOwner, Principal};
+use faceoff_store::{NewToken, Principal, StoreError, Token, TokenKind, TokenOwner};
 use faceoff_types::{TeamId, TokenId};
 
 /// Longest name of a token.

@@ -4,9 +4,8 @@ use super::bundle_stream::{self, ReceivedBundle, SizeLimit};
 use crate::{
     app::App,
     auth::TeamCaller,
-    boxed,
+    boxed, free_space,
     problem::{Problem, ProblemKind},
-    free_space,
     upload_slots::UploadSlot,
     views::stage,
 };
@@ -150,7 +149,11 @@ async fn store(
         blake3: received.blake3.to_string(),
         file_name: file_name(&claimed_name, received.format),
     };
-    let _permit = app.artifact_writes.acquire().await.map_err(Problem::internal)?;
+    let _permit = app
+        .artifact_writes
+        .acquire()
+        .await
+        .map_err(Problem::internal)?;
     let artifacts = app.store.artifacts();
     artifacts
         .put_file(&bundle.key, received.file.path())

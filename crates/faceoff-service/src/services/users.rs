@@ -6,7 +6,7 @@ use crate::{
     boxed,
     problem::{Problem, ProblemKind},
 };
-use faceoff_store::{User, StoreError, Principal};
+use faceoff_store::{Principal, StoreError, User};
 use faceoff_types::UserId;
 
 /// The users whom the caller may see: organisers all, a team its members.
@@ -32,10 +32,12 @@ pub async fn find(app: &AppState, caller: &Caller, id: UserId) -> Result<User, P
         return Ok(user);
     }
     match (&caller.principal, user.team) {
-        (Principal::Member(_, own) | Principal::Team(own), Some(team)) if own.id == team => Err(Problem::new(
-            ProblemKind::Forbidden,
-            "only this user or an organiser may do this",
-        )),
+        (Principal::Member(_, own) | Principal::Team(own), Some(team)) if own.id == team => {
+            Err(Problem::new(
+                ProblemKind::Forbidden,
+                "only this user or an organiser may do this",
+            ))
+        }
         _ => Err(Problem::not_found("user")),
     }
 }
@@ -63,11 +65,7 @@ pub async fn remove_user(
 
 /// Accepts the terms for the calling user.
 #[boxed]
-pub async fn accept_terms(
-    app: &AppState,
-    caller: &Caller,
-    version: u32,
-) -> Result<User, Problem> {
+pub async fn accept_terms(app: &AppState, caller: &Caller, version: u32) -> Result<User, Problem> {
     let Some(user) = caller.user() else {
         return Err(Problem::new(
             ProblemKind::Forbidden,

@@ -6,7 +6,6 @@ use faceoff_api::views::{
 };
 use faceoff_store::{AttemptOutcome, GameAttempt};
 
-
 pub fn view(attempt: GameAttempt) -> GameAttemptView {
     let end = attempt.end.as_ref().map(|end| match end.outcome {
         AttemptOutcome::Played => AttemptOutcomeView::Played,

@@ -1,12 +1,12 @@
 //! Boards: ranks of the teams, and their statistical uncertainty.
 
 use crate::{
+    aggregated_rows::AggregatedRow,
     app::AppState,
     boxed,
     problem::{Problem, ProblemKind},
-    aggregated_rows::AggregatedRow,
     summaries::RunSummaries,
-    views::{division, sign_off, ruling, visibility::Visibility, stage, board_rows, team},
+    views::{board_rows, division, ruling, sign_off, stage, team, visibility::Visibility},
 };
 use faceoff_api::{
     requests::{BoardBy, BoardQuery},
@@ -18,11 +18,11 @@ use faceoff_api::{
     },
 };
 use faceoff_scoring::{
-    EpisodeSummary, ComparedEvaluation, RankedEntry, SIGNIFICANCE, TIER_CHANGE_RESAMPLES, joined_summary,
-    rank_groups,
+    ComparedEvaluation, EpisodeSummary, RankedEntry, SIGNIFICANCE, TIER_CHANGE_RESAMPLES,
+    joined_summary, rank_groups,
 };
 use faceoff_store::{BoardRecord, BoardScope, Stage};
-use faceoff_types::{DivisionName, PerturbationSettings, Seed, StageId, CountingResult, Task};
+use faceoff_types::{CountingResult, DivisionName, PerturbationSettings, Seed, StageId, Task};
 use jiff::civil::Date;
 use std::sync::Arc;
 
@@ -100,7 +100,15 @@ pub async fn query(
         division,
         by: query.by.map(BoardBy::counting_result),
     };
-    let board = build(app, visibility, &stage, revision, selection, (&scope, Vec::new())).await?;
+    let board = build(
+        app,
+        visibility,
+        &stage,
+        revision,
+        selection,
+        (&scope, Vec::new()),
+    )
+    .await?;
     Ok(BoardView {
         frozen: frozen.map(ruling::view),
         ..board

@@ -1,9 +1,9 @@
 //! Aggregation of results into board rows: for each team one evaluation, or the mean of several.
 
 use crate::{
+    aggregated_rows::{AggregatedRow, RowsKey},
     app::AppState,
     problem::Problem,
-    aggregated_rows::{RowsKey, AggregatedRow},
 };
 use faceoff_scoring::{BoardEntry, RankedEntry, overall_board, task_board};
 use faceoff_store::{BoardDays, BoardRecord, BoardScope, Stage};
@@ -84,8 +84,9 @@ async fn load(
     if !extra.is_empty() {
         let final_cutoff = app.store.final_cutoff(stage.id).await?;
         let final_day = final_cutoff.map(|at| stage.day(at).date);
-        let is_eligible =
-            |record: &BoardRecord| counting_result != CountingResult::Final || Some(record.day) == final_day;
+        let is_eligible = |record: &BoardRecord| {
+            counting_result != CountingResult::Final || Some(record.day) == final_day
+        };
         records.extend(extra.into_iter().filter(is_eligible));
         records.sort_by(|a, b| {
             let key = |record: &BoardRecord| (record.team.name.clone(), record.team.id, record.day);

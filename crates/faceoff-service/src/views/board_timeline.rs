@@ -4,11 +4,11 @@ use crate::{
     app::AppState,
     boxed,
     problem::Problem,
-    views::{visibility::Visibility, board_rows},
+    views::{board_rows, visibility::Visibility},
 };
 use faceoff_api::views::board::BoardView;
 use faceoff_store::BoardScope;
-use faceoff_types::{EvaluationResult, CountingResult, Task, TeamId};
+use faceoff_types::{CountingResult, EvaluationResult, Task, TeamId};
 use jiff::civil::Date;
 use std::collections::BTreeMap;
 

@@ -2,7 +2,7 @@
 
 use crate::{app::AppState, boxed, config::Capacity, problem::Problem};
 use faceoff_api::views::capacity::{CapacityView, DayLoad, Fit};
-use faceoff_store::{JobDurations, EvaluationBacklog, Stage, Store, StoreError};
+use faceoff_store::{EvaluationBacklog, JobDurations, Stage, Store, StoreError};
 use faceoff_types::{StageId, TeamId};
 use jiff::{Timestamp, civil::Date};
 
@@ -110,7 +110,9 @@ fn next_load(
     let expected = teams
         .iter()
         .map(|team| Some(measured.episode_ms_of(*team)? * f64::from(episodes)));
-    let each_s = capacity.time.max_slot_time_s(episodes, shards, plan.max_faults);
+    let each_s = capacity
+        .time
+        .max_slot_time_s(episodes, shards, plan.max_faults);
     Load {
         day,
         is_under_way: false,
@@ -181,7 +183,9 @@ pub async fn forecast(
         active.retain(|submission| stage.check_accepts(submission).is_ok());
         let teams: Vec<TeamId> = active.iter().map(|submission| submission.team).collect();
         let cutoff_at = at.unwrap_or(now).max(now);
-        loads.push(next_load(&stage, day, cutoff_at, &teams, &measured, capacity));
+        loads.push(next_load(
+            &stage, day, cutoff_at, &teams, &measured, capacity,
+        ));
     }
     let slots = capacity.slots + store.workers().available_slots(now);
     let to_day_load = |load: &Load| day_load(load, slots);
@@ -224,13 +228,7 @@ mod tests {
                 "probably fits",
             ),
             (Some(30.0), 400.0, Some(24.0), Fit::Not, "does not fit"),
-            (
-                None,
-                400.0,
-                Some(24.0),
-                Fit::Unknown,
-                "duration unknown",
-            ),
+            (None, 400.0, Some(24.0), Fit::Unknown, "duration unknown"),
             (Some(30.0), 400.0, None, Fit::Surely, "No deadline"),
         ] {
             let load = load(expected, worst, available);

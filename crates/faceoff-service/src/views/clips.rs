@@ -12,7 +12,7 @@ use crate::{
     },
 };
 use faceoff_api::views::clips::{EpisodesView, TimeBinView};
-use faceoff_replay::{EpisodeLine, Key, Pack, ClipIndex};
+use faceoff_replay::{ClipIndex, EpisodeLine, Key, Pack};
 use faceoff_store::{Artifacts, Evaluation, EvaluationState};
 use faceoff_types::{EvaluationId, Task};
 use std::collections::BTreeMap;
@@ -33,7 +33,11 @@ impl Clips {
     /// `NotFound`, `NotYet`, `Blind`; `Removed` once the dataset was removed; `Conflict` without a result, and for
     /// evaluations by an older version of the server.
     #[boxed]
-    pub async fn find(app: &AppState, visibility: &Visibility, id: EvaluationId) -> Result<Self, Problem> {
+    pub async fn find(
+        app: &AppState,
+        visibility: &Visibility,
+        id: EvaluationId,
+    ) -> Result<Self, Problem> {
         let evaluation = app.store.evaluation(id).await?;
         visibility.check_not_blind(evaluation.stage_day.stage)?;
         let EvaluationState::Finished { dataset, .. } = &evaluation.state else {
@@ -47,10 +51,7 @@ impl Clips {
             visibility.check_not_frozen(&evaluation, "shown")?;
         }
         if let Some(removed) = &evaluation.dataset_removed {
-            return Err(Problem::removed(
-                "the recording and its replays",
-                removed,
-            ));
+            return Err(Problem::removed("the recording and its replays", removed));
         }
         archive_contents::check_included(app, dataset, "recording").await?;
         let key = Artifacts::clips_key(dataset);
@@ -62,7 +63,8 @@ impl Clips {
             )
         })?;
         Ok(Self {
-            can_see_observations: visibility.is_own(&evaluation) || visibility.is_public(&evaluation),
+            can_see_observations: visibility.is_own(&evaluation)
+                || visibility.is_public(&evaluation),
             file,
             evaluation,
         })
@@ -83,7 +85,9 @@ impl Clips {
     /// `NotFound` if there is no such episode.
     #[boxed]
     pub async fn episode(&self, task: Task, episode: u32) -> Result<Episode, Problem> {
-        self.file.episode(task, episode, self.can_see_observations).await
+        self.file
+            .episode(task, episode, self.can_see_observations)
+            .await
     }
 
     /// Histogram of computation times by task; empty without access to the dataset.

@@ -11,7 +11,7 @@ use faceoff_api::{
     requests::ComparisonQuery,
     views::comparison::{ComparedView, ComparisonView},
 };
-use faceoff_scoring::{Comparison, EpisodeSummary, NotComparable, ComparedEvaluation};
+use faceoff_scoring::{ComparedEvaluation, Comparison, EpisodeSummary, NotComparable};
 use faceoff_store::{Evaluation, EvaluationState, StoreError};
 use faceoff_types::{EvaluationId, EvaluationResult, Seed};
 use std::sync::Arc;
@@ -24,7 +24,11 @@ struct Side {
 }
 
 impl Side {
-    async fn load(app: &AppState, visibility: &Visibility, id: EvaluationId) -> Result<Self, Problem> {
+    async fn load(
+        app: &AppState,
+        visibility: &Visibility,
+        id: EvaluationId,
+    ) -> Result<Self, Problem> {
         let evaluation = app
             .store
             .evaluation(id)
@@ -40,9 +44,7 @@ impl Side {
         let EvaluationState::Finished { result, .. } = &evaluation.state else {
             return Err(Problem::new(
                 ProblemKind::Conflict,
-                format!(
-                    "evaluation {id} has no result; only finished evaluations can be compared"
-                ),
+                format!("evaluation {id} has no result; only finished evaluations can be compared"),
             ));
         };
         let result = result.clone();

@@ -4,7 +4,7 @@ use crate::{
     app::AppState,
     boxed,
     problem::Problem,
-    views::{evaluation, exclusions, visibility::Visibility, team},
+    views::{evaluation, exclusions, team, visibility::Visibility},
 };
 use faceoff_api::views::day::{DayView, NextCutoff};
 use faceoff_store::Stage;
@@ -20,7 +20,8 @@ pub async fn build(app: &AppState, stage_day: StageDay) -> Result<DayView, Probl
     evaluation::add_queue_positions(app, &mut created).await?;
     let evaluated: BTreeSet<TeamId> = created.iter().map(|created| created.team).collect();
     let mut without_submission = team::all(app).await?;
-    let mut excluded_teams = exclusions::excluded_teams(app, &app.store.stage(stage_day.stage).await?).await?;
+    let mut excluded_teams =
+        exclusions::excluded_teams(app, &app.store.stage(stage_day.stage).await?).await?;
     excluded_teams.retain(|excluded| !evaluated.contains(&excluded.team));
     let is_excluded = |id| excluded_teams.iter().any(|excluded| excluded.team == id);
     without_submission.retain(|team| !evaluated.contains(&team.id) && !is_excluded(team.id));

@@ -25,7 +25,9 @@ fn unknown(name: &DivisionName, all: &[DivisionName]) -> Problem {
     let names: Vec<String> = all.iter().map(ToString::to_string).collect();
     let quoted: Vec<String> = names.iter().map(|name| format!("“{name}”")).collect();
     let detail = if names.is_empty() {
-        format!("division: expected none, as this season has no divisions, got “{name}”; leave it out")
+        format!(
+            "division: expected none, as this season has no divisions, got “{name}”; leave it out"
+        )
     } else {
         format!(
             "division: expected {}, got “{name}”; leave it out for all teams",

@@ -41,7 +41,8 @@ pub async fn build(
 ) -> Result<EvaluationView, Problem> {
     let team = app.store.team(evaluation.team).await?;
     let run = evaluation.run;
-    let shows_faults = visibility.is_own(&evaluation) && !visibility.is_hidden(evaluation.stage_day.stage);
+    let shows_faults =
+        visibility.is_own(&evaluation) && !visibility.is_hidden(evaluation.stage_day.stage);
     let mut view = view(visibility, evaluation, team.name);
     if let EvaluationStatus::AgentFailed { faults, log, .. } = &mut view.status
         && view.released_at.is_some()
@@ -57,7 +58,10 @@ pub async fn build(
 
 /// Adds positions in the queue to unfinished evaluations. Without any, the database is not read.
 #[boxed]
-pub async fn add_queue_positions(app: &AppState, views: &mut [EvaluationView]) -> Result<(), Problem> {
+pub async fn add_queue_positions(
+    app: &AppState,
+    views: &mut [EvaluationView],
+) -> Result<(), Problem> {
     if views.iter().all(|view| view.status.is_final()) {
         return Ok(());
     }
@@ -75,7 +79,12 @@ pub async fn day_evaluations(
     visibility: &Visibility,
     stage_day: StageDay,
 ) -> Result<Vec<EvaluationView>, Problem> {
-    all(app, visibility, app.store.evaluations_of_day(stage_day).await?).await
+    all(
+        app,
+        visibility,
+        app.store.evaluations_of_day(stage_day).await?,
+    )
+    .await
 }
 
 /// Unfinished evaluations of the day before, then those of `today`.

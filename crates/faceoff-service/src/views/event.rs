@@ -55,12 +55,7 @@ pub async fn page(app: &AppState, query: EventsQuery) -> Result<EventsView, Prob
 pub async fn actor_names(app: &AppState) -> Result<BTreeMap<String, String>, Problem> {
     let users = app.store.users().await?.into_iter();
     let teams = app.store.teams().await?.into_iter();
-    let users = users.map(|user| {
-        (
-            Actor::User(user.id).to_string(),
-            user.name.to_string(),
-        )
-    });
+    let users = users.map(|user| (Actor::User(user.id).to_string(), user.name.to_string()));
     let teams = teams.map(|team| (Actor::Team(team.id).to_string(), team.name.to_string()));
     Ok(users.chain(teams).collect())
 }

@@ -28,7 +28,10 @@ pub(super) fn excluding_stages(
 }
 
 /// The teams whose active submissions a stage excludes.
-pub(super) async fn excluded_teams(app: &AppState, stage: &Stage) -> Result<Vec<ExcludedTeam>, Problem> {
+pub(super) async fn excluded_teams(
+    app: &AppState,
+    stage: &Stage,
+) -> Result<Vec<ExcludedTeam>, Problem> {
     let mut excluded = Vec::new();
     for submission in app.store.active_submissions().await? {
         if let Err(why) = stage.check_accepts(&submission) {

@@ -89,7 +89,11 @@ pub async fn newest(app: &AppState) -> Result<Vec<NewsItem>, Problem> {
 }
 
 async fn announcements(app: &AppState) -> Result<Vec<NewsItem>, Problem> {
-    let announcements = app.store.announcements(MAX_ANNOUNCEMENTS).await?.into_iter();
+    let announcements = app
+        .store
+        .announcements(MAX_ANNOUNCEMENTS)
+        .await?
+        .into_iter();
     let items = announcements.map(|announcement| NewsItem {
         id: announcement.id.as_uuid(),
         at: announcement.at,

@@ -5,14 +5,16 @@ use crate::{
     boxed,
     problem::{Problem, ProblemKind},
     viewer::Viewer,
-    views::{visibility::GameVisibility, tournament_state::TournamentState},
+    views::{tournament_state::TournamentState, visibility::GameVisibility},
 };
 use faceoff_api::views::{
     game::{GameResultView, GameSideView, GameStatus, GameView, PurposeView, RecordingView},
     printable,
 };
 use faceoff_scoring::tournament::{GameScore, PlayedGame, Side as TableSide};
-use faceoff_store::{Game, GamePurpose, GameRecording, GameState, GameFilter, ScheduleEntry, StoreError};
+use faceoff_store::{
+    Game, GameFilter, GamePurpose, GameRecording, GameState, ScheduleEntry, StoreError,
+};
 use faceoff_types::{GameId, RoundNumber, Side, TournamentId};
 
 /// A game that the viewer may see, with the state of its tournament, which is not scored.
@@ -73,8 +75,13 @@ pub async fn test_and_friendly_games(
         Viewer::Team(team) => Some(team),
         Viewer::Organiser | Viewer::Visitor => None,
     };
-    let games = app.store.games(id, GameFilter::TestAndFriendly(team)).await?;
-    let visible = games.iter().filter(|game| state.visibility(viewer).is_visible(game));
+    let games = app
+        .store
+        .games(id, GameFilter::TestAndFriendly(team))
+        .await?;
+    let visible = games
+        .iter()
+        .filter(|game| state.visibility(viewer).is_visible(game));
     visible.map(|game| view(&state, viewer, game)).collect()
 }
 
@@ -145,8 +152,8 @@ fn status(state: &TournamentState, viewer: Viewer, game: &Game) -> Result<GameSt
                 Problem::internal(format_args!("game {} is played without a result", game.id))
             })?;
             let recording = row.recording.as_ref();
-            let recording =
-                recording.map(|files| recording_view(state.visibility(viewer), game, &score, files));
+            let recording = recording
+                .map(|files| recording_view(state.visibility(viewer), game, &score, files));
             GameStatus::Played {
                 attempt: row.attempt,
                 finished_at: row.at,

@@ -32,7 +32,11 @@ impl GameClips {
         Self::find_clips(app, state.visibility(viewer), &game).await
     }
 
-    async fn find_clips(app: &App, visibility: GameVisibility<'_>, game: &Game) -> Result<Self, Problem> {
+    async fn find_clips(
+        app: &App,
+        visibility: GameVisibility<'_>,
+        game: &Game,
+    ) -> Result<Self, Problem> {
         let recording = match &game.state {
             GameState::Played(row) => row.recording.as_ref(),
             _ => None,
@@ -52,7 +56,8 @@ impl GameClips {
         })?;
         Ok(Self {
             file,
-            can_see_observations: Side::BOTH.map(|side| visibility.is_own(game, side) || visibility.can_see_both_sides(game)),
+            can_see_observations: Side::BOTH
+                .map(|side| visibility.is_own(game, side) || visibility.can_see_both_sides(game)),
         })
     }
 

@@ -57,7 +57,8 @@ pub async fn check(app: &AppState) -> Result<HealthView, Problem> {
             ));
         }
         QueueHealth::Unknown => problems.push("the queue cannot be read".to_owned()),
-        QueueHealth::Running { .. } | QueueHealth::Paused { .. } | QueueHealth::DiskFull { .. } => {}
+        QueueHealth::Running { .. } | QueueHealth::Paused { .. } | QueueHealth::DiskFull { .. } => {
+        }
     }
     for slot in app.config.metrics.slots().stuck() {
         problems.push(format!(

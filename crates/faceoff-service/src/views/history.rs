@@ -1,14 +1,15 @@
 //! Board history: results and ranks of all teams, day by day.
 
 use crate::{
+    aggregated_rows::AggregatedRow,
     app::AppState,
     boxed,
     problem::Problem,
-    aggregated_rows::AggregatedRow,
     views::{
-        board, division, ruling,
-        visibility::Visibility,
+        board,
         board_rows::{self, CountingRule},
+        division, ruling,
+        visibility::Visibility,
     },
 };
 use faceoff_api::{
@@ -68,7 +69,9 @@ pub async fn query(
     let final_day = final_cutoff.map(|at| stage.day(at).date);
     let rows_by = |day: Date| match (by, stage.settings.standings) {
         (Some(by), _) => by,
-        (None, CountingResult::Final) if final_day.is_none_or(|last| day < last) => CountingResult::Latest,
+        (None, CountingResult::Final) if final_day.is_none_or(|last| day < last) => {
+            CountingResult::Latest
+        }
         (None, standings) => standings,
     };
     let rows = rows(records, rows_by, final_day, query.task)?;
@@ -134,7 +137,8 @@ fn rows(
         }
         let aggregated = board_rows::aggregate(counting.concat(), rule)?;
         let all = board_rows::rank(aggregated, task, |row| &row.record);
-        let (ranked, baselines) = board_rows::split_baselines(all, |row| row.record.team.is_baseline);
+        let (ranked, baselines) =
+            board_rows::split_baselines(all, |row| row.record.team.is_baseline);
         let mut day_rows: Vec<HistoryRow> = day_records
             .iter()
             .filter_map(|record| {

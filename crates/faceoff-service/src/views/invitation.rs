@@ -4,7 +4,7 @@ use faceoff_api::{
     requests::InvitedRole,
     views::invitation::{InvitationView, RegistrationView},
 };
-use faceoff_store::{Invitation, InvitationState, InvitationRole, Registration, RegistrationState};
+use faceoff_store::{Invitation, InvitationRole, InvitationState, Registration, RegistrationState};
 use jiff::Timestamp;
 
 /// The invitation's state at `now`.

@@ -2,7 +2,7 @@
 
 use crate::app::AppState;
 use faceoff_store::LiveUpdate;
-use faceoff_types::{GameId, LiveGame, LiveEvent};
+use faceoff_types::{GameId, LiveEvent, LiveGame};
 
 /// State of a running game, and everything that has happened in it.
 #[derive(Debug)]

@@ -5,10 +5,10 @@ use crate::{
     boxed,
     problem::Problem,
     viewer::Viewer,
-    views::{day, evaluation, visibility::Visibility, stage, submission, team},
+    views::{day, evaluation, stage, submission, team, visibility::Visibility},
 };
 use faceoff_api::views::{
-    me::{MeView, TodayView, PendingValidationView},
+    me::{MeView, PendingValidationView, TodayView},
     submission::SubmissionStatus,
 };
 use faceoff_store::{Evaluation, EvaluationState, Team};

@@ -14,21 +14,26 @@ use faceoff_api::{
     views::{
         board::BoardView,
         evaluation::{FaultView, Progress, ResultView},
-        proposal::{
-            ChangeView, ProposedEvaluationStatus, ProposedEvaluationView, OutcomeView, ProposalKindView, ProposalStateView,
-            ProposalView, RankView,
-        },
         printable,
+        proposal::{
+            ChangeView, OutcomeView, ProposalKindView, ProposalStateView, ProposalView,
+            ProposedEvaluationStatus, ProposedEvaluationView, RankView,
+        },
     },
 };
 use faceoff_store::{
-    BoardRecord, BoardScope, ProposedEvaluation, EvaluationState, Proposal, ProposalKind, ProposalOutcome, Stage,
+    BoardRecord, BoardScope, EvaluationState, Proposal, ProposalKind, ProposalOutcome,
+    ProposedEvaluation, Stage,
 };
 use faceoff_types::{ProposalId, TeamId};
 use jiff::Timestamp;
 use std::collections::BTreeSet;
 
-async fn evaluation_view(app: &AppState, evaluation: ProposedEvaluation, is_dropped: bool) -> Result<ProposedEvaluationView, Problem> {
+async fn evaluation_view(
+    app: &AppState,
+    evaluation: ProposedEvaluation,
+    is_dropped: bool,
+) -> Result<ProposedEvaluationView, Problem> {
     let (mut done, mut total) = (0, 0);
     if let EvaluationState::Running {
         episodes_done,
@@ -67,7 +72,9 @@ async fn evaluation_view(app: &AppState, evaluation: ProposedEvaluation, is_drop
             reason: printable(reason),
         },
         EvaluationState::NotPlayed { finished_at, .. }
-        | EvaluationState::Cancelled { finished_at, .. } => ProposedEvaluationStatus::Cancelled { finished_at },
+        | EvaluationState::Cancelled { finished_at, .. } => {
+            ProposedEvaluationStatus::Cancelled { finished_at }
+        }
     };
     Ok(ProposedEvaluationView {
         evaluation: evaluation.id,
@@ -146,8 +153,15 @@ async fn outcome(
                 ..BoardScope::default()
             };
             let trial_results = (&nothing, played);
-            let new_board =
-                board::build(app, &visibility, &stage, revision, BoardSelection::default(), trial_results).await?;
+            let new_board = board::build(
+                app,
+                &visibility,
+                &stage,
+                revision,
+                BoardSelection::default(),
+                trial_results,
+            )
+            .await?;
             return Ok(OutcomeView {
                 changes: Vec::new(),
                 old_board: None,
@@ -158,10 +172,20 @@ async fn outcome(
         ProposalKind::Evaluation(_) | ProposalKind::Day(_) => revision,
     };
     let current_scope = (&BoardScope::default(), Vec::new());
-    let old_board = board::build(app, &visibility, &stage, old_revision, BoardSelection::default(), current_scope).await?;
+    let old_board = board::build(
+        app,
+        &visibility,
+        &stage,
+        old_revision,
+        BoardSelection::default(),
+        current_scope,
+    )
+    .await?;
     // A platform fault replaces no result.
     let replaces = |evaluation: &ProposedEvaluation| match evaluation.state {
-        EvaluationState::Finished { .. } | EvaluationState::AgentFailed { .. } => evaluation.replaces,
+        EvaluationState::Finished { .. } | EvaluationState::AgentFailed { .. } => {
+            evaluation.replaces
+        }
         _ => None,
     };
     let scope = BoardScope {
@@ -169,7 +193,15 @@ async fn outcome(
         ..BoardScope::default()
     };
     let new_scope = (&scope, played);
-    let new_board = board::build(app, &visibility, &stage, revision, BoardSelection::default(), new_scope).await?;
+    let new_board = board::build(
+        app,
+        &visibility,
+        &stage,
+        revision,
+        BoardSelection::default(),
+        new_scope,
+    )
+    .await?;
     Ok(OutcomeView {
         changes: changes(&old_board, &new_board),
         old_board: Some(old_board),

@@ -4,7 +4,6 @@ use crate::{app::AppState, boxed, problem::Problem};
 use faceoff_api::views::queue::QueueView;
 use faceoff_store::{QueueForecast, QueuePosition};
 
-
 pub fn view(position: QueuePosition) -> QueueView {
     QueueView {
         position: position.position,

@@ -8,18 +8,23 @@ use crate::{
 };
 use faceoff_api::views::champion_shares::ChampionSharesView;
 use faceoff_scoring::tournament::compute_champion_shares;
-use faceoff_store::{Game, GamePurpose, GameState, GameFilter};
+use faceoff_store::{Game, GameFilter, GamePurpose, GameState};
 use faceoff_types::{TeamName, TournamentId};
 use std::{collections::BTreeMap, sync::Arc};
 
 /// The shares, cached until the season changes. They are computed in a separate task, so that the result is cached even
 /// if the client disconnects.
 #[boxed]
-pub async fn champion_shares(app: &App, id: TournamentId) -> Result<Arc<ChampionSharesView>, Problem> {
+pub async fn champion_shares(
+    app: &App,
+    id: TournamentId,
+) -> Result<Arc<ChampionSharesView>, Problem> {
     let app = Arc::clone(app);
     let task = tokio::spawn(async move {
         let compute_shares = async || compute(&app, id).await;
-        app.champion_share_cache.get(&app.store, id, compute_shares).await
+        app.champion_share_cache
+            .get(&app.store, id, compute_shares)
+            .await
     });
     task.await.map_err(Problem::internal)?
 }

@@ -5,7 +5,7 @@ use crate::{
     boxed,
     problem::Problem,
     viewer::Viewer,
-    views::{archive, day, ruling, visibility::Visibility, stage},
+    views::{archive, day, ruling, stage, visibility::Visibility},
 };
 use faceoff_api::views::{
     ruling::RulingView,

@@ -3,7 +3,6 @@
 use faceoff_api::views::sign_off::SignOffView;
 use faceoff_store::SignOff;
 
-
 pub fn view(finalised: SignOff) -> SignOffView {
     SignOffView {
         at: finalised.at,

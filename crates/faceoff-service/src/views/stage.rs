@@ -5,12 +5,11 @@ use crate::{
     boxed,
     problem::Problem,
     viewer::Viewer,
-    views::{capacity, day, sign_off, ruling},
+    views::{capacity, day, ruling, sign_off},
 };
 use faceoff_api::views::stage::{PhaseView, RevisionView, StageView};
 use faceoff_store::{Revision, Stage, StagePhase};
 use faceoff_types::StageId;
-
 
 pub fn revision(revision: Revision) -> RevisionView {
     RevisionView {
@@ -19,7 +18,6 @@ pub fn revision(revision: Revision) -> RevisionView {
         rules: revision.rules,
     }
 }
-
 
 pub fn phase(phase: StagePhase) -> PhaseView {
     match phase {

@@ -27,7 +27,11 @@ pub async fn all(app: &AppState) -> Result<Vec<StorageView>, Problem> {
 
 /// Disk usage of a team, for itself or for organisers.
 #[boxed]
-pub async fn find(app: &AppState, team: TeamId, counted: StorageScope) -> Result<StorageView, Problem> {
+pub async fn find(
+    app: &AppState,
+    team: TeamId,
+    counted: StorageScope,
+) -> Result<StorageView, Problem> {
     let found = usage(app, Some(team), counted).await?;
     let found = found.into_iter().next();
     found.ok_or_else(|| Problem::not_found("team"))

@@ -34,7 +34,10 @@ pub async fn build(app: &AppState, submission: Submission) -> Result<SubmissionV
 
 /// The submissions of a team, newest first.
 #[boxed]
-pub async fn team_submissions(app: &AppState, team: TeamId) -> Result<Vec<SubmissionView>, Problem> {
+pub async fn team_submissions(
+    app: &AppState,
+    team: TeamId,
+) -> Result<Vec<SubmissionView>, Problem> {
     all(app, app.store.submissions_of(team).await?).await
 }
 

@@ -3,7 +3,6 @@
 use faceoff_api::views::token::TokenView;
 use faceoff_store::{Token, TokenKind, TokenOwner};
 
-
 pub fn view(token: Token) -> TokenView {
     let (team, person) = match token.owner {
         TokenOwner::Host => (None, None),

@@ -9,12 +9,12 @@ use crate::{
 use faceoff_api::views::{
     printable,
     tournament::{
-        ByeView, EntrantView, DepartureView, RoundProgress, RoundSubmission, RoundView, TournamentHead,
-        TournamentPhase, TournamentView,
+        ByeView, DepartureView, EntrantView, RoundProgress, RoundSubmission, RoundView,
+        TournamentHead, TournamentPhase, TournamentView,
     },
 };
 use faceoff_scoring::tournament::schedule::Table;
-use faceoff_store::{Entrant, Game, GamePurpose, GameState, Departure, TournamentRound};
+use faceoff_store::{Departure, Entrant, Game, GamePurpose, GameState, TournamentRound};
 use faceoff_types::{RoundNumber, StageName, TeamId, TeamName, TournamentId};
 
 /// All tournaments, in order of creation.
@@ -90,7 +90,6 @@ pub async fn entered_tournaments(
     Ok(entered)
 }
 
-
 pub fn entrant(entrant: Entrant) -> EntrantView {
     EntrantView {
         team: entrant.team,
@@ -99,7 +98,6 @@ pub fn entrant(entrant: Entrant) -> EntrantView {
         departure: entrant.departure.map(departure),
     }
 }
-
 
 pub fn departure(leave: Departure) -> DepartureView {
     DepartureView {
@@ -160,7 +158,10 @@ const fn count(progress: &mut RoundProgress, state: &GameState) {
 }
 
 /// The games of a round, with their matchdays.
-fn games_in_round(state: &TournamentState, number: RoundNumber) -> impl Iterator<Item = (&Game, u32)> {
+fn games_in_round(
+    state: &TournamentState,
+    number: RoundNumber,
+) -> impl Iterator<Item = (&Game, u32)> {
     state
         .games
         .iter()
@@ -213,7 +214,8 @@ fn next(state: &TournamentState, phase: TournamentPhase) -> String {
     match phase {
         TournamentPhase::Closed => "The tournament is closed.".to_owned(),
         TournamentPhase::Played => {
-            "All rounds have been played; the organisers still have to close the tournament.".to_owned()
+            "All rounds have been played; the organisers still have to close the tournament."
+                .to_owned()
         }
         TournamentPhase::Open | TournamentPhase::Between => format!(
             "An organiser starts round {next_number} of {last}; the active submissions of that moment play the whole round."

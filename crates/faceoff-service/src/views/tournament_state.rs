@@ -1,6 +1,8 @@
 //! A tournament in the scoring's types, built from database rows; `faceoff score tournament` reads the same from a file.
 
-use crate::{app::AppState, boxed, problem::Problem, viewer::Viewer, views::visibility::GameVisibility};
+use crate::{
+    app::AppState, boxed, problem::Problem, viewer::Viewer, views::visibility::GameVisibility,
+};
 use faceoff_scoring::tournament::{
     Departure, Departures, GameScore, PlayedGame,
     schedule::{Entrants, Matchday, Pairing, Progress, Round, Schedule as _, ScheduleError, Table},

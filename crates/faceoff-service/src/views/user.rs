@@ -2,10 +2,10 @@
 
 use crate::views::team;
 use faceoff_api::views::{
-    user::{UserView, CallerView},
     token::TokenView,
+    user::{CallerView, UserView},
 };
-use faceoff_store::{User, Principal};
+use faceoff_store::{Principal, User};
 
 pub fn view(user: User) -> UserView {
     UserView {

@@ -139,7 +139,8 @@ impl Visibility {
     /// `NotYet`.
     pub fn check_not_frozen(&self, evaluation: &Evaluation, action: &str) -> Result<(), Problem> {
         let at = scored_at(&evaluation.state);
-        let Some(frozen) = at.and_then(|at| self.hiding_freeze(evaluation.stage_day.stage, at)) else {
+        let Some(frozen) = at.and_then(|at| self.hiding_freeze(evaluation.stage_day.stage, at))
+        else {
             return Ok(());
         };
         Err(Problem::new(
@@ -251,7 +252,10 @@ impl<'a> GameVisibility<'a> {
             Publication::Never => false,
             Publication::AtClose => has_closed,
             Publication::AtRelease => {
-                let round = self.rounds.iter().find(|round| round.number == meeting.round);
+                let round = self
+                    .rounds
+                    .iter()
+                    .find(|round| round.number == meeting.round);
                 has_closed || round.is_some_and(|round| round.over_at.is_some())
             }
         }

@@ -1,7 +1,9 @@
 //! Remote workers and their slots.
 
 use crate::{app::AppState, boxed, problem::Problem};
-use faceoff_api::views::workers::{BusySlotView, WorkerBanView, WorkerState, WorkerView, WorkersView};
+use faceoff_api::views::workers::{
+    BusySlotView, WorkerBanView, WorkerState, WorkerView, WorkersView,
+};
 use faceoff_store::{SlotStatus, WorkerStatus};
 use jiff::{SignedDuration, Timestamp};
 
@@ -26,7 +28,10 @@ pub async fn with_bans(app: &AppState) -> Result<WorkersView, Problem> {
             games: results.games,
         });
     }
-    Ok(WorkersView { bans, ..current(app) })
+    Ok(WorkersView {
+        bans,
+        ..current(app)
+    })
 }
 
 /// All workers, without the bans, which need a database read.
@@ -37,7 +42,10 @@ pub fn current(app: &AppState) -> WorkersView {
     let all = workers.all();
     let stuck = all.iter().flat_map(stuck_jobs);
     let problems = problems.chain(stuck).collect();
-    let alarms = all.iter().flat_map(|worker| long_jobs(worker, now)).collect();
+    let alarms = all
+        .iter()
+        .flat_map(|worker| long_jobs(worker, now))
+        .collect();
     WorkersView {
         own_slots: app.config.capacity.slots,
         remote_slots: workers.available_slots(now),
@@ -69,7 +77,10 @@ fn long_jobs(worker: &WorkerStatus, now: Timestamp) -> impl Iterator<Item = Stri
 }
 
 fn describe(worker: &WorkerStatus, slot: &str, busy: &SlotStatus) -> String {
-    let job = busy.description.as_deref().unwrap_or("started before this server process");
+    let job = busy
+        .description
+        .as_deref()
+        .unwrap_or("started before this server process");
     format!("{}/{slot}, job {} ({job})", worker.name, busy.job)
 }
 
@@ -84,14 +95,17 @@ fn worker(worker: WorkerStatus, now: Timestamp) -> WorkerView {
         None if worker.busy_slots.is_empty() => WorkerState::Idle,
         None => WorkerState::Working,
     };
-    let busy = worker.busy_slots.into_iter().map(|(slot, busy)| BusySlotView {
-        is_long: is_long(&busy, now),
-        slot,
-        job: busy.job,
-        job_description: busy.description,
-        since: busy.since,
-        problem: busy.problem,
-    });
+    let busy = worker
+        .busy_slots
+        .into_iter()
+        .map(|(slot, busy)| BusySlotView {
+            is_long: is_long(&busy, now),
+            slot,
+            job: busy.job,
+            job_description: busy.description,
+            since: busy.since,
+            problem: busy.problem,
+        });
     WorkerView {
         busy: busy.collect(),
         name: worker.name,

@@ -79,7 +79,8 @@ pub fn sin_cos<T: Lanes>(angle: T) -> (T, T) {
 fn arc_tangent<T: Lanes>(ratio: T) -> T {
     let one = T::splat(1.0);
     // Reduces by a reference angle: 0, atan ½, π/4, atan 1½, π/2.
-    let [half, quarter, steep, upright] = ARC_BOUNDS.map(|bound| T::splat(bound).less_or_equal(ratio));
+    let [half, quarter, steep, upright] =
+        ARC_BOUNDS.map(|bound| T::splat(bound).less_or_equal(ratio));
     let pick = |values: [T; 5]| {
         let low = T::select(half, values[1], values[0]);
         let middle = T::select(quarter, values[2], low);
@@ -194,8 +195,7 @@ mod tests {
     use wide::f64x4;
 
     fn assert_same(actual: f64, expected: f64, label: &str) {
-        let same =
-            actual.to_bits() == expected.to_bits() || (actual.is_nan() && expected.is_nan());
+        let same = actual.to_bits() == expected.to_bits() || (actual.is_nan() && expected.is_nan());
         assert!(same, "{label}: {actual:e} and {expected:e}");
     }
 

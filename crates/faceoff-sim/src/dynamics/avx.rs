@@ -12,7 +12,7 @@
 
 use super::{
     lane_kernel::LaneKernel,
-    lanes::{Lanes, ROUNDING, ABS_MASK},
+    lanes::{ABS_MASK, Lanes, ROUNDING},
 };
 use std::{
     arch::x86_64::{

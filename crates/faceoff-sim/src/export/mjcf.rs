@@ -2,7 +2,7 @@
 
 use super::{
     numbers::{spaced, tidy},
-    parts::{Model, end_of_link, level, quaternion, visual_radius_m, vector},
+    parts::{Model, end_of_link, level, quaternion, vector, visual_radius_m},
 };
 use crate::{
     model::{GRAVITY_M_S2, INITIAL_Q, JOINTS, LINKS, SUBSTEP_S, TOOL},

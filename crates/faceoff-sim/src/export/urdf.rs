@@ -2,7 +2,7 @@
 
 use super::{
     numbers::{spaced, tidy},
-    parts::{Model, end_of_link, roll_pitch_yaw, visual_radius_m, vector},
+    parts::{Model, end_of_link, roll_pitch_yaw, vector, visual_radius_m},
 };
 use crate::{
     model::{JOINTS, LINKS, TOOL},

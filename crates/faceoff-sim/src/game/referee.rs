@@ -124,7 +124,9 @@ impl Referee {
             return Some(RallyEnd::Foul { by: side_of_puck });
         }
         if x.abs() > TABLE.half_length_m() && y.abs() <= TABLE.goal_width_m / 2.0 {
-            return Some(RallyEnd::Goal { by: 1 - side_of_puck });
+            return Some(RallyEnd::Goal {
+                by: 1 - side_of_puck,
+            });
         }
         if in_middle && puck.velocity[0].abs() < GAME_RULES.stuck_vx_m_s {
             return Some(RallyEnd::Stuck);

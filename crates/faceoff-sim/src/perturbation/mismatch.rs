@@ -4,7 +4,7 @@ use crate::{
     dynamics::arm::{Bodies, Kinematics, controller_torques, plant_bias},
     model::{DOFS, EE_DESIRED_HEIGHT_M, INITIAL_Q, JOINTS, LINKS},
     robot::{
-        inverse_kinematics::{with_zero_universal, inverse_kinematics},
+        inverse_kinematics::{inverse_kinematics, with_zero_universal},
         plant::Plant,
         universal_joint::vertical,
     },
@@ -29,7 +29,11 @@ const SAG_ROUNDS: usize = 12;
 impl Plant {
     /// The plant for these factors: nominal, or that of the season with this mismatch seed.
     #[must_use]
-    pub fn for_factors(factors: Factors, settings: &PerturbationSettings, mismatch_seed: Seed) -> Self {
+    pub fn for_factors(
+        factors: Factors,
+        settings: &PerturbationSettings,
+        mismatch_seed: Seed,
+    ) -> Self {
         if factors.contains(Factor::ModelMismatch) {
             Self::mismatched(settings, mismatch_seed)
         } else {
@@ -65,7 +69,8 @@ impl Plant {
 fn draw_in_range(settings: &MismatchSettings, seed: Seed, draws: usize) -> (Plant, bool) {
     let [least, most] = settings.static_error_m;
     let workspace = workspace();
-    let is_in_range = |plant: &Plant| (least..=most).contains(&largest_static_error(plant, &workspace));
+    let is_in_range =
+        |plant: &Plant| (least..=most).contains(&largest_static_error(plant, &workspace));
     let mut stream = Stream::new(&seed, "plant");
     let mut plant = draw(settings, &mut stream);
     for _ in 1..draws {
@@ -123,7 +128,9 @@ fn largest_static_error(plant: &Plant, workspace: &[[f64; JOINTS]]) -> f64 {
 
 /// Distance between the commanded end-effector position and where gravity and gains balance.
 fn static_error(plant: &Plant, desired: &[f64; JOINTS]) -> f64 {
-    let target = Kinematics::new(&with_zero_universal(desired)).end_effector.origin;
+    let target = Kinematics::new(&with_zero_universal(desired))
+        .end_effector
+        .origin;
     let mut q = with_zero_universal(desired);
     for _ in 0..SAG_ROUNDS {
         let kinematics = Kinematics::new(&q);

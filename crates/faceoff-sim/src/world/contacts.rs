@@ -66,9 +66,7 @@ pub struct Contacts {
 #[derive(Debug, Clone, Copy)]
 pub enum Pair<'a> {
     /// A rim and the puck.
-    Rim {
-        puck: &'a [f64; 3],
-    },
+    Rim { puck: &'a [f64; 3] },
     /// A mallet and the puck.
     Mallet {
         /// The mallet's robot, 0 or 1.

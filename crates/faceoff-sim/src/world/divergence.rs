@@ -12,7 +12,11 @@ impl World {
             Some(Runaway::Joint { robot, joint })
         };
         let joint = self.arms.iter().enumerate().find_map(beyond);
-        joint.or_else(|| self.bounds.is_puck_out_of_bounds(&self.puck).then_some(Runaway::Puck))
+        joint.or_else(|| {
+            self.bounds
+                .is_puck_out_of_bounds(&self.puck)
+                .then_some(Runaway::Puck)
+        })
     }
 
     /// Stops the world for good.

@@ -36,9 +36,14 @@ impl<'a, A> LaneWorld<'a, A> {
 
 /// The world whose arm is in a lane, and the index of that arm. Unused lanes repeat the first arm.
 #[inline(always)]
-pub fn world_in_lane<'s, 'a, A>(lane_worlds: &'s [LaneWorld<'a, A>], lane: usize) -> (&'s LaneWorld<'a, A>, usize) {
+pub fn world_in_lane<'s, 'a, A>(
+    lane_worlds: &'s [LaneWorld<'a, A>],
+    lane: usize,
+) -> (&'s LaneWorld<'a, A>, usize) {
     for lane_world in lane_worlds {
-        if lane >= lane_world.first_lane && lane - lane_world.first_lane < lane_world.world.arms.len() {
+        if lane >= lane_world.first_lane
+            && lane - lane_world.first_lane < lane_world.world.arms.len()
+        {
             return (lane_world, lane - lane_world.first_lane);
         }
     }

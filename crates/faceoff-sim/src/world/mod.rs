@@ -1,21 +1,21 @@
 //! The physical world: a puck and up to two arms.
 
-mod scalar_arms;
 mod arm;
 mod arm_lanes;
 mod bounds;
 mod cone;
+mod contact_detection;
 mod contacts;
 mod divergence;
 mod friction;
 mod impacts;
 mod joints;
-mod puck_substep;
 mod lane_worlds;
+mod puck_substep;
+mod scalar_arms;
 mod solver;
 mod substep;
 mod time_step;
-mod contact_detection;
 
 use crate::{
     dynamics::arm::Kinematics,
@@ -30,7 +30,7 @@ use crate::{
 use arm::Arm;
 pub use bounds::{Bounds, Divergence, Runaway};
 use faceoff_types::{Interpolation, Ruleset};
-pub use impacts::{Impact, Impacts, ContactBody};
+pub use impacts::{ContactBody, Impact, Impacts};
 
 /// A mallet's striking cylinder: centre x, y, z (m) and velocity vx, vy (m/s), table frame.
 #[derive(Debug, Clone, Copy, PartialEq)]

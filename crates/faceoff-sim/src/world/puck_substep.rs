@@ -2,8 +2,8 @@
 
 use super::{
     World,
-    contacts::{Contacts, MalletMotion, Pair},
     contact_detection::add_rims,
+    contacts::{Contacts, MalletMotion, Pair},
 };
 use crate::table::{contact_finder, contact_law::MALLET, mallet_cylinder::MalletCylinder};
 

@@ -2,10 +2,10 @@
 
 use super::{
     arm_lanes::ArmLanes,
+    contact_detection::{MalletPose, find_contacts},
     contacts::Contacts,
     lane_worlds::LaneWorld,
     solver::{Mass, Problem, accelerations, accelerations_in_contact},
-    contact_detection::{MalletPose, find_contacts},
 };
 use crate::{
     dynamics::{
@@ -135,7 +135,9 @@ pub fn solve_contacts<T: Lanes, A>(
     let robots = world.arms.len();
     let contacts = find_contacts(&mallets[..robots], motion, &world.puck);
     let touching = contacts.as_ref().map_or(0, Contacts::touching);
-    world.impacts.record_touching(touching, world.substep, &world.puck);
+    world
+        .impacts
+        .record_touching(touching, world.substep, &world.puck);
     let Some(contacts) = contacts else {
         return;
     };

@@ -5,13 +5,13 @@
 //! ordinary range.
 
 use super::{
-    scalar_arms::{ScalarSolutions, ArmDynamics, solve_stops, solve_contacts},
     arm::Arm,
     arm_lanes::{ArmLanes, MotionLanes},
     bounds::{is_ordinary, is_ordinary_puck},
-    lane_worlds::{LaneWorld, world_in_lane},
-    solver::search,
     contact_detection::may_touch,
+    lane_worlds::{LaneWorld, world_in_lane},
+    scalar_arms::{ArmDynamics, ScalarSolutions, solve_contacts, solve_stops},
+    solver::search,
 };
 use crate::{
     dynamics::{
@@ -30,7 +30,11 @@ use std::f64::consts::FRAC_PI_2;
 
 /// One substep of all arms in the lanes, and of their pucks.
 #[inline(always)]
-pub fn substep<T: Lanes, A>(arms: &mut ArmLanes<T>, lane_worlds: &mut [LaneWorld<'_, A>], scalar: &mut ScalarSolutions) {
+pub fn substep<T: Lanes, A>(
+    arms: &mut ArmLanes<T>,
+    lane_worlds: &mut [LaneWorld<'_, A>],
+    scalar: &mut ScalarSolutions,
+) {
     let before = arms.motion;
     let dynamics = arm_dynamics(arms, lane_worlds);
     scalar.clear();
@@ -57,17 +61,25 @@ pub fn substep<T: Lanes, A>(arms: &mut ArmLanes<T>, lane_worlds: &mut [LaneWorld
     }
     filter_velocity(&mut motion.dq_filtered, &motion.dq);
     let ordinary = T::bits(is_ordinary(motion));
-    for lane_world in lane_worlds.iter_mut().filter(|lane_world| lane_world.is_moving) {
+    for lane_world in lane_worlds
+        .iter_mut()
+        .filter(|lane_world| lane_world.is_moving)
+    {
         let puck = lane_world.world.puck;
         lane_world.world.advance_puck(lane_world.puck_force.take());
-        if ordinary & lane_world.lanes() != lane_world.lanes() || !is_ordinary_puck(&lane_world.world.puck) {
+        if ordinary & lane_world.lanes() != lane_world.lanes()
+            || !is_ordinary_puck(&lane_world.world.puck)
+        {
             check_world(arms, lane_world, &before, puck);
         }
     }
 }
 
 #[inline(always)]
-fn arm_dynamics<T: Lanes, A>(arms: &mut ArmLanes<T>, lane_worlds: &[LaneWorld<'_, A>]) -> ArmDynamics<T> {
+fn arm_dynamics<T: Lanes, A>(
+    arms: &mut ArmLanes<T>,
+    lane_worlds: &[LaneWorld<'_, A>],
+) -> ArmDynamics<T> {
     let desired = Setpoint::gather(|lane| {
         let (lane_world, arm) = world_in_lane(lane_worlds, lane);
         &lane_world.world.arms[arm].trajectory[lane_world.world.substep]
@@ -120,8 +132,14 @@ fn solve_contacts_and_stops<T: Lanes, A>(
 ) {
     let centre = dynamics.kinematics.cylinder_centre();
     let beyond = T::bits(is_beyond_stop(&arms.motion.q));
-    for lane_world in lane_worlds.iter_mut().filter(|lane_world| lane_world.is_moving) {
-        let lanes = [lane_world.first_lane, (lane_world.first_lane + 1).min(T::COUNT - 1)];
+    for lane_world in lane_worlds
+        .iter_mut()
+        .filter(|lane_world| lane_world.is_moving)
+    {
+        let lanes = [
+            lane_world.first_lane,
+            (lane_world.first_lane + 1).min(T::COUNT - 1),
+        ];
         let centres = lanes.map(|lane| centre.lane(lane));
         let robots = lane_world.world.arms.len();
         if may_touch(&centres[..robots], &lane_world.world.puck) {
@@ -196,7 +214,10 @@ fn update_bound_sets<T: Lanes, A>(
     scalar_lanes: u32,
     acceleration: &mut [T; DOFS],
 ) {
-    for lane_world in lane_worlds.iter_mut().filter(|lane_world| lane_world.is_moving) {
+    for lane_world in lane_worlds
+        .iter_mut()
+        .filter(|lane_world| lane_world.is_moving)
+    {
         for (a, arm) in lane_world.world.arms.iter_mut().enumerate() {
             let lane = lane_world.first_lane + a;
             let constraints = &mut arm.constraints;

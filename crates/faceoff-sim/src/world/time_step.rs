@@ -2,9 +2,9 @@
 
 use super::{
     World,
-    scalar_arms::ScalarSolutions,
     arm_lanes::ArmLanes,
     lane_worlds::{LaneWorld, world_in_lane},
+    scalar_arms::ScalarSolutions,
     substep::substep,
 };
 use crate::{
@@ -111,7 +111,10 @@ impl<A: FnMut(&Puck) -> [f64; 2]> LaneKernel for ControlStep<'_, '_, A> {
 
 /// Advances worlds in lanes by some substeps.
 #[inline(always)]
-fn advance<T: Lanes, A: FnMut(&Puck) -> [f64; 2]>(lane_worlds: &mut [LaneWorld<'_, A>], substeps: usize) {
+fn advance<T: Lanes, A: FnMut(&Puck) -> [f64; 2]>(
+    lane_worlds: &mut [LaneWorld<'_, A>],
+    substeps: usize,
+) {
     let mut arms = ArmLanes::<T>::gather(|lane| {
         let (lane_world, arm) = world_in_lane(lane_worlds, lane);
         (&lane_world.world.arms[arm], &lane_world.world.plant)
@@ -122,12 +125,18 @@ fn advance<T: Lanes, A: FnMut(&Puck) -> [f64; 2]>(lane_worlds: &mut [LaneWorld<'
             lane_world.world.air_n = (lane_world.air_force)(&lane_world.world.puck);
         }
         substep(&mut arms, lane_worlds, &mut scalar);
-        for lane_world in lane_worlds.iter_mut().filter(|lane_world| lane_world.is_moving) {
+        for lane_world in lane_worlds
+            .iter_mut()
+            .filter(|lane_world| lane_world.is_moving)
+        {
             lane_world.world.substep = (lane_world.world.substep + 1) % SUBSTEPS;
             lane_world.is_moving = lane_world.world.divergence.is_none();
         }
     }
-    for lane_world in lane_worlds.iter_mut().filter(|lane_world| lane_world.is_moving) {
+    for lane_world in lane_worlds
+        .iter_mut()
+        .filter(|lane_world| lane_world.is_moving)
+    {
         for (a, arm) in lane_world.world.arms.iter_mut().enumerate() {
             arms.store(lane_world.first_lane + a, arm);
         }

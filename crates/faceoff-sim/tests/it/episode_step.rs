@@ -130,7 +130,10 @@ fn compare(path: LanePath, plays: Vec<Play>) -> Vec<EpisodeEnd> {
                 stepped.episode.steps()
             );
             assert_eq!(a, b, "{label}");
-            assert!(snapshot(&stepped.episode) == snapshot(&reference.episode), "{label}");
+            assert!(
+                snapshot(&stepped.episode) == snapshot(&reference.episode),
+                "{label}"
+            );
         }
         let mut ended = alone.iter().map(|outcome| outcome.end);
         pairs.retain(|_| match ended.next().flatten() {

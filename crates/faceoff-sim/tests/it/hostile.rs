@@ -80,7 +80,10 @@ fn action(
 }
 
 fn assert_finite(label: &str, numbers: &[f64]) {
-    assert!(numbers.iter().all(|x| x.is_finite()), "{label}: {numbers:?}");
+    assert!(
+        numbers.iter().all(|x| x.is_finite()),
+        "{label}: {numbers:?}"
+    );
 }
 
 /// Runs an episode; returns whether its world diverged.
@@ -192,7 +195,14 @@ fn divergence_in_a_game_names_the_hostile_robot() {
                     let actions = [0, 1].map(|robot| {
                         let observation = game.observation(robot);
                         if robot == hostile {
-                            action(habit, ACTION_LIMIT, interpolation, step, observation, &mut stream)
+                            action(
+                                habit,
+                                ACTION_LIMIT,
+                                interpolation,
+                                step,
+                                observation,
+                                &mut stream,
+                            )
                         } else {
                             interpolation.hold_position(&INITIAL_Q)[..interpolation.len()].to_vec()
                         }

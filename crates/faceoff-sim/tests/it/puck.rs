@@ -77,13 +77,18 @@ fn bounces_match_recordings() {
     // The reference approximates the rounding by chords, up to 0.3 mm off, so cases do not match one by one.
     let posts = of_kind(&["goal_post"]);
     for post in &posts {
-        let recorded_touch = first_touch(&post.recorded).expect("the recorded puck touches the post");
-        let simulated_touch = first_touch(&post.simulated).expect("the simulated puck touches the post");
+        let recorded_touch =
+            first_touch(&post.recorded).expect("the recorded puck touches the post");
+        let simulated_touch =
+            first_touch(&post.simulated).expect("the simulated puck touches the post");
         assert!(
             recorded_touch.abs_diff(simulated_touch) <= 1,
             "recorded_touch at {simulated_touch} ms, recorded {recorded_touch} ms"
         );
-        assert_leaves_the_post(&post.simulated[recorded_touch - 1], &post.simulated[post.judged_row()]);
+        assert_leaves_the_post(
+            &post.simulated[recorded_touch - 1],
+            &post.simulated[post.judged_row()],
+        );
     }
     let ratio = |post: &&Bounce| {
         let end = post.judged_row();

@@ -58,7 +58,10 @@ impl Bounce {
         if self.kind.starts_with("wall") {
             before = before.max(PUCK_RADIUS * self.recorded[0][5].abs());
         }
-        let (simulated, recorded) = (self.simulated[self.judged_row()], self.recorded[self.judged_row()]);
+        let (simulated, recorded) = (
+            self.simulated[self.judged_row()],
+            self.recorded[self.judged_row()],
+        );
         let velocity = (simulated[3] - recorded[3]).hypot(simulated[4] - recorded[4]);
         let spin = PUCK_RADIUS * (simulated[5] - recorded[5]).abs();
         (velocity / before, spin / before)

@@ -156,7 +156,8 @@ fn quoted_measurements_match_the_simulator() {
 
     let (across, along) = rim_bounces();
     let mean = |ratios: &[f64]| ratios.iter().sum::<f64>() / ratios.len() as f64;
-    let [least, most] = [f64::min, f64::max].map(|reduce| across.iter().copied().reduce(reduce).unwrap());
+    let [least, most] =
+        [f64::min, f64::max].map(|reduce| across.iter().copied().reduce(reduce).unwrap());
     assert_documented(&format!(
         "{:.2} of its speed across the rim, {least:.2} to {most:.2}",
         mean(&across)
@@ -164,7 +165,8 @@ fn quoted_measurements_match_the_simulator() {
     assert_documented(&format!("{:.2} of its speed along the rim", mean(&along)));
 
     let shares: Vec<f64> = [0.5, 1.0, 2.0, 3.0].map(mallet_bounce).to_vec();
-    let [least, most] = [f64::min, f64::max].map(|reduce| shares.iter().copied().reduce(reduce).unwrap());
+    let [least, most] =
+        [f64::min, f64::max].map(|reduce| shares.iter().copied().reduce(reduce).unwrap());
     assert_documented(&format!("{least:.2} to {most:.2} of the puck's speed"));
 }
 

@@ -1,5 +1,5 @@
 use super::parse::ParseEventError;
-use faceoff_types::{UserId, TeamId};
+use faceoff_types::{TeamId, UserId};
 use std::{fmt, str::FromStr};
 
 /// The cause of a change.

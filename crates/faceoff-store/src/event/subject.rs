@@ -1,7 +1,7 @@
 use super::parse::ParseEventError;
 use faceoff_types::{
-    AblationId, AnnouncementId, EvaluationId, GameId, UserId, ProposalId, QuestionId,
-    RegistrationId, StageDay, StageId, SubmissionId, TeamId, TournamentId,
+    AblationId, AnnouncementId, EvaluationId, GameId, ProposalId, QuestionId, RegistrationId,
+    StageDay, StageId, SubmissionId, TeamId, TournamentId, UserId,
 };
 use jiff::civil::Date;
 use std::{fmt, str::FromStr};

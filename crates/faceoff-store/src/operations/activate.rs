@@ -24,7 +24,8 @@ fn check_valid(submission: &Submission) -> Result<()> {
             format!("the submission is invalid ({reason}): upload a corrected one")
         }
         SubmissionState::ValidationError { .. } => {
-            "the submission could not be checked because of a platform fault: upload it again".into()
+            "the submission could not be checked because of a platform fault: upload it again"
+                .into()
         }
     }))
 }

@@ -128,7 +128,9 @@ async fn check(
     })
 }
 
-async fn read_contents(connection: &mut SqliteConnection) -> Result<(String, Vec<RequiredArtifact>)> {
+async fn read_contents(
+    connection: &mut SqliteConnection,
+) -> Result<(String, Vec<RequiredArtifact>)> {
     Ok((
         season::read(connection).await?.name,
         required_artifacts::all(connection).await?,

@@ -4,11 +4,11 @@ use crate::{
     event::{Actor, Subject},
     operations::{
         completion,
+        jobs::{ClaimedJob, Job, RunSeeds},
         lease_release::give_up,
         purpose::{self, JobFilter, Purpose},
         runs,
         tournament::game_lifecycle,
-        jobs::{ClaimedJob, RunSeeds, Job},
     },
     queue::{self, JobClaim, LeasedJob},
     store::Store,
@@ -41,7 +41,8 @@ impl Store {
         lease_s: u32,
         now: Timestamp,
     ) -> Result<Option<ClaimedJob>> {
-        self.claim_matching(JobFilter::All, worker, lease_s, now).await
+        self.claim_matching(JobFilter::All, worker, lease_s, now)
+            .await
     }
 
     /// [`claim`](Self::claim), limited to some kinds of jobs.

@@ -79,7 +79,9 @@ impl Store {
     /// call is completed by the next one.
     #[boxed]
     pub async fn remove_refused_bundles(&self, now: Timestamp) -> Result<usize> {
-        let before = now.saturating_sub(UNCHECKED_KEPT_FOR).unwrap_or(Timestamp::MIN);
+        let before = now
+            .saturating_sub(UNCHECKED_KEPT_FOR)
+            .unwrap_or(Timestamp::MIN);
         let mut connection = self.database.read.acquire().await?;
         let refused = bundles::refused(&mut connection, before).await?;
         drop(connection);

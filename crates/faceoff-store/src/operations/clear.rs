@@ -4,7 +4,7 @@ use crate::{
     boxed,
     error::Result,
     event::Actor,
-    operations::{runs as run_owners, cleanup::RECORDINGS_KEPT_FOR},
+    operations::{cleanup::RECORDINGS_KEPT_FOR, runs as run_owners},
     store::Store,
     tables::{
         events,

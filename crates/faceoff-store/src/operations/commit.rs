@@ -7,7 +7,7 @@ use crate::{
         purpose::{self, Purpose},
         runs,
     },
-    queue::{self, JobClaim, ClaimState},
+    queue::{self, ClaimState, JobClaim},
     store::Store,
     tables::{
         runs as run_rows,

@@ -11,7 +11,7 @@ use crate::{
     tables::{
         ablations,
         evaluations::{self, Failure},
-        scorings, runs as run_rows,
+        runs as run_rows, scorings,
     },
     write::Tx,
 };
@@ -57,7 +57,9 @@ pub(crate) async fn end_run(
         (RunOwner::Evaluation(id), RunEnd::PlatformFailed(reason)) => {
             fail_evaluation(tx, id, run, Failure::Platform(reason)).await
         }
-        (RunOwner::ProposedEvaluation { id, .. }, RunEnd::Completed) => proposal_completion::queue_scoring(tx, id).await,
+        (RunOwner::ProposedEvaluation { id, .. }, RunEnd::Completed) => {
+            proposal_completion::queue_scoring(tx, id).await
+        }
         (RunOwner::ProposedEvaluation { id, proposal }, RunEnd::AgentFailed) => {
             proposal_completion::fail(tx, id, run, proposal, Failure::Agent).await
         }

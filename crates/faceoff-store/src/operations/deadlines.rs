@@ -8,10 +8,9 @@ use crate::{
     operations::completion,
     store::Store,
     tables::{
-        days,
+        counting_evaluations, days,
         evaluations::Failure,
         stages::{self, Stage},
-        counting_evaluations,
     },
     write::Tx,
 };
@@ -44,7 +43,10 @@ pub(crate) async fn update_deadlines(tx: &mut Tx, stage: &Stage, or_stay: bool) 
 /// Ends the unfinished evaluations of an overdue day, except those that only wait for scoring. Returns how many.
 async fn end_day(tx: &mut Tx, stage_day: StageDay) -> Result<u32> {
     let zone = stages::find(tx, stage_day.stage).await?.zone;
-    let deadline_at = days::find(tx, stage_day).await?.deadline_at.unwrap_or(tx.now);
+    let deadline_at = days::find(tx, stage_day)
+        .await?
+        .deadline_at
+        .unwrap_or(tx.now);
     let there = deadline_at.to_zoned(zone.time_zone());
     let reason = format!(
         "the deadline of its day ({}) passed before all its episodes were run: the server ran out of time, this is no \

@@ -5,19 +5,19 @@ use crate::{
     error::{Result, StoreError},
     event::{Actor, Event, Subject},
     operations::{
-        new_evaluation::{NewEvaluation, DaySetup, queue_evaluation},
+        new_evaluation::{DaySetup, NewEvaluation, queue_evaluation},
         rulings::void,
         start_day::check_open,
     },
     queries,
     store::Store,
     tables::{
-        days, entries,
+        counting_evaluations, days, entries,
         evaluations::Evaluation,
         plan::RunPlan,
         season, stage_runtimes,
         stages::{self, Stage},
-        counting_evaluations, submissions, teams,
+        submissions, teams,
     },
     write::Tx,
 };

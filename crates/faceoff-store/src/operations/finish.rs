@@ -10,7 +10,7 @@ use crate::{
     },
     queue::JobClaim,
     store::Store,
-    tables::{proposed_evaluations, evaluations, retentions},
+    tables::{evaluations, proposed_evaluations, retentions},
 };
 use faceoff_types::EvaluationResult;
 use jiff::Timestamp;
@@ -45,7 +45,8 @@ impl Store {
                 release_day::release_if_over(tx, id).await
             }
             Purpose::ProposedScoring { id, proposal, .. } => {
-                proposed_evaluations::set_finished(tx, id, result, dataset, dataset_blake3, now).await?;
+                proposed_evaluations::set_finished(tx, id, result, dataset, dataset_blake3, now)
+                    .await?;
                 if let Some(bytes) = bytes {
                     retentions::set_measured(tx, id, bytes).await?;
                 }

@@ -8,17 +8,17 @@ use crate::{
     store::Store,
     tables::{
         divisions,
-        invitations::{self, Invitation, InvitationState, InvitationRole},
-        users::{self, User},
+        invitations::{self, Invitation, InvitationRole, InvitationState},
         registrations::{self, Registration, RegistrationState},
         season,
         teams::{self, Team, TeamProfile},
         terms,
         tokens::{Token, TokenKind, TokenOwner},
+        users::{self, User},
     },
     write::Tx,
 };
-use faceoff_types::{InvitationId, UserId, UserName, TeamId, TeamName};
+use faceoff_types::{InvitationId, TeamId, TeamName, UserId, UserName};
 use jiff::Timestamp;
 
 /// Invitations to one team that may be open at a time.
@@ -166,7 +166,8 @@ pub(super) async fn add_team(
 async fn add_user(tx: &mut Tx, request: &mut JoinRequest, team: Option<TeamId>) -> Result<UserId> {
     let Some(name) = request.name.clone() else {
         return Err(StoreError::Conflict(
-            "name: expected the name that the user is shown with and signs in with; got none".into(),
+            "name: expected the name that the user is shown with and signs in with; got none"
+                .into(),
         ));
     };
     check_terms(tx, request.accepted_terms).await?;
@@ -188,11 +189,7 @@ async fn add_user(tx: &mut Tx, request: &mut JoinRequest, team: Option<TeamId>) 
 /// Gives a user access again: all earlier tokens and sessions are revoked.
 async fn restore_access(tx: &mut Tx, id: UserId, request: &JoinRequest) -> Result<()> {
     let user = users::find(tx, id).await?;
-    if request
-        .name
-        .as_ref()
-        .is_some_and(|name| *name != user.name)
-    {
+    if request.name.as_ref().is_some_and(|name| *name != user.name) {
         return Err(StoreError::Conflict(format!(
             "name: the link belongs to {}; leave the name out",
             user.name
@@ -264,11 +261,7 @@ async fn join(tx: &mut Tx, mut request: JoinRequest) -> Result<JoinOutcome> {
         Some(team) => Some(teams::find(tx, team).await?),
         None => None,
     };
-    Ok(JoinOutcome {
-        user,
-        team,
-        token,
-    })
+    Ok(JoinOutcome { user, team, token })
 }
 
 async fn code_status(

@@ -3,13 +3,13 @@ use crate::{
     error::{Result, StoreError},
     event::{Actor, Event, Subject},
     operations::{
-        proposal_completion,
         completion::{self, RunEnd},
+        proposal_completion,
         purpose::{self, Purpose},
         runs,
         tournament::game_lifecycle,
     },
-    queue::{self, JobClaim, ClaimState},
+    queue::{self, ClaimState, JobClaim},
     store::Store,
     tables::{
         evaluations::{self, Failure},
@@ -110,7 +110,12 @@ impl Store {
     /// [`ValidationError`](crate::SubmissionState::ValidationError), an ablation ends without a result. For a lost lease
     /// nothing is recorded.
     #[boxed]
-    pub async fn release_failed(&self, claim: &JobClaim, reason: &str, now: Timestamp) -> Result<()> {
+    pub async fn release_failed(
+        &self,
+        claim: &JobClaim,
+        reason: &str,
+        now: Timestamp,
+    ) -> Result<()> {
         let actor = Actor::Worker(claim.worker.clone());
         self.write(actor, now, async |tx| {
             let ClaimState::Leased { kind } = queue::claim_state(tx, claim).await? else {
@@ -126,7 +131,8 @@ impl Store {
             let subject = event_subject(tx, &purpose).await?;
             tx.record(subject, event);
             if let Purpose::Game(id) = purpose {
-                game_lifecycle::end_attempt(tx, id, AttemptOutcome::PlatformFailed, Some(reason)).await?;
+                game_lifecycle::end_attempt(tx, id, AttemptOutcome::PlatformFailed, Some(reason))
+                    .await?;
             }
             if failures >= MAX_ATTEMPTS {
                 give_up(tx, claim.job, &kind, reason).await?;
@@ -191,7 +197,9 @@ impl Store {
         let actor = Actor::Worker(claim.worker.clone());
         self.write(actor, now, async |tx| {
             match queue::claim_state(tx, claim).await? {
-                ClaimState::Leased { kind } => release_held(tx, claim, &kind, rest_s, out_of_space).await,
+                ClaimState::Leased { kind } => {
+                    release_held(tx, claim, &kind, rest_s, out_of_space).await
+                }
                 ClaimState::AlreadyDone | ClaimState::Lost => Ok(()),
             }
         })
@@ -212,9 +220,7 @@ impl Store {
     #[boxed]
     pub async fn end_leases_of(&self, worker: &str, now: Timestamp) -> Result<u64> {
         let actor = Actor::Worker(worker.to_owned());
-        self.write(actor, now, async |tx| {
-            queue::end_leases(tx, worker).await
-        })
-        .await
+        self.write(actor, now, async |tx| queue::end_leases(tx, worker).await)
+            .await
     }
 }

@@ -5,7 +5,7 @@ use crate::{
     event::{Event, Subject},
     operations::{purpose, runs},
     queue,
-    tables::{proposed_evaluations, evaluations::Failure},
+    tables::{evaluations::Failure, proposed_evaluations},
     write::Tx,
 };
 use faceoff_types::{EvaluationId, ProposalId, RunId};

@@ -5,22 +5,22 @@ use crate::{
     error::{Result, StoreError},
     event::{Actor, Event, Subject},
     operations::{proposal_completion, purpose, rulings::void, runs},
-    queue::NewJob,
     queries,
+    queue::NewJob,
     store::Store,
     tables::{
-        days,
-        proposed_evaluations::{self, ProposedEvaluation},
+        counting_evaluations, days,
         entries::{self, Entry},
         evaluations::{self, EvaluationState, Failure},
-        scorings, sign_offs, freezes,
+        freezes,
         plan::RunPlan,
         proposals::{self, Proposal, ProposalKind, ProposalOutcome},
+        proposed_evaluations::{self, ProposedEvaluation},
         retentions, runs as run_rows,
         runs::Run,
-        season, stage_runtimes,
+        scorings, season, sign_offs, stage_runtimes,
         stages::{self, Stage, StagePhase},
-        counting_evaluations, submissions,
+        submissions,
     },
     write::Tx,
 };
@@ -329,7 +329,8 @@ impl Store {
             for evaluation in queries::proposals::evaluations_of_proposal(tx, id).await? {
                 if !evaluation.state.is_over() {
                     let failure = Failure::Cancelled("the proposal was dropped");
-                    proposal_completion::fail(tx, evaluation.id, evaluation.run, id, failure).await?;
+                    proposal_completion::fail(tx, evaluation.id, evaluation.run, id, failure)
+                        .await?;
                 }
             }
             proposals::set_outcome(tx, id, ProposalOutcome::Dropped(now)).await?;
@@ -350,7 +351,12 @@ async fn find_undecided(tx: &mut Tx, id: ProposalId) -> Result<Proposal> {
 }
 
 /// Replaces a result by the re-evaluation in a proposal.
-async fn apply_evaluation(tx: &mut Tx, proposal: &Proposal, stage_day: StageDay, evaluation: ProposedEvaluation) -> Result<()> {
+async fn apply_evaluation(
+    tx: &mut Tx,
+    proposal: &Proposal,
+    stage_day: StageDay,
+    evaluation: ProposedEvaluation,
+) -> Result<()> {
     let now = tx.now;
     if !matches!(
         evaluation.state,
@@ -362,7 +368,8 @@ async fn apply_evaluation(tx: &mut Tx, proposal: &Proposal, stage_day: StageDay,
         evaluation.replaces,
         matches!(proposal.kind, ProposalKind::Rules(_)),
     ) {
-        let counting = counting_evaluations::of_day_and_team(tx, stage_day, evaluation.team).await?;
+        let counting =
+            counting_evaluations::of_day_and_team(tx, stage_day, evaluation.team).await?;
         if !counting.iter().any(|one| one.id == replaced && one.counts) {
             return conflict(format!(
                 "the evaluation {replaced}, which would be replaced, does not count any more: drop the proposal and create another"
@@ -410,7 +417,10 @@ async fn apply_evaluation(tx: &mut Tx, proposal: &Proposal, stage_day: StageDay,
         }
         _ => {
             evaluations::set_failed(tx, evaluation.id, Failure::Agent, now).await?;
-            tx.record(Subject::Evaluation(evaluation.id), Event::EvaluationAgentFailed);
+            tx.record(
+                Subject::Evaluation(evaluation.id),
+                Event::EvaluationAgentFailed,
+            );
         }
     }
     Ok(())

@@ -5,8 +5,9 @@ use crate::{
     queries,
     store::Store,
     tables::{
+        counting_evaluations,
         evaluations::{Evaluation, EvaluationState},
-        stages, counting_evaluations,
+        stages,
     },
 };
 use faceoff_types::EvaluationId;

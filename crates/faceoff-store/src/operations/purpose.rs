@@ -2,7 +2,7 @@ use crate::{
     error::{Result, StoreError},
     queue::{Lane, NewJob},
     tables::{
-        proposed_evaluations, scorings, games,
+        games, proposed_evaluations, scorings,
         shards::{self, Shard},
         validation_runs,
     },
@@ -77,7 +77,9 @@ impl JobFilter {
             Self::All => {
                 r#"["finalise","smoke","shard","ablation","proposal","game","free_game","replay"]"#
             }
-            Self::ShardsAndGames => r#"["shard","ablation","proposal","game","free_game","replay"]"#,
+            Self::ShardsAndGames => {
+                r#"["shard","ablation","proposal","game","free_game","replay"]"#
+            }
             Self::ValidationAndScoring => r#"["finalise","smoke"]"#,
         }
     }

@@ -5,14 +5,14 @@ use crate::{
     boxed,
     error::{Result, StoreError},
     event::Actor,
-    operations::new_evaluation::{NewEvaluation, DaySetup, queue_evaluation},
+    operations::new_evaluation::{DaySetup, NewEvaluation, queue_evaluation},
     queries,
     store::Store,
     tables::{
         days,
         entries::{self, Entry},
         evaluations::{self, Evaluation, EvaluationState},
-        sign_offs, runs, season, teams,
+        runs, season, sign_offs, teams,
     },
     write::Tx,
 };

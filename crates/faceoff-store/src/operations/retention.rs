@@ -7,9 +7,9 @@ use crate::{
     operations::cleanup::RECORDINGS_KEPT_FOR,
     store::Store,
     tables::{
-        bundles, days, sign_offs,
+        bundles, days,
         retentions::{self, ScoredEvaluation},
-        season,
+        season, sign_offs,
         stages::{self, Stage, StagePhase},
     },
     write::Tx,
@@ -128,7 +128,8 @@ async fn plan(
         None => return Ok(Plan::default()),
     };
     let is_removable = |one: &&&ScoredEvaluation| one.has_dataset && !one.is_evidence;
-    let removable: Vec<&ScoredEvaluation> = removable.iter().filter(is_removable).copied().collect();
+    let removable: Vec<&ScoredEvaluation> =
+        removable.iter().filter(is_removable).copied().collect();
     let datasets: Vec<EvaluationId> = removable.iter().map(|one| one.id).collect();
     let bundles = retentions::idle_bundles(connection, stage.id, &datasets).await?;
     let teams: BTreeSet<TeamId> = removable.iter().map(|one| one.team).collect();

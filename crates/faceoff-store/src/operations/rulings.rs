@@ -11,17 +11,16 @@ use crate::{
     queries,
     store::Store,
     tables::{
-        days, entrants, entries,
+        counting_evaluations, days, entrants, entries,
         evaluations::{Evaluation, Failure},
-        sign_offs,
         rulings::Ruling,
-        counting_evaluations,
+        sign_offs,
         teams::{self, Team},
         tournaments,
     },
     write::Tx,
 };
-use faceoff_types::{EvaluationId, DepartureKind, StageDay, TeamId};
+use faceoff_types::{DepartureKind, EvaluationId, StageDay, TeamId};
 use jiff::Timestamp;
 
 pub(crate) async fn void(tx: &mut Tx, id: EvaluationId, reason: &str) -> Result<()> {
@@ -104,7 +103,8 @@ impl Store {
             for evaluation in counting_evaluations::of_day(tx, stage_day).await? {
                 if evaluation.is_open {
                     let cancelled = Failure::Cancelled(reason);
-                    completion::fail_evaluation(tx, evaluation.id, evaluation.run, cancelled).await?;
+                    completion::fail_evaluation(tx, evaluation.id, evaluation.run, cancelled)
+                        .await?;
                 } else if evaluation.counts {
                     void(tx, evaluation.id, reason).await?;
                 } else {
@@ -113,7 +113,9 @@ impl Store {
                 count += 1;
             }
             if count == 0 {
-                return Err(StoreError::Conflict("no evaluation of that day counts".into()));
+                return Err(StoreError::Conflict(
+                    "no evaluation of that day counts".into(),
+                ));
             }
             let reason = reason.to_owned();
             tx.record(Subject::Day(stage_day), Event::DayVoided { reason });

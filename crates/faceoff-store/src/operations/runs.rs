@@ -5,7 +5,7 @@ use crate::{
     event::Subject,
     queue::{self, NewJob},
     tables::{
-        ablations, bundles, proposed_evaluations, evaluations, runs,
+        ablations, bundles, evaluations, proposed_evaluations, runs,
         runs::Run,
         shards::{self, Shard},
     },

@@ -4,7 +4,7 @@ use crate::{
     event::{Actor, Event, Subject},
     operations::stage_sign_off::is_final_day_pending,
     store::Store,
-    tables::{proposed_evaluations, evaluations, games, season, stages, tournaments},
+    tables::{evaluations, games, proposed_evaluations, season, stages, tournaments},
 };
 use jiff::Timestamp;
 

@@ -8,12 +8,12 @@ use crate::{
     store::Store,
     tables::{
         evaluations::Evaluation,
-        sign_offs, freezes, proposals, season,
+        freezes, proposals, season, sign_offs,
         stages::{self, Stage, StagePhase},
     },
     write::Tx,
 };
-use faceoff_types::{StageId, CountingResult};
+use faceoff_types::{CountingResult, StageId};
 use jiff::Timestamp;
 
 fn conflict<T>(why: String) -> Result<T> {

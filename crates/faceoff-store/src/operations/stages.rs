@@ -7,7 +7,7 @@ use crate::{
     operations::{deadlines, retention},
     store::Store,
     tables::{
-        days, sign_offs, season,
+        days, season, sign_offs,
         stages::{self, Revision, Stage, StagePhase},
     },
     write::Tx,
@@ -144,7 +144,8 @@ async fn change(tx: &mut Tx, stage: &Stage, change: StageChange, by: ChangeSourc
     let phase = stage.phase(now);
     let rules = change.rules.unwrap_or_else(|| stage.rules.rules.clone());
     sign_offs::check_not_signed_off(tx, stage.id).await?;
-    let increases_visibility = rules == stage.rules.rules && only_increases_visibility(stage, &changed);
+    let increases_visibility =
+        rules == stage.rules.rules && only_increases_visibility(stage, &changed);
     if phase == StagePhase::Closed && !increases_visibility {
         return conflict(format!(
             "the stage {:?} closed at {}, and a closed stage cannot be changed, except to open a blind one or to publish \
@@ -188,7 +189,8 @@ async fn change(tx: &mut Tx, stage: &Stage, change: StageChange, by: ChangeSourc
     check_rules(&rules, &changed.settings)?;
     // An organiser's change is not reverted by the configuration at the next start.
     let new_values = (&rules, &changed.settings, &changed.zone);
-    let by_hand = by == ChangeSource::Organiser && new_values != (&stage.rules.rules, &stage.settings, &stage.zone);
+    let by_hand = by == ChangeSource::Organiser
+        && new_values != (&stage.rules.rules, &stage.settings, &stage.zone);
     if changed != *stage {
         let event = Event::StageChanged {
             name: changed.name.clone(),

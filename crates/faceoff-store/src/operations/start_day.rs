@@ -5,7 +5,7 @@ use crate::{
     error::{Result, StoreError},
     event::{Actor, Event, Subject},
     operations::{
-        new_evaluation::{NewEvaluation, DaySetup, queue_evaluation},
+        new_evaluation::{DaySetup, NewEvaluation, queue_evaluation},
         release_day,
     },
     queries,
@@ -81,7 +81,11 @@ async fn insert(tx: &mut Tx, stage: &Stage, cutoff: CutoffDate<'_>) -> Result<St
     }
 }
 
-async fn start_if_open(tx: &mut Tx, stage: StageId, cutoff: CutoffDate<'_>) -> Result<(StageDay, Vec<Evaluation>)> {
+async fn start_if_open(
+    tx: &mut Tx,
+    stage: StageId,
+    cutoff: CutoffDate<'_>,
+) -> Result<(StageDay, Vec<Evaluation>)> {
     season::check_open(tx).await?;
     let stage = stages::find(tx, stage).await?;
     check_open(&stage, tx.now)?;
@@ -174,7 +178,8 @@ impl Store {
     ) -> Result<Vec<Evaluation>> {
         let date = stage_day.date;
         self.write(actor, now, async |tx| {
-            let (_, started) = start_if_open(tx, stage_day.stage, CutoffDate::Missed { date, reason }).await?;
+            let (_, started) =
+                start_if_open(tx, stage_day.stage, CutoffDate::Missed { date, reason }).await?;
             require_evaluations(started)
         })
         .await

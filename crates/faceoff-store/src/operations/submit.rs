@@ -7,9 +7,9 @@ use crate::{
     store::Store,
     tables::{
         bundles::{self, UploadQuota, UploadUsage},
-        season, validation_runs,
+        season,
         submissions::{self, Submission},
-        teams,
+        teams, validation_runs,
     },
 };
 use faceoff_types::{BundleRef, SubmissionId, TeamId};

@@ -8,9 +8,10 @@ use crate::{
     },
     store::Store,
     tables::{
-        divisions, users, season,
+        divisions, season,
         teams::{self, Team, TeamProfile},
         tokens::{TokenKind, TokenOwner},
+        users,
     },
     write::Tx,
 };

@@ -6,9 +6,9 @@ use crate::{
     event::{Actor, Event, Subject},
     store::Store,
     tables::{
-        users::{self, User},
         teams::{self, Team},
         tokens::{self, Token, TokenKind, TokenOwner},
+        users::{self, User},
     },
     write::Tx,
 };
@@ -114,7 +114,10 @@ pub(crate) async fn revoke_all(
     tokens::revoke_others(tx, owner, except, now).await
 }
 
-async fn principal_of(connection: &mut SqliteConnection, token: &Token) -> Result<Option<Principal>> {
+async fn principal_of(
+    connection: &mut SqliteConnection,
+    token: &Token,
+) -> Result<Option<Principal>> {
     Ok(match token.owner {
         TokenOwner::Host => Some(Principal::Host),
         TokenOwner::Team(id) => Some(Principal::Team(teams::find(connection, id).await?)),
@@ -123,7 +126,10 @@ async fn principal_of(connection: &mut SqliteConnection, token: &Token) -> Resul
             match user.team {
                 _ if user.left_at.is_some() => None,
                 None => Some(Principal::Organiser(user)),
-                Some(team) => Some(Principal::Member(user, teams::find(connection, team).await?)),
+                Some(team) => Some(Principal::Member(
+                    user,
+                    teams::find(connection, team).await?,
+                )),
             }
         }
     })
@@ -182,7 +188,11 @@ impl Store {
 
     /// Verifies the token with this id at `now`, for a request signed with the token's [hash](Store::token_hash).
     #[boxed]
-    pub async fn verify_token_id(&self, id: TokenId, now: Timestamp) -> Result<Result<VerifiedToken, TokenRejection>> {
+    pub async fn verify_token_id(
+        &self,
+        id: TokenId,
+        now: Timestamp,
+    ) -> Result<Result<VerifiedToken, TokenRejection>> {
         let mut connection = self.database.read.acquire().await?;
         let token = tokens::find(&mut connection, id).await?;
         check_token(&mut connection, token, now).await

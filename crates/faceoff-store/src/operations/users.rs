@@ -7,12 +7,12 @@ use crate::{
     operations::tokens::revoke_all,
     store::Store,
     tables::{
-        users::{self, User},
         terms::{self, Terms},
         tokens::{self, TokenOwner},
+        users::{self, User},
     },
 };
-use faceoff_types::{UserId, TeamId, TokenId};
+use faceoff_types::{TeamId, TokenId, UserId};
 use jiff::Timestamp;
 
 impl Store {
@@ -63,12 +63,7 @@ impl Store {
     /// [`StoreError::Conflict`] if the user has left, or is the last who can organise: no other organiser, and no
     /// valid host token.
     #[boxed]
-    pub async fn remove_user(
-        &self,
-        actor: Actor,
-        id: UserId,
-        now: Timestamp,
-    ) -> Result<User> {
+    pub async fn remove_user(&self, actor: Actor, id: UserId, now: Timestamp) -> Result<User> {
         self.write(actor, now, async |tx| {
             let user = users::find(tx, id).await?;
             if user.left_at.is_some() {

@@ -24,7 +24,8 @@ impl Store {
     /// The cutoff of a stage's final day; `None` before it.
     #[boxed]
     pub async fn final_cutoff(&self, stage: StageId) -> Result<Option<Timestamp>> {
-        crate::tables::sign_offs::final_cutoff(&mut *self.database.read.acquire().await?, stage).await
+        crate::tables::sign_offs::final_cutoff(&mut *self.database.read.acquire().await?, stage)
+            .await
     }
 
     /// As [`Store::board_within`], with several days of each team: by team name, then by day.

@@ -2,20 +2,20 @@
 
 pub(crate) mod ablations;
 pub(crate) mod board;
-pub(crate) mod subject_contexts;
+pub(crate) mod board_days;
 mod days;
 pub(crate) mod evaluations;
 mod events;
-mod leases;
 pub(crate) mod gauges;
-pub(crate) mod queue_forecast;
+mod leases;
 pub(crate) mod progress;
 pub(crate) mod proposals;
+pub(crate) mod queue_forecast;
 pub(crate) mod runs;
 mod season;
 mod stages;
-pub(crate) mod board_days;
 pub(crate) mod storage;
+pub(crate) mod subject_contexts;
 mod submissions;
 mod summaries;
 mod teams;

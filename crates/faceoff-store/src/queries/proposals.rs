@@ -4,8 +4,8 @@ use crate::{
     queries::progress,
     store::Store,
     tables::{
-        proposed_evaluations::{self, ProposedEvaluation},
         proposals::{self, Proposal},
+        proposed_evaluations::{self, ProposedEvaluation},
     },
 };
 use faceoff_types::{EvaluationId, ProposalId};
@@ -37,7 +37,10 @@ impl Store {
     /// An evaluation of a proposal or a trial, with the proposal. [`StoreError::NotFound`](crate::StoreError::NotFound)
     /// for other evaluations.
     #[boxed]
-    pub async fn proposed_evaluation(&self, id: EvaluationId) -> Result<(Proposal, ProposedEvaluation)> {
+    pub async fn proposed_evaluation(
+        &self,
+        id: EvaluationId,
+    ) -> Result<(Proposal, ProposedEvaluation)> {
         let mut tx = self.database.read.begin().await?;
         let row = proposed_evaluations::find(&mut tx, id).await?;
         let proposal = proposals::find(&mut tx, row.proposal.0).await?;

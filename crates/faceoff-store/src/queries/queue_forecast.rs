@@ -177,7 +177,8 @@ struct JobGroups<'a> {
 impl<'a> JobGroups<'a> {
     fn of_evaluations(open: &'a [OpenEvaluation], durations: &'a JobDurations) -> Self {
         let follow_up = Some(durations.scoring_ms);
-        let group = |open: &OpenEvaluation| (GroupTarget::Evaluation(open.id), JobGroup { follow_up });
+        let group =
+            |open: &OpenEvaluation| (GroupTarget::Evaluation(open.id), JobGroup { follow_up });
         Self {
             durations,
             open,
@@ -192,7 +193,10 @@ impl<'a> JobGroups<'a> {
         if let Some(group) = job.run.as_ref().and_then(group_of_run) {
             let each_ms = episode_ms(&self.open[group], self.durations);
             let duration = job.episodes.zip(each_ms);
-            return (group, duration.map(|(episodes, ms)| f64::from(episodes) * ms));
+            return (
+                group,
+                duration.map(|(episodes, ms)| f64::from(episodes) * ms),
+            );
         }
         if let Some(id) = &job.scoring_of {
             let is_target =

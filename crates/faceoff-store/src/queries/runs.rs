@@ -51,7 +51,8 @@ impl Store {
     /// The agent faults of a run, with the agent's standard error.
     #[boxed]
     pub async fn run_faults(&self, run: RunId) -> Result<RunFaults> {
-        let faulty = shards::with_agent_faults(&mut *self.database.read.acquire().await?, run).await?;
+        let faulty =
+            shards::with_agent_faults(&mut *self.database.read.acquire().await?, run).await?;
         let mut faults = Vec::new();
         let mut log = String::new();
         for shard in faulty {

@@ -31,7 +31,10 @@ impl Store {
         }
         let seed = |stage_day: StageDay| {
             let stage = stages.iter().find(|stage| stage.id == stage_day.stage)?;
-            Some((stage_day, stage.seed_label(stage_day.date).seed(&season.secret)))
+            Some((
+                stage_day,
+                stage.seed_label(stage_day.date).seed(&season.secret),
+            ))
         };
         Ok(days.filter_map(seed).collect())
     }

@@ -2,8 +2,8 @@
 
 use crate::{boxed, column::Instant, error::Result, event::Subject, store::Store};
 use faceoff_types::{
-    AblationId, EvaluationId, GameId, UserId, QuestionId, StageId, SubmissionId, TeamId,
-    TournamentId,
+    AblationId, EvaluationId, GameId, QuestionId, StageId, SubmissionId, TeamId, TournamentId,
+    UserId,
 };
 use jiff::{Timestamp, civil::Date};
 use sqlx::{SqliteConnection, types::Text};
@@ -61,7 +61,10 @@ pub enum SubjectContext {
     Organisers,
 }
 
-async fn evaluation_context(connection: &mut SqliteConnection, id: EvaluationId) -> Result<SubjectContext> {
+async fn evaluation_context(
+    connection: &mut SqliteConnection,
+    id: EvaluationId,
+) -> Result<SubjectContext> {
     let id = Text(id);
     let row = sqlx::query!(
         r#"SELECT e.team_id AS "team: Text<TeamId>", e.submission_id AS "submission: Text<SubmissionId>",
@@ -72,32 +75,40 @@ async fn evaluation_context(connection: &mut SqliteConnection, id: EvaluationId)
     )
     .fetch_optional(connection)
     .await?;
-    Ok(row.map_or(SubjectContext::Organisers, |row| SubjectContext::Evaluation {
-        stage: row.stage.0,
-        day: row.day.0,
-        submission: row.submission.0,
-        team: row.team.0,
-        finished_at: row.finished_at.map(|at| at.0),
-        is_released: row.is_released,
+    Ok(row.map_or(SubjectContext::Organisers, |row| {
+        SubjectContext::Evaluation {
+            stage: row.stage.0,
+            day: row.day.0,
+            submission: row.submission.0,
+            team: row.team.0,
+            finished_at: row.finished_at.map(|at| at.0),
+            is_released: row.is_released,
+        }
     }))
 }
 
-async fn submission_context(connection: &mut SqliteConnection, id: SubmissionId) -> Result<SubjectContext> {
+async fn submission_context(
+    connection: &mut SqliteConnection,
+    id: SubmissionId,
+) -> Result<SubjectContext> {
     let key = Text(id);
     let team = sqlx::query_scalar!(
         r#"SELECT team_id AS "team: Text<TeamId>" FROM submissions WHERE id = ?"#,
         key
     );
     let team = team.fetch_optional(connection).await?;
-    Ok(
-        team.map_or(SubjectContext::Organisers, |team| SubjectContext::Submission {
+    Ok(team.map_or(SubjectContext::Organisers, |team| {
+        SubjectContext::Submission {
             submission: id,
             team: team.0,
-        }),
-    )
+        }
+    }))
 }
 
-async fn ablation_context(connection: &mut SqliteConnection, id: AblationId) -> Result<SubjectContext> {
+async fn ablation_context(
+    connection: &mut SqliteConnection,
+    id: AblationId,
+) -> Result<SubjectContext> {
     let id = Text(id);
     let row = sqlx::query!(
         r#"SELECT s.id AS "submission: Text<SubmissionId>", s.team_id AS "team: Text<TeamId>"
@@ -106,10 +117,12 @@ async fn ablation_context(connection: &mut SqliteConnection, id: AblationId) -> 
     )
     .fetch_optional(connection)
     .await?;
-    Ok(row.map_or(SubjectContext::Organisers, |row| SubjectContext::Ablation {
-        submission: row.submission.0,
-        team: row.team.0,
-    }))
+    Ok(
+        row.map_or(SubjectContext::Organisers, |row| SubjectContext::Ablation {
+            submission: row.submission.0,
+            team: row.team.0,
+        }),
+    )
 }
 
 async fn game_context(connection: &mut SqliteConnection, id: GameId) -> Result<SubjectContext> {
@@ -122,11 +135,13 @@ async fn game_context(connection: &mut SqliteConnection, id: GameId) -> Result<S
     )
     .fetch_optional(connection)
     .await?;
-    Ok(row.map_or(SubjectContext::Organisers, |row| SubjectContext::Game {
-        tournament: row.tournament.0,
-        teams: [row.home.0, row.away.0],
-        is_public: row.is_public,
-    }))
+    Ok(
+        row.map_or(SubjectContext::Organisers, |row| SubjectContext::Game {
+            tournament: row.tournament.0,
+            teams: [row.home.0, row.away.0],
+            is_public: row.is_public,
+        }),
+    )
 }
 
 async fn user_context(connection: &mut SqliteConnection, id: UserId) -> Result<SubjectContext> {
@@ -141,7 +156,10 @@ async fn user_context(connection: &mut SqliteConnection, id: UserId) -> Result<S
     })
 }
 
-async fn question_context(connection: &mut SqliteConnection, id: QuestionId) -> Result<SubjectContext> {
+async fn question_context(
+    connection: &mut SqliteConnection,
+    id: QuestionId,
+) -> Result<SubjectContext> {
     let id = Text(id);
     let team = sqlx::query_scalar!(
         r#"SELECT team_id AS "team: Text<TeamId>" FROM questions WHERE id = ?"#,

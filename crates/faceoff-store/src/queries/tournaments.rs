@@ -65,7 +65,9 @@ impl Store {
         let mut connection = self.database.read.acquire().await?;
         match filter {
             GameFilter::Rounds => games::of_rounds(&mut connection, id).await,
-            GameFilter::TestAndFriendly(team) => games::test_and_friendly(&mut connection, id, team).await,
+            GameFilter::TestAndFriendly(team) => {
+                games::test_and_friendly(&mut connection, id, team).await
+            }
             GameFilter::Replays => games::of_replays(&mut connection, id).await,
         }
     }

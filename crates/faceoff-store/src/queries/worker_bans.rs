@@ -28,7 +28,11 @@ impl Store {
 
     /// The counting results of a remote worker, at most `limit` of each kind.
     #[boxed]
-    pub async fn results_of_worker(&self, worker: &WorkerName, limit: u32) -> Result<WorkerResults> {
+    pub async fn results_of_worker(
+        &self,
+        worker: &WorkerName,
+        limit: u32,
+    ) -> Result<WorkerResults> {
         let holder = worker.holder();
         let mut connection = self.database.read.acquire().await?;
         let evaluations = sqlx::query_scalar!(

@@ -193,7 +193,11 @@ impl Forecast {
         account_a
             .urgency
             .cmp(&account_b.urgency)
-            .then(account_a.lane_served_ms.total_cmp(&account_b.lane_served_ms))
+            .then(
+                account_a
+                    .lane_served_ms
+                    .total_cmp(&account_b.lane_served_ms),
+            )
             .then(account_a.rank.cmp(&account_b.rank))
             .then(job_a.batch.cmp(&job_b.batch))
             .then(account_a.served_ms.total_cmp(&account_b.served_ms))

@@ -64,7 +64,11 @@ pub(crate) async fn claim_next(
     lease_s: u32,
     now: Timestamp,
 ) -> Result<Option<LeasedJob>> {
-    let (nonce, until, now) = (Text(nonce), Instant(seconds_later(now, lease_s)), Instant(now));
+    let (nonce, until, now) = (
+        Text(nonce),
+        Instant(seconds_later(now, lease_s)),
+        Instant(now),
+    );
     let lease_ms = milliseconds(lease_s);
     Ok(sqlx::query_as!(
         LeasedJob,

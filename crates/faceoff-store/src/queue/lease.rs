@@ -21,9 +21,7 @@ pub struct JobClaim {
 pub(crate) enum ClaimState {
     /// The job is leased under this claim. The lease may have expired: until another worker claims the job, its result is
     /// accepted.
-    Leased {
-        kind: String,
-    },
+    Leased { kind: String },
     /// The job was completed under this claim.
     AlreadyDone,
     /// The job was claimed by another worker, queued again or dropped.
@@ -31,7 +29,10 @@ pub(crate) enum ClaimState {
 }
 
 /// Reads the state of a claim, within a transaction.
-pub(crate) async fn claim_state(connection: &mut SqliteConnection, claim: &JobClaim) -> Result<ClaimState> {
+pub(crate) async fn claim_state(
+    connection: &mut SqliteConnection,
+    claim: &JobClaim,
+) -> Result<ClaimState> {
     let (id, nonce) = (Text(claim.job), Text(claim.nonce));
     let row = sqlx::query!(
         "SELECT kind, state = 'leased' AS held FROM jobs WHERE id = ? AND nonce = ?",

@@ -3,17 +3,17 @@
 //! its account are opaque labels.
 
 pub(crate) mod forecast;
+mod jobs;
 mod lease;
 mod shares;
-mod jobs;
 
-pub use lease::JobClaim;
-pub(crate) use lease::{
-    ClaimState, transfer, claim_state, lease_holder, is_holder, is_leased, leases, mark_done, park, release,
-    renew, renew_all_leases, renew_leases, requeue_failed, unpark,
-};
-pub(crate) use shares::{Account, Lane, account};
 pub(crate) use jobs::{
     LeasedJob, NewJob, QueueGauges, claim_next, drop_jobs, end_leases, gauges, insert, requeue,
     resume,
 };
+pub use lease::JobClaim;
+pub(crate) use lease::{
+    ClaimState, claim_state, is_holder, is_leased, lease_holder, leases, mark_done, park, release,
+    renew, renew_all_leases, renew_leases, requeue_failed, transfer, unpark,
+};
+pub(crate) use shares::{Account, Lane, account};

@@ -175,7 +175,10 @@ pub(crate) async fn set_ended(
 }
 
 /// Is every run of the ablation complete?
-pub(crate) async fn all_complete(connection: &mut SqliteConnection, id: AblationId) -> Result<bool> {
+pub(crate) async fn all_complete(
+    connection: &mut SqliteConnection,
+    id: AblationId,
+) -> Result<bool> {
     let id = Text(id);
     Ok(sqlx::query_scalar!(
         r#"SELECT NOT EXISTS (SELECT 1 FROM ablation_runs a JOIN runs r ON r.id = a.run_id

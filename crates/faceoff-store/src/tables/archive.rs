@@ -77,7 +77,10 @@ pub(crate) async fn read(connection: &mut SqliteConnection) -> Result<Option<Arc
 }
 
 /// Marks the database as an archive's.
-pub(crate) async fn put(connection: &mut SqliteConnection, archived: &ArchivedSeason) -> Result<()> {
+pub(crate) async fn put(
+    connection: &mut SqliteConnection,
+    archived: &ArchivedSeason,
+) -> Result<()> {
     let (edition, made_at) = (Text(archived.edition), Instant(archived.made_at));
     let imported_at = archived.imported_at.map(Instant);
     sqlx::query!(
@@ -117,7 +120,11 @@ pub(crate) async fn put_seed(
     stage_day: StageDay,
     seed: &Seed,
 ) -> Result<()> {
-    let (stage, day, seed) = (Text(stage_day.stage), Text(stage_day.date), Bytes32(*seed.as_bytes()));
+    let (stage, day, seed) = (
+        Text(stage_day.stage),
+        Text(stage_day.date),
+        Bytes32(*seed.as_bytes()),
+    );
     sqlx::query!(
         "INSERT OR REPLACE INTO archived_seeds (stage_id, day, seed) VALUES (?, ?, ?)",
         stage,

@@ -216,7 +216,10 @@ pub(crate) async fn deletable(
 }
 
 /// Notes that the file of a removed bundle was deleted.
-pub(crate) async fn set_file_deleted(connection: &mut SqliteConnection, id: SubmissionId) -> Result<()> {
+pub(crate) async fn set_file_deleted(
+    connection: &mut SqliteConnection,
+    id: SubmissionId,
+) -> Result<()> {
     let id = Text(id);
     sqlx::query!("UPDATE submissions SET bundle_gone = 1 WHERE id = ?", id)
         .execute(connection)
@@ -225,7 +228,10 @@ pub(crate) async fn set_file_deleted(connection: &mut SqliteConnection, id: Subm
 }
 
 /// Refuses a submission whose bundle was removed.
-pub(crate) async fn check_available(connection: &mut SqliteConnection, id: SubmissionId) -> Result<()> {
+pub(crate) async fn check_available(
+    connection: &mut SqliteConnection,
+    id: SubmissionId,
+) -> Result<()> {
     let text = Text(id);
     let removed = sqlx::query!(
         r#"SELECT bundle_removed_at AS "at!: Instant", bundle_removed_for AS reason FROM submissions
@@ -257,7 +263,10 @@ pub(crate) struct BundleUses {
     pub(crate) proposed: u32,
 }
 
-pub(crate) async fn uses(connection: &mut SqliteConnection, id: SubmissionId) -> Result<BundleUses> {
+pub(crate) async fn uses(
+    connection: &mut SqliteConnection,
+    id: SubmissionId,
+) -> Result<BundleUses> {
     let id = Text(id);
     Ok(sqlx::query_as!(
         BundleUses,

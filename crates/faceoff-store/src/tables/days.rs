@@ -173,7 +173,11 @@ pub(crate) async fn set_deadline(
     stage_day: StageDay,
     deadline_at: Option<Timestamp>,
 ) -> Result<()> {
-    let (stage, day, at) = (Text(stage_day.stage), Text(stage_day.date), deadline_at.map(Instant));
+    let (stage, day, at) = (
+        Text(stage_day.stage),
+        Text(stage_day.date),
+        deadline_at.map(Instant),
+    );
     sqlx::query!(
         "UPDATE days SET deadline_at = ? WHERE stage_id = ? AND day = ?",
         at,

@@ -239,7 +239,10 @@ pub(crate) async fn give_up(
 }
 
 /// Deletes the deliveries that were settled before an instant, and returns their number.
-pub(crate) async fn delete_settled(connection: &mut SqliteConnection, before: Timestamp) -> Result<u64> {
+pub(crate) async fn delete_settled(
+    connection: &mut SqliteConnection,
+    before: Timestamp,
+) -> Result<u64> {
     let before = Instant(before);
     let deleted = sqlx::query!(
         "DELETE FROM webhook_deliveries WHERE state <> 'waiting' AND settled_at < ?",

@@ -141,7 +141,10 @@ impl EvaluationRow {
 
     pub(crate) fn into_evaluation(self, episodes_done: u32) -> Result<Evaluation> {
         let damaged = |problem: &str| {
-            StoreError::Damaged(format!("evaluation {}: {} {problem}", self.id.0, self.state))
+            StoreError::Damaged(format!(
+                "evaluation {}: {} {problem}",
+                self.id.0, self.state
+            ))
         };
         let plan = RunPlan {
             profile: self.profile.0,
@@ -220,7 +223,10 @@ impl EvaluationRow {
             extra_for: self.extra_for,
             voided: Ruling::from_columns(self.voided_at, self.voided_for),
             published_at: self.published_at.map(|at| at.0),
-            dataset_removed: Ruling::from_columns(self.dataset_removed_at, self.dataset_removed_for),
+            dataset_removed: Ruling::from_columns(
+                self.dataset_removed_at,
+                self.dataset_removed_for,
+            ),
             state,
         })
     }

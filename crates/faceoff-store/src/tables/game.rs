@@ -142,7 +142,10 @@ impl GamePurpose {
     #[must_use]
     pub const fn schedule_entry(self) -> Option<ScheduleEntry> {
         match self {
-            Self::Round(entry) | Self::Replay { original: entry, .. } => Some(entry),
+            Self::Round(entry)
+            | Self::Replay {
+                original: entry, ..
+            } => Some(entry),
             Self::Test { .. } | Self::Friendly { .. } => None,
         }
     }

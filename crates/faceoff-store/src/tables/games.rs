@@ -255,10 +255,7 @@ pub(crate) async fn open(
 }
 
 /// The game that a job plays.
-pub(crate) async fn of_job(
-    connection: &mut SqliteConnection,
-    job: Uuid,
-) -> Result<Option<GameId>> {
+pub(crate) async fn of_job(connection: &mut SqliteConnection, job: Uuid) -> Result<Option<GameId>> {
     let job = Text(job);
     let found = sqlx::query_scalar!(
         r#"SELECT id AS "id: Text<GameId>" FROM games WHERE job_id = ?"#,

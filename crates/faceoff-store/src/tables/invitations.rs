@@ -2,7 +2,7 @@ use crate::{
     column::{Bytes32, Instant},
     error::{Result, StoreError},
 };
-use faceoff_types::{InvitationId, UserId, TeamId};
+use faceoff_types::{InvitationId, TeamId, UserId};
 use jiff::Timestamp;
 use sqlx::{SqliteConnection, types::Text};
 
@@ -47,13 +47,8 @@ impl InvitationRole {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum InvitationState {
     Open,
-    Accepted {
-        by: UserId,
-        at: Timestamp,
-    },
-    Revoked {
-        at: Timestamp,
-    },
+    Accepted { by: UserId, at: Timestamp },
+    Revoked { at: Timestamp },
 }
 
 /// An invitation link, which can be used once.

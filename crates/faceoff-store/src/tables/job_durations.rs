@@ -50,7 +50,9 @@ pub(crate) struct OpenEvaluation {
 }
 
 /// All open evaluations, in the order in which they were queued.
-pub(crate) async fn open_evaluations(connection: &mut SqliteConnection) -> Result<Vec<OpenEvaluation>> {
+pub(crate) async fn open_evaluations(
+    connection: &mut SqliteConnection,
+) -> Result<Vec<OpenEvaluation>> {
     let rows = sqlx::query!(
         r#"SELECT e.id AS "id!: Text<EvaluationId>", e.team_id AS "team!: Text<TeamId>",
                   e.stage_id AS "stage!: Text<StageId>", e.day AS "day!: Text<Date>", e.run_id AS "run!: Text<RunId>",

@@ -52,7 +52,10 @@ impl ProposedEvaluationRow {
     pub(crate) fn into_evaluation(self, episodes_done: u32) -> Result<ProposedEvaluation> {
         let id = self.id.0;
         let damaged = || {
-            StoreError::Damaged(format!("proposed evaluation {id}: {} and incomplete", self.state))
+            StoreError::Damaged(format!(
+                "proposed evaluation {id}: {} and incomplete",
+                self.state
+            ))
         };
         let finished_at = self.finished_at.map(|at| at.0);
         let state = match (self.state.as_str(), finished_at) {
@@ -114,7 +117,10 @@ macro_rules! select_proposed_evaluations {
 }
 
 /// The proposed evaluation with this id.
-pub(crate) async fn find(connection: &mut SqliteConnection, id: EvaluationId) -> Result<ProposedEvaluationRow> {
+pub(crate) async fn find(
+    connection: &mut SqliteConnection,
+    id: EvaluationId,
+) -> Result<ProposedEvaluationRow> {
     let id = Text(id);
     let found = select_proposed_evaluations!("WHERE d.id = ?", id).fetch_optional(connection);
     found.await?.ok_or(StoreError::NotFound("evaluation"))
@@ -167,7 +173,10 @@ pub(crate) async fn of_job(
     Ok(found.map(|row| (row.id.0, row.run.0, row.proposal.0)))
 }
 
-pub(crate) async fn insert(connection: &mut SqliteConnection, new: &ProposedEvaluation) -> Result<()> {
+pub(crate) async fn insert(
+    connection: &mut SqliteConnection,
+    new: &ProposedEvaluation,
+) -> Result<()> {
     let (id, proposal, submission) = (Text(new.id), Text(new.proposal), Text(new.submission));
     let (team, replaces, run) = (Text(new.team), new.replaces.map(Text), Text(new.run));
     let created_at = Instant(new.created_at);

@@ -12,10 +12,7 @@ pub enum RegistrationState {
     /// An organiser has to decide.
     Pending,
     /// The team was created; the registration's code now invites its first member.
-    Approved {
-        at: Timestamp,
-        team: TeamId,
-    },
+    Approved { at: Timestamp, team: TeamId },
     Refused {
         at: Timestamp,
         /// Shown to the person who registered.

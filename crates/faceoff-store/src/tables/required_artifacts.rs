@@ -12,9 +12,7 @@ pub enum RequiredArtifact {
         blake3: Option<String>,
     },
     /// At least one file under a key prefix: the recording of a shard of a running evaluation.
-    Folder {
-        key: String,
-    },
+    Folder { key: String },
 }
 
 /// All required artifacts. A bundle that is not validated yet is left out: it may be rejected and removed at any time.
@@ -54,7 +52,11 @@ pub(crate) async fn all(connection: &mut SqliteConnection) -> Result<Vec<Require
     )
     .fetch_all(&mut *connection)
     .await?;
-    required.extend(recordings.into_iter().map(|key| RequiredArtifact::Folder { key }));
+    required.extend(
+        recordings
+            .into_iter()
+            .map(|key| RequiredArtifact::Folder { key }),
+    );
     let games = sqlx::query!(
         r#"/* backup */ SELECT a.recording AS "key!", a.game_blake3 AS "game!", a.home_blake3 AS "home!", a.away_blake3 AS "away!"
            FROM games g JOIN game_attempts a ON a.game_id = g.id AND a.number = g.attempt

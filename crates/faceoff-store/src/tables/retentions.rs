@@ -26,7 +26,9 @@ pub(crate) async fn of_stage(
 }
 
 /// The stages whose retention removes files at some time.
-pub(crate) async fn stages_with_removals(connection: &mut SqliteConnection) -> Result<Vec<StageId>> {
+pub(crate) async fn stages_with_removals(
+    connection: &mut SqliteConnection,
+) -> Result<Vec<StageId>> {
     let stages = sqlx::query_scalar!(
         r#"SELECT stage_id AS "stage: Text<StageId>" FROM stage_retentions WHERE retention <> '{}'"#
     )

@@ -294,7 +294,10 @@ pub(crate) struct FaultyShard {
 }
 
 /// The shards of a run with agent faults, in order of play.
-pub(crate) async fn with_agent_faults(connection: &mut SqliteConnection, run: RunId) -> Result<Vec<FaultyShard>> {
+pub(crate) async fn with_agent_faults(
+    connection: &mut SqliteConnection,
+    run: RunId,
+) -> Result<Vec<FaultyShard>> {
     let run = Text(run);
     Ok(sqlx::query_as!(
         FaultyShard,
@@ -308,7 +311,10 @@ pub(crate) async fn with_agent_faults(connection: &mut SqliteConnection, run: Ru
 }
 
 /// Deletes a run's shards without agent faults, committed or not, with their jobs.
-pub(crate) async fn delete_without_faults(connection: &mut SqliteConnection, run: RunId) -> Result<()> {
+pub(crate) async fn delete_without_faults(
+    connection: &mut SqliteConnection,
+    run: RunId,
+) -> Result<()> {
     let run = Text(run);
     let jobs = sqlx::query_scalar!(
         r#"DELETE FROM shards WHERE run_id = ? AND COALESCE(agent_faults, 0) = 0

@@ -34,7 +34,10 @@ impl SignOff {
 }
 
 /// Refuses to change a stage that is signed off.
-pub(crate) async fn check_not_signed_off(connection: &mut SqliteConnection, stage: StageId) -> Result<()> {
+pub(crate) async fn check_not_signed_off(
+    connection: &mut SqliteConnection,
+    stage: StageId,
+) -> Result<()> {
     let id = Text(stage);
     let found = sqlx::query!(
         r#"SELECT name, finalised_at AS "at!: Instant", finalised_by AS "by!: String"
@@ -112,7 +115,10 @@ pub(crate) async fn final_cutoff(
 }
 
 /// Marks a new day as its stage's final one.
-pub(crate) async fn set_final_day(connection: &mut SqliteConnection, stage_day: StageDay) -> Result<()> {
+pub(crate) async fn set_final_day(
+    connection: &mut SqliteConnection,
+    stage_day: StageDay,
+) -> Result<()> {
     let (stage, day) = (Text(stage_day.stage), Text(stage_day.date));
     sqlx::query!(
         "UPDATE days SET is_final = 1 WHERE stage_id = ? AND day = ?",

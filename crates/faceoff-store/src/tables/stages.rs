@@ -2,7 +2,7 @@ use crate::{
     column::{Instant, Json},
     error::{Result, StoreError},
     event::Actor,
-    tables::{sign_offs::SignOff, plan::RunPlan},
+    tables::{plan::RunPlan, sign_offs::SignOff},
 };
 use faceoff_types::{
     DayDeadline, SeedLabel, StageDay, StageId, StageName, StageRules, StageSettings, TeamId, Zone,
@@ -181,7 +181,11 @@ impl From<Row> for Stage {
             },
             names_seeds: row.names_seeds,
             configured: row.configured,
-            sign_off: SignOff::from_columns(row.finalised_at, row.finalised_by, row.finalised_without),
+            sign_off: SignOff::from_columns(
+                row.finalised_at,
+                row.finalised_by,
+                row.finalised_without,
+            ),
         }
     }
 }

@@ -4,7 +4,7 @@ use crate::{
     event::Actor,
     tables::rulings::Ruling,
 };
-use faceoff_types::{BundleRef, ValidationTiming, SubmissionId, TeamId};
+use faceoff_types::{BundleRef, SubmissionId, TeamId, ValidationTiming};
 use jiff::Timestamp;
 use sqlx::{SqliteConnection, types::Text};
 
@@ -59,9 +59,7 @@ pub enum SubmissionState {
         reason: String,
     },
     /// Given up after platform faults in several attempts; the team may upload again.
-    ValidationError {
-        reason: String,
-    },
+    ValidationError { reason: String },
 }
 
 impl SubmissionState {

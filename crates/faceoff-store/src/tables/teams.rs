@@ -1,7 +1,7 @@
 use crate::{
     column::Instant,
     error::{Result, StoreError},
-    tables::{users, rulings::Ruling, terms},
+    tables::{rulings::Ruling, terms, users},
 };
 use faceoff_types::{DivisionName, TeamId, TeamName};
 use jiff::Timestamp;

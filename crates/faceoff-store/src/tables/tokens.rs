@@ -2,7 +2,7 @@ use crate::{
     column::{Bytes32, Instant},
     error::{Result, StoreError},
 };
-use faceoff_types::{UserId, TeamId, TokenId};
+use faceoff_types::{TeamId, TokenId, UserId};
 use jiff::Timestamp;
 use sqlx::{SqliteConnection, types::Text};
 
@@ -298,7 +298,10 @@ pub(crate) async fn revoke_others(
 }
 
 /// Deletes the sessions that expired or were revoked before an instant. The events still record them.
-pub(crate) async fn delete_old_sessions(connection: &mut SqliteConnection, before: Timestamp) -> Result<()> {
+pub(crate) async fn delete_old_sessions(
+    connection: &mut SqliteConnection,
+    before: Timestamp,
+) -> Result<()> {
     let before = Instant(before);
     sqlx::query!(
         "DELETE FROM tokens WHERE kind = 'session' AND (expires_at < ?1 OR revoked_at < ?1)",

@@ -2,7 +2,7 @@ use crate::{
     column::Instant,
     error::{Result, StoreError},
 };
-use faceoff_types::{UserId, UserName, TeamId};
+use faceoff_types::{TeamId, UserId, UserName};
 use jiff::Timestamp;
 use sqlx::{SqliteConnection, types::Text};
 
@@ -65,17 +65,12 @@ macro_rules! select_users {
 
 /// All users, including those who have left, by name.
 pub(crate) async fn all(connection: &mut SqliteConnection) -> Result<Vec<User>> {
-    let rows = select_users!("ORDER BY name")
-        .fetch_all(connection)
-        .await?;
+    let rows = select_users!("ORDER BY name").fetch_all(connection).await?;
     Ok(rows.into_iter().map(User::from).collect())
 }
 
 /// The members of a team, including those who have left, by name.
-pub(crate) async fn of_team(
-    connection: &mut SqliteConnection,
-    team: TeamId,
-) -> Result<Vec<User>> {
+pub(crate) async fn of_team(connection: &mut SqliteConnection, team: TeamId) -> Result<Vec<User>> {
     let team = Text(team);
     let rows = select_users!("WHERE team_id = ? ORDER BY name", team)
         .fetch_all(connection)

@@ -29,7 +29,10 @@ fn available_slots_count_online_accepted_workers() {
     assert_eq!(all.len(), 2);
     assert_eq!((all[0].first_seen_at, all[0].last_seen_at), (at(0), at(50)));
     let busy = &all[0].busy_slots["slot-0"];
-    assert_eq!((busy.description.as_deref(), busy.since), (Some("hit"), at(40)));
+    assert_eq!(
+        (busy.description.as_deref(), busy.since),
+        (Some("hit"), at(40))
+    );
     assert_eq!(busy.problem.as_deref(), Some("the disk is full"));
     workers.record_job("a", "slot-0", job, SlotReport::default(), at(50));
     assert_eq!(workers.all()[0].busy_slots["slot-0"].problem, None);
@@ -57,15 +60,21 @@ fn backoff_doubles_with_failures_and_ends_with_success() {
     let failed = |job, s| workers.record_failure("a", Uuid::from_u128(job), at(s));
     assert_eq!(failed(1, 0), None);
     assert_eq!(failed(1, 0), None);
-    assert_eq!(failed(1, 0), None, "a job that fails repeatedly counts once");
+    assert_eq!(
+        failed(1, 0),
+        None,
+        "a job that fails repeatedly counts once"
+    );
     assert_eq!(failed(2, 0), None);
     assert_eq!(workers.backoff_reason("a", at(0)), None);
     assert_eq!(failed(3, 0), Some((3, at(60))));
-    let reason = workers
-        .backoff_reason("a", at(59))
-        .expect("it backs off");
+    let reason = workers.backoff_reason("a", at(59)).expect("it backs off");
     assert!(reason.contains("its last 3 jobs"), "{reason}");
-    assert_eq!(workers.backoff_reason("a", at(60)), None, "it may try again");
+    assert_eq!(
+        workers.backoff_reason("a", at(60)),
+        None,
+        "it may try again"
+    );
     assert_eq!(failed(4, 60), Some((4, at(180))));
     for job in 5..25 {
         failed(job, 180);
@@ -82,7 +91,10 @@ fn files_are_closed_once_no_upload_runs() {
     let (workers, nonce) = (Workers::default(), Uuid::from_u128(1));
     let first = workers.begin_upload(nonce).expect("open");
     assert!(!workers.close_files(nonce), "an upload is running");
-    assert!(workers.begin_upload(nonce).is_none(), "no other upload begins");
+    assert!(
+        workers.begin_upload(nonce).is_none(),
+        "no other upload begins"
+    );
     drop(first);
     assert!(workers.close_files(nonce));
     assert!(workers.begin_upload(nonce).is_none());

@@ -152,7 +152,10 @@ async fn season() -> (TestStore, EvaluationId) {
         .invite(Actor::Organiser, invitation, f.now)
         .await
         .unwrap();
-    f.store.join(join_request([7; 32], "Ada"), f.now).await.unwrap();
+    f.store
+        .join(join_request([7; 32], "Ada"), f.now)
+        .await
+        .unwrap();
     let webhook = NewWebhook {
         team: Some(alpha.team),
         name: "hook".into(),
@@ -240,7 +243,10 @@ async fn archive_omits_open_evaluations_and_credentials() {
             imported.season().await.unwrap(),
         );
         assert_eq!(is.commitment, was.commitment, "the commitment stays");
-        let (stages, days) = (imported.stages().await.unwrap(), imported.days().await.unwrap());
+        let (stages, days) = (
+            imported.stages().await.unwrap(),
+            imported.days().await.unwrap(),
+        );
         let days: Vec<StageDay> = days.into_iter().map(|(day, _)| day.stage_day).collect();
         let seeds = imported
             .day_seeds(&is, &stages, days.iter().copied())
@@ -278,7 +284,10 @@ async fn public_archive_has_results_without_episodes() {
     }
     Store::import(folder.path(), f.now).await.unwrap();
     let imported = Store::open(folder.path()).await.unwrap();
-    let summaries = imported.episode_summaries(&[evaluation.run], 1).await.unwrap();
+    let summaries = imported
+        .episode_summaries(&[evaluation.run], 1)
+        .await
+        .unwrap();
     assert_eq!(summaries.len(), 1);
     let outcomes = imported.outcomes(evaluation.run).await;
     assert!(
@@ -451,7 +460,10 @@ async fn import_removes_planted_credentials() {
     Store::import(folder.path(), f.now).await.unwrap();
     let imported = Store::open(folder.path()).await.unwrap();
     assert!(imported.tokens().await.unwrap().is_empty());
-    let holder = imported.verify_token([0; 32], TokenKind::ApiToken, f.now).await.unwrap();
+    let holder = imported
+        .verify_token([0; 32], TokenKind::ApiToken, f.now)
+        .await
+        .unwrap();
     assert!(holder.is_err(), "{holder:?}");
     let passwords = "SELECT COUNT(*) FROM people WHERE password IS NOT NULL";
     let left: i64 = sqlx::query_scalar(passwords)
@@ -461,7 +473,10 @@ async fn import_removes_planted_credentials() {
     assert_eq!(left, 0);
     // The new server's own token works.
     assert!(imported.set_host_token([9; 32], f.now).await.unwrap());
-    let holder = imported.verify_token([9; 32], TokenKind::ApiToken, f.now).await.unwrap();
+    let holder = imported
+        .verify_token([9; 32], TokenKind::ApiToken, f.now)
+        .await
+        .unwrap();
     assert!(matches!(holder.unwrap().principal, Principal::Host));
 }
 
@@ -523,7 +538,10 @@ async fn public_archive_has_counting_games_only() {
             .iter()
             .filter(|one| matches!(one.owner, ArtifactOwner::Game(_)))
             .count();
-        let friendly_games = store.games(cup.id, GameFilter::TestAndFriendly(None)).await.unwrap();
+        let friendly_games = store
+            .games(cup.id, GameFilter::TestAndFriendly(None))
+            .await
+            .unwrap();
         let log = store
             .game_log(record.games[0].id, Side::First)
             .await

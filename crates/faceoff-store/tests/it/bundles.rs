@@ -40,7 +40,10 @@ async fn refuse(f: &TestStore) {
         timing: Vec::new(),
         log: "its log\n".into(),
     };
-    f.store.commit_validation(&claim, outcome, f.now).await.unwrap();
+    f.store
+        .commit_validation(&claim, outcome, f.now)
+        .await
+        .unwrap();
 }
 
 /// Ends the next validation run by platform faults.
@@ -157,7 +160,10 @@ async fn upload_quota_is_per_team_and_checked_on_insert() {
     upload(&f, &one, 400).await.unwrap();
     upload(&f, &other, 1000).await.unwrap();
     let error = upload(&f, &one, u64::MAX).await.unwrap_err();
-    assert!(matches!(error, StoreError::DailyQuotaExceeded { .. }), "{error}");
+    assert!(
+        matches!(error, StoreError::DailyQuotaExceeded { .. }),
+        "{error}"
+    );
     // Midnight, UTC.
     f.later(14 * 3600);
     let error = upload(&f, &one, 600).await.unwrap_err();

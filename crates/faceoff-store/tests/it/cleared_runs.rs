@@ -24,7 +24,10 @@ async fn kinds(f: &TestStore) -> Vec<String> {
     kinds.fetch_all(&mut f.connection().await).await.unwrap()
 }
 
-async fn outcomes(f: &TestStore, evaluation: &Evaluation) -> Result<Vec<EpisodeOutcome>, StoreError> {
+async fn outcomes(
+    f: &TestStore,
+    evaluation: &Evaluation,
+) -> Result<Vec<EpisodeOutcome>, StoreError> {
     f.store.outcomes(evaluation.run).await
 }
 
@@ -110,7 +113,10 @@ async fn cleared_run_keeps_agent_faults() {
     f.store.clear_run(evaluation.run, f.now).await.unwrap();
     let left = rows(&f, "shards").await;
     assert!(0 < left && left < before, "{left} of {before}");
-    assert_eq!(f.store.run_faults(evaluation.run).await.unwrap(), faults_before);
+    assert_eq!(
+        f.store.run_faults(evaluation.run).await.unwrap(),
+        faults_before
+    );
 }
 
 #[tokio::test]

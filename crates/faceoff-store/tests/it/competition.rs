@@ -56,7 +56,10 @@ async fn submission_travels_from_upload_to_board() {
             }
         );
         f.later(1);
-        assert_eq!(f.commit_shard(&claim, &shard, 0).await, CommitOutcome::Stored);
+        assert_eq!(
+            f.commit_shard(&claim, &shard, 0).await,
+            CommitOutcome::Stored
+        );
         played.push((shard.task, shard.first_episode, shard.end_episode));
     }
     let in_order = Task::ALL
@@ -99,7 +102,9 @@ async fn submission_travels_from_upload_to_board() {
     let secret = f.store.season().await.unwrap().secret;
     assert_eq!(
         seeds.episodes,
-        secret.stage(evaluation.stage_day.stage).day(evaluation.stage_day.date)
+        secret
+            .stage(evaluation.stage_day.stage)
+            .day(evaluation.stage_day.date)
     );
     assert_eq!(seeds.mismatch, secret.model_mismatch());
     assert!(f.claim().await.is_none(), "it is claimed once");

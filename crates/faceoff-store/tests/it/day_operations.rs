@@ -82,7 +82,9 @@ async fn frozen_board_omits_later_results() {
         ["boards_frozen", "boards_unfrozen"]
     );
     let other = StageId::new();
-    let none = f.store.freeze_boards(Actor::Organiser, other, REASON, f.now);
+    let none = f
+        .store
+        .freeze_boards(Actor::Organiser, other, REASON, f.now);
     assert!(matches!(none.await, Err(StoreError::NotFound("stage"))));
 }
 
@@ -108,8 +110,15 @@ async fn missed_day_runs_on_its_date_with_active_submissions() {
     assert_eq!(played.len(), 2, "Beta's submission is active now, too");
     let of = played[0].stage_day;
     let (day, _) = f.store.days().await.unwrap()[0];
-    assert_eq!((day.stage_day, day.cutoff_at), (of, f.now), "its cutoff is the actual time");
-    assert_eq!(f.store.missed_days().await.unwrap(), [(of, REASON.to_owned())]);
+    assert_eq!(
+        (day.stage_day, day.cutoff_at),
+        (of, f.now),
+        "its cutoff is the actual time"
+    );
+    assert_eq!(
+        f.store.missed_days().await.unwrap(),
+        [(of, REASON.to_owned())]
+    );
     let (_, run, _) = {
         let claimed = f.claim_shard().await;
         f.commit_shard(&claimed.0, &claimed.2, 0).await;
@@ -136,7 +145,12 @@ async fn missed_day_runs_on_its_date_with_active_submissions() {
     // The schedule continues from the newest date, regardless of missed days.
     let stage = f.store.stage(of.stage).await.unwrap();
     assert_eq!(
-        f.store.newest_day(stage.id).await.unwrap().unwrap().stage_day,
+        f.store
+            .newest_day(stage.id)
+            .await
+            .unwrap()
+            .unwrap()
+            .stage_day,
         newest
     );
 
@@ -199,7 +213,10 @@ async fn extra_evaluation_of_open_day_uses_its_episodes() {
     f.validate().await;
     let extra_run = extra(&f, day.stage_day, late.id, false).await.unwrap();
     assert_eq!(extra_run.extra_for.as_deref(), Some(REASON));
-    refused(extra(&f, day.stage_day, late.id, false).await, &["queued or running"]);
+    refused(
+        extra(&f, day.stage_day, late.id, false).await,
+        &["queued or running"],
+    );
     let mut labels = Vec::new();
     while let Some(ClaimedJob { claim, job }) = f.claim().await {
         match job {
@@ -240,7 +257,10 @@ async fn extra_evaluation_of_released_day_gets_own_episodes() {
         "the submission that is active now"
     );
     let replaced = f.store.evaluation(day.id).await.unwrap().voided.unwrap();
-    assert_eq!(replaced.reason, format!("replaced by an extra evaluation: {REASON}"));
+    assert_eq!(
+        replaced.reason,
+        format!("replaced by an extra evaluation: {REASON}")
+    );
     let (claim, run, shard) = f.claim_shard().await;
     assert_eq!(run.seed, SeedLabel::Extra(extra_run.id));
     // After platform faults only an organiser can rerun it: on the same episodes, still as an extra evaluation.
@@ -248,7 +268,9 @@ async fn extra_evaluation_of_released_day_gets_own_episodes() {
     let broken = f.fail_next().await;
     assert_eq!(broken, extra_run.id);
     let _ = shard;
-    let rerun = f.store.rerun_evaluation(Actor::Organiser, extra_run.id, f.now);
+    let rerun = f
+        .store
+        .rerun_evaluation(Actor::Organiser, extra_run.id, f.now);
     let rerun = rerun.await.unwrap();
     assert_eq!(rerun.extra_for.as_deref(), Some(REASON));
     let (claim, run, shard) = f.claim_shard().await;
@@ -280,7 +302,10 @@ async fn extra_evaluation_uses_rules_of_its_day() {
     let stage = f.stage(&two).await;
     let beta = f.ready_team("Beta").await;
     let extra_run = extra(&f, day.stage_day, beta.team, false).await.unwrap();
-    assert_eq!((extra_run.revision, extra_run.plan.episodes_per_task), (1, 1));
+    assert_eq!(
+        (extra_run.revision, extra_run.plan.episodes_per_task),
+        (1, 1)
+    );
     f.run_all(2.0).await;
 
     let none = StageDay {

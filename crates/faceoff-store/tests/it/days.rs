@@ -2,7 +2,7 @@
 
 use crate::fixture::*;
 use faceoff_store::*;
-use faceoff_types::{ValidationOutcome, SubmissionId, Zone};
+use faceoff_types::{SubmissionId, ValidationOutcome, Zone};
 use jiff::civil::date;
 
 fn expect_cutoff_passed<T: std::fmt::Debug>(result: Result<T, StoreError>) -> jiff::civil::Date {
@@ -48,7 +48,14 @@ async fn day_has_one_cutoff() {
     f.now = "2026-03-02T00:00:00Z".parse().unwrap();
     let next = f.evaluate(second.id, &plan()).await;
     assert_eq!(next.stage_day.date, date(2026, 3, 2));
-    assert_eq!(f.store.evaluations_on(next.stage_day.date).await.unwrap().len(), 2);
+    assert_eq!(
+        f.store
+            .evaluations_on(next.stage_day.date)
+            .await
+            .unwrap()
+            .len(),
+        2
+    );
     // and a clock that was set back starts nothing
     f.now = "2026-02-27T00:00:00Z".parse().unwrap();
     let repeated = f
@@ -165,7 +172,10 @@ async fn valid_upload_becomes_active_unless_superseded() {
         Err(StoreError::Conflict(_))
     ));
     assert!(choose(old.id).await.unwrap().active);
-    f.store.commit_validation(&claim, valid(), f.now).await.unwrap();
+    f.store
+        .commit_validation(&claim, valid(), f.now)
+        .await
+        .unwrap();
     assert_eq!(active(&f, &team).await, old.id);
     choose(slow.id).await.unwrap();
     assert_eq!(active(&f, &team).await, slow.id);
@@ -216,7 +226,10 @@ async fn cancelled_evaluation_loses_leases_and_can_be_rerun() {
         .await
         .unwrap();
     assert!(!f.store.heartbeat(&claim, 1, LEASE_S, f.now).await.unwrap());
-    assert_eq!(f.commit_shard(&claim, &shard, 0).await, CommitOutcome::LeaseLost);
+    assert_eq!(
+        f.commit_shard(&claim, &shard, 0).await,
+        CommitOutcome::LeaseLost
+    );
     assert!(f.claim().await.is_none());
     assert_eq!(
         f.state(evaluation.id).await,
@@ -253,7 +266,10 @@ async fn cutoff_takes_newest_valid_submission_of_each_team() {
         timing: Vec::new(),
         log: String::new(),
     };
-    f.store.commit_validation(&claim, outcome, f.now).await.unwrap();
+    f.store
+        .commit_validation(&claim, outcome, f.now)
+        .await
+        .unwrap();
     f.later(1);
     let team = f.store.team(alpha.team).await.unwrap();
     f.upload(&team).await;
@@ -426,7 +442,10 @@ async fn withdrawn_submission_skips_days_until_chosen_again() {
         (false, Some(f.now))
     );
     let repeated = withdraw(&f, first.id).await;
-    assert!(matches!(repeated, Err(StoreError::Conflict(_))), "{repeated:?}");
+    assert!(
+        matches!(repeated, Err(StoreError::Conflict(_))),
+        "{repeated:?}"
+    );
     // The day past its cutoff continues, the next one excludes it.
     f.run_all(1.0).await;
     assert_eq!(f.board().await.len(), 2);
@@ -452,9 +471,9 @@ async fn withdrawn_submission_skips_days_until_chosen_again() {
     let chosen = chosen.await.unwrap();
     assert_eq!((chosen.active, chosen.withdrawn_at), (true, None));
     let describe = async |description| {
-        let described = f
-            .store
-            .describe_submission(Actor::Team(team.id), first.id, description, f.now);
+        let described =
+            f.store
+                .describe_submission(Actor::Team(team.id), first.id, description, f.now);
         let described = described.await.unwrap();
         (described.label, described.note)
     };

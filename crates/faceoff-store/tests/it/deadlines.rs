@@ -175,10 +175,17 @@ async fn deadline_ends_open_evaluations_and_releases_the_day() {
         panic!("expected that the evaluation has ended")
     };
     assert_eq!(finished_at, deadline);
-    for words in ["2026-03-03 at 10:00:00 UTC", "the server ran out of time", "no agent fault"] {
+    for words in [
+        "2026-03-03 at 10:00:00 UTC",
+        "the server ran out of time",
+        "no agent fault",
+    ] {
         assert!(reason.contains(words), "{words} is not in {reason}");
     }
-    assert_eq!(f.commit_shard(&held.0, &held.1, 0).await, CommitOutcome::LeaseLost);
+    assert_eq!(
+        f.commit_shard(&held.0, &held.1, 0).await,
+        CommitOutcome::LeaseLost
+    );
     assert_eq!(
         kinds_since(&f, before).await,
         ["day_overdue", "evaluation_not_played"]
@@ -226,7 +233,11 @@ async fn overdue_day_without_scoring_is_released_at_once() {
     let started = start(&f, stage).await;
     // An automatic rerun after a platform fault has no time left.
     let broken = f.fail_next().await;
-    let evaluations = f.store.evaluations_of_day(started[0].stage_day).await.unwrap();
+    let evaluations = f
+        .store
+        .evaluations_of_day(started[0].stage_day)
+        .await
+        .unwrap();
     assert_eq!(evaluations.len(), 2, "the rerun is queued");
     f.later(3600);
     f.store.end_overdue_days(f.now).await.unwrap();
@@ -289,7 +300,8 @@ async fn deadline_follows_settings_but_never_into_the_past() {
             .change_stage(Actor::Organiser, stage, wanted, f.now)
             .await
     };
-    let deadline = async |f: &TestStore| f.store.unreleased_days(stage).await.unwrap()[0].deadline_at;
+    let deadline =
+        async |f: &TestStore| f.store.unreleased_days(stage).await.unwrap()[0].deadline_at;
     f.later(2 * 3600);
     change(&f, DayDeadline::Hours(3)).await.unwrap();
     assert_eq!(deadline(&f).await, Some(at("2026-03-01T13:00:00Z")));

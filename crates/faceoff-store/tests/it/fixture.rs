@@ -156,7 +156,9 @@ impl TestStore {
                 Job::Scoring { .. } => {
                     self.finish(&claim, score, "d").await;
                 }
-                Job::Validation { .. } | Job::Game { .. } => panic!("expected no validation run and no game"),
+                Job::Validation { .. } | Job::Game { .. } => {
+                    panic!("expected no validation run and no game")
+                }
             }
         }
     }
@@ -228,7 +230,12 @@ impl TestStore {
             .unwrap()
     }
 
-    pub async fn commit_shard(&self, claim: &JobClaim, shard: &Shard, faults: u32) -> CommitOutcome {
+    pub async fn commit_shard(
+        &self,
+        claim: &JobClaim,
+        shard: &Shard,
+        faults: u32,
+    ) -> CommitOutcome {
         self.store
             .commit_shard(claim, commit(shard, faults), self.now)
             .await

@@ -55,7 +55,9 @@ impl History {
             Job::Scoring { .. } => {
                 f.finish(&claim, 1.0, "d").await;
             }
-            Job::Validation { .. } | Job::Game { .. } => unreachable!("the only validation run is over"),
+            Job::Validation { .. } | Job::Game { .. } => {
+                unreachable!("the only validation run is over")
+            }
         }
     }
 }

@@ -68,7 +68,10 @@ async fn child_process_writes_until_killed() {
             .invite(Actor::Organiser, invitation, now)
             .await
             .unwrap();
-        let joined = store.join(join_request(code, name.as_str()), now).await.unwrap();
+        let joined = store
+            .join(join_request(code, name.as_str()), now)
+            .await
+            .unwrap();
         report(format!("joined {}", joined.user.id));
         if round % 2 == 1 {
             let person = joined.user.id;
@@ -285,7 +288,10 @@ async fn remove_files(
 /// Applies finished proposals, and then replaces a counting evaluation by an extra one.
 async fn apply_played(store: &Store, now: jiff::Timestamp, report: &impl Fn(String)) {
     for (proposal, evaluations) in open_proposals(store).await {
-        if !evaluations.iter().all(|evaluation| evaluation.state.is_over()) {
+        if !evaluations
+            .iter()
+            .all(|evaluation| evaluation.state.is_over())
+        {
             continue;
         }
         match store.apply_proposal(Actor::Organiser, proposal, now).await {
@@ -346,7 +352,10 @@ async fn organiser_operations_survive_kill_9() {
     let acknowledged = survive(&[60, 31, 47, 80], false).await;
     for operation in ["disqualified", "voided", "proposal", "dropped", "applied"] {
         let is_reported = |write: &String| write.starts_with(operation);
-        assert!(acknowledged.iter().any(is_reported), "no process reached {operation}");
+        assert!(
+            acknowledged.iter().any(is_reported),
+            "no process reached {operation}"
+        );
     }
 }
 
@@ -359,7 +368,10 @@ async fn file_removal_survives_kill_9() {
     }
     for operation in ["keeps", "removed", "deleted"] {
         let is_reported = |write: &String| write.starts_with(operation);
-        assert!(acknowledged.iter().any(is_reported), "no process reached {operation}");
+        assert!(
+            acknowledged.iter().any(is_reported),
+            "no process reached {operation}"
+        );
     }
 }
 
@@ -374,7 +386,12 @@ async fn survive(kill_after_lines: &[usize], clears: bool) -> HashSet<String> {
             command.env(CLEARS, "1");
         }
         let mut child = command
-            .args(["--exact", "kill::child_process_writes_until_killed", "--ignored", "--nocapture"])
+            .args([
+                "--exact",
+                "kill::child_process_writes_until_killed",
+                "--ignored",
+                "--nocapture",
+            ])
             .env(FOLDER, folder.path())
             .stdout(Stdio::piped())
             .stderr(Stdio::null())
@@ -410,7 +427,11 @@ async fn survive(kill_after_lines: &[usize], clears: bool) -> HashSet<String> {
         let seen: Vec<String> = reports.take(line_count).collect();
         child.kill().unwrap();
         child.wait().unwrap();
-        assert_eq!(seen.len(), line_count, "the child ended before it was killed");
+        assert_eq!(
+            seen.len(),
+            line_count,
+            "the child ended before it was killed"
+        );
         acknowledged.extend(seen);
 
         let store = Store::open(folder.path()).await.unwrap();
@@ -565,8 +586,14 @@ async fn check_consistency(folder: &Path, store: &Store) {
     .unwrap();
     for (dataset, is_available, is_deleted) in datasets {
         let exists = store.artifacts().read(&dataset).await.is_ok();
-        assert!(exists || !is_available, "{dataset} should be available and is missing");
-        assert!(!exists || !is_deleted, "{dataset} is marked as deleted and exists");
+        assert!(
+            exists || !is_available,
+            "{dataset} should be available and is missing"
+        );
+        assert!(
+            !exists || !is_deleted,
+            "{dataset} is marked as deleted and exists"
+        );
     }
     let recordings: Vec<String> =
         sqlx::query_scalar("SELECT recording FROM shards WHERE recording IS NOT NULL")

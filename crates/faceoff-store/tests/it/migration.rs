@@ -102,8 +102,15 @@ impl Old {
             bundle().blake3
         ))
         .await;
-        self.unit("smoke", validation, number, "submission_id", &id, number + 900)
-            .await;
+        self.unit(
+            "smoke",
+            validation,
+            number,
+            "submission_id",
+            &id,
+            number + 900,
+        )
+        .await;
     }
 
     async fn unit(
@@ -405,9 +412,16 @@ async fn migration_keeps_all_old_rows() {
     assert_eq!(submission(1).await.state, SubmissionState::Validating);
     // The teams' tokens are valid.
     let token = *blake3::hash(&11_u32.to_le_bytes()).as_bytes();
-    let holder = f.store.verify_token(token, TokenKind::ApiToken, f.now).await.unwrap();
+    let holder = f
+        .store
+        .verify_token(token, TokenKind::ApiToken, f.now)
+        .await
+        .unwrap();
     let team = f.store.team(id(11)).await.unwrap();
-    assert_eq!(holder.map(|holder| holder.principal), Ok(Principal::Team(team)));
+    assert_eq!(
+        holder.map(|holder| holder.principal),
+        Ok(Principal::Team(team))
+    );
     let reason = "no answer".to_owned();
     assert_eq!(
         submission(3).await.state,
@@ -613,7 +627,10 @@ async fn migration_keeps_leases_and_failure_counts() {
         "the key of the old program"
     );
     let shard = f.store.shards(run).await.unwrap().remove(1);
-    assert_eq!(f.commit_shard(&claim, &shard, 0).await, CommitOutcome::Stored);
+    assert_eq!(
+        f.commit_shard(&claim, &shard, 0).await,
+        CommitOutcome::Stored
+    );
 
     let claim = JobClaim {
         job: id(1203),

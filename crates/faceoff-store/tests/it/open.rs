@@ -24,10 +24,7 @@ async fn concurrent_openers_agree_on_one_season() {
     commitments.dedup();
     assert_eq!(commitments.len(), 1);
     let another = TestStore::new().await.store.season().await.unwrap();
-    assert_ne!(
-        another.commitment, commitments[0],
-        "secrets are random"
-    );
+    assert_ne!(another.commitment, commitments[0], "secrets are random");
 }
 
 #[tokio::test]

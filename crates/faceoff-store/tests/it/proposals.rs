@@ -72,7 +72,10 @@ async fn trial_runs_last_and_reaches_no_board() {
             .iter()
             .all(|one| one.state == EvaluationState::Queued)
     );
-    assert!(f.store.days().await.unwrap().is_empty(), "no day has started");
+    assert!(
+        f.store.days().await.unwrap().is_empty(),
+        "no day has started"
+    );
     // The evaluations of the day run first.
     let day = f.evaluate(agents[0].id, &small()).await;
     for _ in 0..2 {
@@ -139,7 +142,10 @@ async fn impossible_trial_is_refused() {
     // It is dropped while a shard runs, and the worker is notified.
     let (claim, _, shard) = f.claim_shard().await;
     discard(&f, one.id).await.unwrap();
-    assert_eq!(f.commit_shard(&claim, &shard, 0).await, CommitOutcome::LeaseLost);
+    assert_eq!(
+        f.commit_shard(&claim, &shard, 0).await,
+        CommitOutcome::LeaseLost
+    );
     assert!(f.claim().await.is_none());
     let closing = StageChange {
         closes_at: Some(Some(f.now + jiff::SignedDuration::from_secs(1))),

@@ -62,18 +62,30 @@ async fn expired_lease_is_reassigned_and_old_holder_refused() {
         "an expired lease is reassigned"
     );
     assert!(!f.store.heartbeat(&first, 1, LEASE_S, f.now).await.unwrap());
-    assert_eq!(f.commit_shard(&first, &shard, 0).await, CommitOutcome::LeaseLost);
+    assert_eq!(
+        f.commit_shard(&first, &shard, 0).await,
+        CommitOutcome::LeaseLost
+    );
     f.store.release(&first, f.now).await.unwrap();
     f.store
         .release_failed(&first, "too late", f.now)
         .await
         .unwrap();
     assert!(
-        f.store.heartbeat(&successor, 1, LEASE_S, f.now).await.unwrap(),
+        f.store
+            .heartbeat(&successor, 1, LEASE_S, f.now)
+            .await
+            .unwrap(),
         "the new lease is not affected"
     );
-    assert_eq!(f.commit_shard(&successor, &shard, 0).await, CommitOutcome::Stored);
-    assert_eq!(f.commit_shard(&first, &shard, 0).await, CommitOutcome::LeaseLost);
+    assert_eq!(
+        f.commit_shard(&successor, &shard, 0).await,
+        CommitOutcome::Stored
+    );
+    assert_eq!(
+        f.commit_shard(&first, &shard, 0).await,
+        CommitOutcome::LeaseLost
+    );
 }
 
 #[tokio::test]
@@ -83,10 +95,21 @@ async fn job_filter_limits_claims() {
     let evaluation = f.evaluate(submission.id, &plan()).await;
     let team = f.team("Beta").await;
     f.upload(&team).await;
-    let claim = async |filter| f.store.claim_matching(filter, "slot", LEASE_S, f.now).await.unwrap();
+    let claim = async |filter| {
+        f.store
+            .claim_matching(filter, "slot", LEASE_S, f.now)
+            .await
+            .unwrap()
+    };
     let validation = claim(JobFilter::ValidationAndScoring).await.unwrap();
-    assert!(matches!(validation.job, Job::Validation { .. }), "{validation:?}");
-    assert!(claim(JobFilter::ValidationAndScoring).await.is_none(), "shards are not claimed");
+    assert!(
+        matches!(validation.job, Job::Validation { .. }),
+        "{validation:?}"
+    );
+    assert!(
+        claim(JobFilter::ValidationAndScoring).await.is_none(),
+        "shards are not claimed"
+    );
     while let Some(ClaimedJob { claim, job }) = claim(JobFilter::ShardsAndGames).await {
         let Job::Shard { shard, .. } = job else {
             panic!("expected a shard");
@@ -108,7 +131,12 @@ async fn lease_transfer_succeeds_for_one_worker() {
     let claimed = f.store.claim("reserved", LEASE_S, f.now).await;
     let ClaimedJob { claim, .. } = claimed.unwrap().unwrap();
     f.later(i64::from(LEASE_S) - 1);
-    let transfer = async |to: &str| f.store.transfer_lease(&claim, to, LEASE_S, f.now).await.unwrap();
+    let transfer = async |to: &str| {
+        f.store
+            .transfer_lease(&claim, to, LEASE_S, f.now)
+            .await
+            .unwrap()
+    };
     assert!(transfer("one").await);
     assert!(!transfer("another").await);
     assert!(
@@ -129,7 +157,8 @@ async fn lease_transfer_succeeds_for_one_worker() {
         "another worker holds the lease"
     );
     // A started job cannot be released; one that was not started goes to the next claim.
-    let release_unstarted = async |claim: &JobClaim| f.store.release_unstarted(claim, f.now).await.unwrap();
+    let release_unstarted =
+        async |claim: &JobClaim| f.store.release_unstarted(claim, f.now).await.unwrap();
     assert!(!release_unstarted(&claim).await);
     assert!(is_leased().await);
     let claimed = f.store.claim("reserved", LEASE_S, f.now).await;
@@ -177,7 +206,11 @@ async fn dead_workers_leases_end_at_once() {
     while let Some(claimed) = f.claim().await {
         reclaimed.push(claimed.claim.job);
     }
-    assert_eq!(reclaimed.len(), 5, "three of the dead worker and two unclaimed ones");
+    assert_eq!(
+        reclaimed.len(),
+        5,
+        "three of the dead worker and two unclaimed ones"
+    );
     assert!(!reclaimed.contains(&claims[2].job));
     assert!(
         f.store
@@ -194,7 +227,10 @@ async fn late_commit_counts_without_a_new_lease() {
     f.evaluate(submission.id, &plan()).await;
     let (claim, _, shard) = f.claim_shard().await;
     f.later(3600);
-    assert_eq!(f.commit_shard(&claim, &shard, 0).await, CommitOutcome::Stored);
+    assert_eq!(
+        f.commit_shard(&claim, &shard, 0).await,
+        CommitOutcome::Stored
+    );
 }
 
 #[tokio::test]
@@ -203,7 +239,10 @@ async fn second_commit_changes_nothing() {
     let submission = f.ready_team("Alpha").await;
     let evaluation = f.evaluate(submission.id, &plan()).await;
     let (claim, _, shard) = f.claim_shard().await;
-    assert_eq!(f.commit_shard(&claim, &shard, 0).await, CommitOutcome::Stored);
+    assert_eq!(
+        f.commit_shard(&claim, &shard, 0).await,
+        CommitOutcome::Stored
+    );
     let mut other = commit(&shard, 2);
     other.recording = Some("recordings/other".into());
     let repeated = f.store.commit_shard(&claim, other, f.now).await.unwrap();

@@ -29,7 +29,10 @@ async fn run_next(f: &mut TestStore) -> bool {
                 timing: Vec::new(),
                 log: String::new(),
             };
-            f.store.commit_validation(&claim, outcome, f.now).await.unwrap();
+            f.store
+                .commit_validation(&claim, outcome, f.now)
+                .await
+                .unwrap();
         }
         Job::Shard { shard, .. } => {
             f.later(10);
@@ -87,7 +90,10 @@ async fn forecast_uses_recent_durations() {
     f.later(10);
     let estimate = forecast(&f).await;
     let found = estimate.submissions[&submission.id];
-    assert_eq!(found.expected_at, Some(f.now + SignedDuration::from_secs(10)));
+    assert_eq!(
+        found.expected_at,
+        Some(f.now + SignedDuration::from_secs(10))
+    );
     assert_eq!(found.position, 1);
     f.store.release(&held.claim, f.now).await.unwrap();
     for _ in uploads {
@@ -131,7 +137,11 @@ async fn forecast_uses_recent_durations() {
     assert_eq!(order, [1, 2, 3]);
     // With two slots it takes as long as the longest sequence.
     let with_two = f.store.queue_forecast(2, f.now).await.unwrap();
-    let last = with_two.evaluations.values().map(|one| one.expected_at).max();
+    let last = with_two
+        .evaluations
+        .values()
+        .map(|one| one.expected_at)
+        .max();
     let last = last.unwrap().unwrap().duration_since(f.now).as_secs();
     assert!((34..=44).contains(&last), "{last}");
     // The forecast is what happens.
@@ -155,7 +165,10 @@ async fn paused_queue_has_positions_without_times() {
     let paused = f.store.pause_queue(Actor::Organiser, "new disks", f.now);
     paused.await.unwrap();
     let found = forecast(&f).await.submissions[&upload.id];
-    assert_eq!((found.position, found.total, found.expected_at), (1, 1, None));
+    assert_eq!(
+        (found.position, found.total, found.expected_at),
+        (1, 1, None)
+    );
     // Durations measured more than a week ago are ignored.
     f.store.resume_queue(Actor::Organiser, f.now).await.unwrap();
     f.later(8 * 24 * 3600);

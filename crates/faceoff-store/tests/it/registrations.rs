@@ -54,7 +54,11 @@ async fn registration_link_is_valid_once_approved() {
     let at = f.now;
     let state = RegistrationState::Approved { at, team: team.id };
     assert_eq!(approved.state, state);
-    let joined = f.store.join(join_request([1; 32], "Ada"), f.now).await.unwrap();
+    let joined = f
+        .store
+        .join(join_request([1; 32], "Ada"), f.now)
+        .await
+        .unwrap();
     assert_eq!(joined.team, Some(team));
     let twice = f
         .store

@@ -31,7 +31,11 @@ async fn day_is_released_by_its_last_evaluation() {
         None
     );
     f.later(86_400);
-    assert_eq!(released_at(&f).await, None, "an evaluation can outlast its day");
+    assert_eq!(
+        released_at(&f).await,
+        None,
+        "an evaluation can outlast its day"
+    );
     assert_eq!(f.finish_next().await, evaluations[1]);
     let end = f.now;
     f.later(60);
@@ -124,7 +128,9 @@ async fn platform_faults_rerun_before_release_with_a_limit() {
     };
     assert_eq!(
         seeds.episodes,
-        secret.stage(first.stage_day.stage).day(first.stage_day.date)
+        secret
+            .stage(first.stage_day.stage)
+            .day(first.stage_day.date)
     );
     assert_eq!(evaluated, bundle());
     f.store.release(&claim, f.now).await.unwrap();

@@ -3,7 +3,9 @@
 use crate::fixture::*;
 use faceoff_store::*;
 use faceoff_types::*;
-use sqlx::{AssertSqlSafe, Connection, SqliteConnection, migrate::Migrator, sqlite::SqliteConnectOptions};
+use sqlx::{
+    AssertSqlSafe, Connection, SqliteConnection, migrate::Migrator, sqlite::SqliteConnectOptions,
+};
 use std::path::Path;
 
 /// The first migration that the old version does not have.
@@ -105,7 +107,10 @@ impl OldDatabase {
 }
 
 fn new_columns(old: &[String]) -> String {
-    let names: Vec<_> = old.iter().map(|column| new_name(&COLUMNS, column)).collect();
+    let names: Vec<_> = old
+        .iter()
+        .map(|column| new_name(&COLUMNS, column))
+        .collect();
     names.join(", ")
 }
 
@@ -115,9 +120,9 @@ async fn filled_store() -> TestStore {
     let agents = [f.ready_team("Alpha").await, f.ready_team("Beta").await];
     let of = f.evaluate(agents[0].id, &small()).await.stage_day;
     f.run_all(1.0).await;
-    let proposed = f
-        .store
-        .propose_reevaluation(Actor::Organiser, Reevaluation::Day(of), "a reason", f.now);
+    let proposed =
+        f.store
+            .propose_reevaluation(Actor::Organiser, Reevaluation::Day(of), "a reason", f.now);
     proposed.await.unwrap();
     f.run_all(2.0).await;
     f.later(24 * 3600);

@@ -152,7 +152,11 @@ async fn retention_keeps_last_and_best_of_each_team() {
     let all = f.store.apply_retentions(f.now).await.unwrap();
     assert!(all.is_empty(), "by default everything is kept");
 
-    let preview = f.store.preview_removal(stage, &last(2), f.now).await.unwrap();
+    let preview = f
+        .store
+        .preview_removal(stage, &last(2), f.now)
+        .await
+        .unwrap();
     let expected = RemovalSummary {
         datasets: 3,
         teams: 2,
@@ -182,7 +186,10 @@ async fn retention_keeps_last_and_best_of_each_team() {
     let events = f.store.events_after(0, 10_000).await.unwrap();
     let is_removal = |event: &Event| matches!(event, Event::DatasetRemoved { .. });
     assert_eq!(
-        events.iter().filter(|record| is_removal(&record.event)).count(),
+        events
+            .iter()
+            .filter(|record| is_removal(&record.event))
+            .count(),
         3
     );
 
@@ -249,7 +256,11 @@ async fn retention_waits_for_open_evaluations_and_trials() {
     let expect_no_removal = async |f: &TestStore| {
         assert!(f.store.apply_retentions(f.now).await.unwrap().is_empty());
         // The preview still shows what will be removed later.
-        let preview = f.store.preview_removal(stage, &last(1), f.now).await.unwrap();
+        let preview = f
+            .store
+            .preview_removal(stage, &last(1), f.now)
+            .await
+            .unwrap();
         assert_eq!(preview.datasets, 2);
     };
     // A pending trial.
@@ -301,7 +312,10 @@ async fn retention_keeps_datasets_of_blind_stage() {
     keep(&f, stage, last(1)).await.unwrap();
     assert!(f.store.apply_retentions(f.now).await.unwrap().is_empty());
     // Their size is hidden, too.
-    let storage = f.store.storage(Some(alpha.team), StorageScope::Released).await;
+    let storage = f
+        .store
+        .storage(Some(alpha.team), StorageScope::Released)
+        .await;
     assert_eq!(storage.unwrap()[0].datasets, 0);
     let opened = StageChange {
         settings: Some(StageSettings {
@@ -572,8 +586,14 @@ async fn submission_without_bundle_cannot_be_deleted() {
         timing: Vec::new(),
         log: String::new(),
     };
-    f.store.commit_validation(&claim, outcome, f.now).await.unwrap();
-    refused(delete(waiting.id).await, &["removes its bundle automatically"]);
+    f.store
+        .commit_validation(&claim, outcome, f.now)
+        .await
+        .unwrap();
+    refused(
+        delete(waiting.id).await,
+        &["removes its bundle automatically"],
+    );
     f.store.remove_refused_bundles(f.now).await.unwrap();
     refused(delete(waiting.id).await, &["nothing left to delete"]);
     let none = delete(SubmissionId::new()).await;
@@ -674,7 +694,10 @@ async fn evidence_is_exempt_from_retention_and_deletion() {
     };
     f.later(2 * DAY_S);
     f.store.remove_files_of_removed(f.now).await.unwrap();
-    assert!(has_file(&f, &deleted_early.bundle.key).await, "it is evidence");
+    assert!(
+        has_file(&f, &deleted_early.bundle.key).await,
+        "it is evidence"
+    );
     assert!(has_file(&f, &dataset).await);
     f.store
         .reinstate_team(Actor::Organiser, beta.team, "it did not", f.now)
@@ -745,9 +768,16 @@ async fn storage_is_reported_without_reading_files() {
     let owner = f.store.evaluation(evaluation).await.unwrap().team;
     store_file(&f, "datasets/today.zip", 77).await;
     f.finish(&claim, 1.0, "datasets/today.zip").await;
-    let storage_of_owner = async |counted| f.store.storage(Some(owner), counted).await.unwrap()[0].clone();
-    assert_eq!(storage_of_owner(StorageScope::All).await.dataset_bytes, 1077);
-    assert_eq!(storage_of_owner(StorageScope::Released).await.dataset_bytes, 1000);
+    let storage_of_owner =
+        async |counted| f.store.storage(Some(owner), counted).await.unwrap()[0].clone();
+    assert_eq!(
+        storage_of_owner(StorageScope::All).await.dataset_bytes,
+        1077
+    );
+    assert_eq!(
+        storage_of_owner(StorageScope::Released).await.dataset_bytes,
+        1000
+    );
 
     // Datasets of older versions are measured once; a lost one takes no space.
     let mut connection = f.connection().await;
@@ -766,7 +796,10 @@ async fn storage_is_reported_without_reading_files() {
     assert_eq!(f.store.measure_datasets(f.now).await.unwrap(), 0);
     let measured = storage_of_owner(StorageScope::All).await;
     assert_eq!((measured.dataset_bytes, measured.unmeasured), (1000, 0));
-    let none = f.store.storage(Some(TeamId::new()), StorageScope::All).await;
+    let none = f
+        .store
+        .storage(Some(TeamId::new()), StorageScope::All)
+        .await;
     assert!(none.unwrap().is_empty());
 }
 

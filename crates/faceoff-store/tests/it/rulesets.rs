@@ -74,7 +74,11 @@ async fn upgrade_from(earlier: Ruleset) {
     f.later(24 * 3600);
     f.evaluate(alpha.id, &plan()).await;
     assert_eq!(newest(&f).await, (1, earlier), "until there is a result");
-    assert_eq!(run_evaluation(&f, 20.0).await, earlier, "Beta's was queued before");
+    assert_eq!(
+        run_evaluation(&f, 20.0).await,
+        earlier,
+        "Beta's was queued before"
+    );
     assert_eq!(run_evaluation(&f, 30.0).await, Ruleset::CURRENT);
     assert_eq!(newest(&f).await, (2, Ruleset::CURRENT));
     assert_eq!(teams(&f, 1).await, ["Alpha", "Beta"]);

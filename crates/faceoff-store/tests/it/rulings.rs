@@ -52,7 +52,10 @@ async fn voided_result_leaves_board_and_can_be_rerun() {
     let mut f = TestStore::new().await;
     let agent = f.ready_team("Alpha").await;
     let first = f.evaluate(agent.id, &small()).await;
-    refused(void(&f, first.id).await, &["queued or running", "cancelled"]);
+    refused(
+        void(&f, first.id).await,
+        &["queued or running", "cancelled"],
+    );
     f.finish_next().await;
     f.later(24 * 3600);
     let second = f.evaluate(agent.id, &small()).await;
@@ -85,7 +88,10 @@ async fn voided_result_leaves_board_and_can_be_rerun() {
 
     let rerun = f.store.rerun_evaluation(Actor::Organiser, second.id, f.now);
     let rerun = rerun.await.unwrap();
-    assert_eq!((rerun.rerun_of, rerun.stage_day), (Some(second.id), second.stage_day));
+    assert_eq!(
+        (rerun.rerun_of, rerun.stage_day),
+        (Some(second.id), second.stage_day)
+    );
     f.run_all(3.0).await;
     assert_eq!(on_board(&f).await, [("Alpha".to_owned(), 3.0)]);
     let twice = f
@@ -153,7 +159,8 @@ async fn voided_day_is_over_at_once() {
     let of = f.evaluate(alpha.id, &small()).await.stage_day;
     let under_way = f.evaluate(beta.id, &small()).await.id;
     let done = f.finish_next().await;
-    let void_day = async |f: &TestStore| f.store.void_day(Actor::Organiser, of, REASON, f.now).await;
+    let void_day =
+        async |f: &TestStore| f.store.void_day(Actor::Organiser, of, REASON, f.now).await;
     let before = newest_event(&f).await;
     f.later(60);
     assert_eq!(void_day(&f).await.unwrap(), 2);
@@ -178,7 +185,10 @@ async fn voided_day_is_over_at_once() {
         date: of.date.tomorrow().unwrap(),
         ..of
     };
-    let none = f.store.void_day(Actor::Organiser, other, REASON, f.now).await;
+    let none = f
+        .store
+        .void_day(Actor::Organiser, other, REASON, f.now)
+        .await;
     assert!(matches!(none, Err(StoreError::NotFound("day"))), "{none:?}");
     for id in [done, under_way] {
         let rerun = f.store.rerun_evaluation(Actor::Organiser, id, f.now);

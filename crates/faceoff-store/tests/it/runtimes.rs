@@ -54,7 +54,11 @@ async fn submission_with_unknown_runtime_must_be_uploaded_again() {
     let stage = f.stage(&plan()).await;
     let active = || async { f.store.active_submissions().await.unwrap().remove(0) };
     let current = async || f.store.stage(stage).await.unwrap();
-    assert_eq!(current().await.check_accepts(&active().await), Ok(()), "all runtimes are accepted");
+    assert_eq!(
+        current().await.check_accepts(&active().await),
+        Ok(()),
+        "all runtimes are accepted"
+    );
     accept_only(&f, stage, "native").await;
     let refused = current().await.check_accepts(&active().await).unwrap_err();
     assert!(refused.to_string().contains("upload it again"), "{refused}");

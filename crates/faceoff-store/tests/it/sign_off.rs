@@ -362,7 +362,10 @@ async fn final_day_needs_its_own_date_and_a_submission() {
     f.run_all(1.0).await;
     f.now = at(CLOSES);
     let same_date = f.store.start_final_day(Actor::Organiser, stage.id, f.now);
-    assert!(matches!(same_date.await, Err(StoreError::CutoffPassed { .. })));
+    assert!(matches!(
+        same_date.await,
+        Err(StoreError::CutoffPassed { .. })
+    ));
     f.later(24 * 3600);
     let next = f.store.start_final_day(Actor::Organiser, stage.id, f.now);
     assert_eq!(next.await.unwrap().len(), 1);

@@ -387,8 +387,11 @@ async fn ablations_run_last_and_scoring_first() {
     for _ in 0..3 {
         s.f.upload(&sleeper).await;
     }
-    s.run(|_, kind| if kind == Kind::Validation { 50 } else { 10 }, NEVER)
-        .await;
+    s.run(
+        |_, kind| if kind == Kind::Validation { 50 } else { 10 },
+        NEVER,
+    )
+    .await;
     let order = s.order();
     let first_ablation = order
         .iter()
@@ -433,7 +436,11 @@ async fn slot_time_lost_by_the_platform_is_not_charged() {
                 .await
                 .unwrap()
                 .unwrap();
-        assert_eq!(s.team_and_kind(&next.job).await.0, first_team, "before the {ending}");
+        assert_eq!(
+            s.team_and_kind(&next.job).await.0,
+            first_team,
+            "before the {ending}"
+        );
         match ending {
             "shutdown" => {
                 assert!(
@@ -452,7 +459,10 @@ async fn slot_time_lost_by_the_platform_is_not_charged() {
     // The lost job is claimed again, and only its new lease is charged.
     let reclaimed = s.f.claim().await.unwrap();
     let other = s.f.claim().await.unwrap();
-    let teams = [s.team_and_kind(&reclaimed.job).await.0, s.team_and_kind(&other.job).await.0];
+    let teams = [
+        s.team_and_kind(&reclaimed.job).await.0,
+        s.team_and_kind(&other.job).await.0,
+    ];
     assert!(teams[0] != teams[1], "{teams:?}");
 }
 

@@ -193,7 +193,11 @@ async fn new_rules_of_open_stage_create_revision_and_board() {
     assert_eq!((changed.rules.number, changed.rules.since), (2, f.now));
     let same = change(&f, stage.id, others).await.unwrap();
     assert_eq!(same, changed, "identical rules are no change");
-    assert_eq!(f.store.board_revision(&same).await.unwrap(), 1, "there is no result of revision 2 yet");
+    assert_eq!(
+        f.store.board_revision(&same).await.unwrap(),
+        1,
+        "there is no result of revision 2 yet"
+    );
 
     f.now = at("2026-03-02T10:00:00Z");
     let started = start(&f, stage.id).await.unwrap().remove(0);

@@ -28,7 +28,10 @@ async fn team_token_is_valid_until_replaced() {
         .unwrap();
     assert_eq!(f.store.team(team.id).await.unwrap(), team);
     let principal = async |hash| {
-        let holder = f.store.verify_token([hash; 32], TokenKind::ApiToken, f.now).await;
+        let holder = f
+            .store
+            .verify_token([hash; 32], TokenKind::ApiToken, f.now)
+            .await;
         holder.unwrap().map(|holder| holder.principal)
     };
     assert_eq!(principal(7).await, Ok(Principal::Team(team.clone())));

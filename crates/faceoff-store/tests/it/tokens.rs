@@ -16,7 +16,10 @@ fn new(hash: u8, owner: TokenOwner, expires_at: Option<Timestamp>) -> NewToken {
 }
 
 async fn rejection(f: &TestStore, hash: u8) -> Option<TokenRejection> {
-    let holder = f.store.verify_token([hash; 32], TokenKind::ApiToken, f.now).await;
+    let holder = f
+        .store
+        .verify_token([hash; 32], TokenKind::ApiToken, f.now)
+        .await;
     holder.unwrap().err()
 }
 
@@ -39,7 +42,10 @@ async fn token_is_valid_until_expired_rotated_or_revoked() {
     assert!(matches!(repeated, StoreError::Conflict(_)), "{repeated}");
     assert_eq!(rejection(&f, 1).await, None);
     assert_eq!(rejection(&f, 4).await, Some(TokenRejection::Unknown));
-    let as_cookie = f.store.verify_token([1; 32], TokenKind::Session, f.now).await;
+    let as_cookie = f
+        .store
+        .verify_token([1; 32], TokenKind::Session, f.now)
+        .await;
     assert_eq!(as_cookie.unwrap().unwrap_err(), TokenRejection::WrongKind);
 
     f.store
@@ -119,7 +125,11 @@ async fn host_token_follows_its_file_and_stays_revoked() {
     assert!(f.store.set_host_token([2; 32], f.now).await.unwrap());
     assert_eq!(rejection(&f, 1).await, Some(TokenRejection::Revoked(f.now)));
     assert_eq!(rejection(&f, 2).await, None);
-    assert_eq!(rejection(&f, 9).await, None, "other host tokens are not affected");
+    assert_eq!(
+        rejection(&f, 9).await,
+        None,
+        "other host tokens are not affected"
+    );
     // If the file token could be rotated, the next start would restore the old secret from the file.
     let tokens = f.store.tokens().await.unwrap();
     let of_file = tokens

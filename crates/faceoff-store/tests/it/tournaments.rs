@@ -23,7 +23,11 @@ fn round(number: u32) -> RoundNumber {
 }
 
 /// A tournament with these rules and teams, each of which has a valid submission.
-async fn opened(f: &TestStore, names: &[&str], rules: TournamentRules) -> (Tournament, Vec<TeamId>) {
+async fn opened(
+    f: &TestStore,
+    names: &[&str],
+    rules: TournamentRules,
+) -> (Tournament, Vec<TeamId>) {
     let mut teams = Vec::new();
     for name in names {
         teams.push(f.ready_team(name).await.team);
@@ -159,7 +163,11 @@ async fn state(f: &TestStore, game: GameId) -> GameState {
     f.store.game(game).await.unwrap().state
 }
 
-fn departure(team: TeamId, kind: DepartureKind, from_round: Option<RoundNumber>) -> DepartureRequest {
+fn departure(
+    team: TeamId,
+    kind: DepartureKind,
+    from_round: Option<RoundNumber>,
+) -> DepartureRequest {
     DepartureRequest {
         team,
         kind,
@@ -275,7 +283,11 @@ async fn round_needs_a_valid_submission_of_each_team() {
         .store
         .leave_tournament(Actor::Organiser, cup.id, &out, f.now)
         .await;
-    assert_eq!(left.unwrap(), None, "before the first round it is only removed");
+    assert_eq!(
+        left.unwrap(),
+        None,
+        "before the first round it is only removed"
+    );
     refused(start(&f, cup.id, &round).await, &["have changed meanwhile"]);
     let two = drawn(1, &[&[[teams[0], teams[1]]]], &[]);
     start(&f, cup.id, &two).await.unwrap();
@@ -385,7 +397,9 @@ async fn game_with_platform_faults_has_attempts_but_no_result() {
         &["have no result"],
     );
     refused(
-        f.store.void_game(Actor::Organiser, game, REASON, f.now).await,
+        f.store
+            .void_game(Actor::Organiser, game, REASON, f.now)
+            .await,
         &["only a game"],
     );
     f.store
@@ -632,7 +646,9 @@ async fn disqualification_also_applies_after_withdrawal() {
             .leave_tournament(Actor::Organiser, cup.id, &request, f.now)
             .await
     };
-    let out = leave(departure(c, DepartureKind::Withdrawn, None)).await.unwrap();
+    let out = leave(departure(c, DepartureKind::Withdrawn, None))
+        .await
+        .unwrap();
     assert_eq!(out.unwrap().from_round, round(2));
     refused(
         leave(departure(c, DepartureKind::Disqualified, Some(round(3)))).await,
@@ -672,7 +688,10 @@ async fn disqualification_also_applies_after_withdrawal() {
     assert!(f.claim().await.is_none(), "queued games are cancelled");
     let entrants = record(&f, cup.id).await.entrants;
     let of_b = entrants.iter().find(|one| one.team == b).unwrap();
-    assert_eq!(of_b.departure.as_ref().unwrap().kind, DepartureKind::Disqualified);
+    assert_eq!(
+        of_b.departure.as_ref().unwrap().kind,
+        DepartureKind::Disqualified
+    );
     refused(
         f.store.close_season(Actor::Organiser, f.now).await,
         &["Cup", "close it first"],
@@ -745,7 +764,11 @@ async fn friendly_games_have_a_quota_and_wait_for_rounds() {
     for _ in 0..3 {
         run_next_game(&f).await;
     }
-    let friendly_games = f.store.games(cup.id, GameFilter::TestAndFriendly(Some(b))).await.unwrap();
+    let friendly_games = f
+        .store
+        .games(cup.id, GameFilter::TestAndFriendly(Some(b)))
+        .await
+        .unwrap();
     assert_eq!(friendly_games.len(), 2, "one of them was cancelled");
     f.later(24 * 3600);
     assert_eq!(f.store.requested_games_on_day(a, f.now).await.unwrap(), 0);
@@ -909,7 +932,9 @@ async fn closed_tournament_is_final_and_frees_bundles() {
     f.store.check_deletable(of_a, f.now).await.unwrap();
     refused(change().await, &["was closed on"]);
     refused(
-        f.store.void_game(Actor::Organiser, game, REASON, f.now).await,
+        f.store
+            .void_game(Actor::Organiser, game, REASON, f.now)
+            .await,
         &["was closed on"],
     );
     let twice = NewTournament {

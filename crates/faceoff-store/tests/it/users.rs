@@ -2,7 +2,7 @@
 
 use crate::fixture::*;
 use faceoff_store::*;
-use faceoff_types::{UserId, TeamId};
+use faceoff_types::{TeamId, UserId};
 use jiff::SignedDuration;
 
 async fn invite(f: &TestStore, code: u8, role: InvitationRole) -> Invitation {
@@ -41,7 +41,10 @@ async fn invitation_creates_one_user_with_its_role() {
     let alpha = f.team("Alpha").await;
     let member = add_user(&f, 1, "Ada", InvitationRole::Member(alpha.id)).await;
     assert_eq!(member.team, Some(alpha.id));
-    assert_eq!(principal(&f, 1).await, Ok(Principal::Member(member.clone(), alpha)));
+    assert_eq!(
+        principal(&f, 1).await,
+        Ok(Principal::Member(member.clone(), alpha))
+    );
     let organiser = add_user(&f, 2, "Grace", InvitationRole::Organiser).await;
     assert_eq!(principal(&f, 2).await, Ok(Principal::Organiser(organiser)));
 
@@ -62,7 +65,11 @@ async fn invitation_creates_one_user_with_its_role() {
     f.later(3600);
     let late = f.store.join(join_request([4; 32], "Eve"), f.now).await;
     words(&late.unwrap_err(), &["expired on"]);
-    assert_eq!(f.store.users().await.unwrap().len(), 2, "no other user joined");
+    assert_eq!(
+        f.store.users().await.unwrap().len(),
+        2,
+        "no other user joined"
+    );
 }
 
 #[tokio::test]
@@ -82,7 +89,11 @@ async fn founder_invitation_requires_a_team_name() {
     nameless.name = None;
     let error = f.store.join(nameless, f.now).await.unwrap_err();
     words(&error, &["name: expected"]);
-    assert_eq!(f.store.teams().await.unwrap().len(), 1, "a failed request changes nothing");
+    assert_eq!(
+        f.store.teams().await.unwrap().len(),
+        1,
+        "a failed request changes nothing"
+    );
     let joined = f.store.join(founder("Beta"), f.now).await.unwrap();
     let team = joined.team.unwrap();
     assert_eq!(team.name.as_str(), "Beta");
@@ -122,7 +133,10 @@ async fn returning_user_keeps_identity_and_gets_new_tokens() {
         .set_password(Actor::User(ada.id), ada.id, "other", by, f.now)
         .await
         .unwrap();
-    assert!(principal(&f, 2).await.is_ok(), "the token of the request stays valid");
+    assert!(
+        principal(&f, 2).await.is_ok(),
+        "the token of the request stays valid"
+    );
 }
 
 #[tokio::test]
@@ -139,7 +153,10 @@ async fn removed_user_loses_all_access() {
     let left = remove(ada.id).await.unwrap();
     assert_eq!(left.left_at, Some(f.now));
     for code in [1, 2] {
-        assert_eq!(principal(&f, code).await, Err(TokenRejection::Revoked(f.now)));
+        assert_eq!(
+            principal(&f, code).await,
+            Err(TokenRejection::Revoked(f.now))
+        );
     }
     assert_eq!(f.store.password_hash_of("Ada").await.unwrap(), None);
     words(&remove(ada.id).await.unwrap_err(), &["has left"]);
@@ -186,7 +203,9 @@ async fn invalid_invitations_are_refused() {
     }
     let many = invite(new(99, InvitationRole::Member(alpha.id), soon)).await;
     words(&many.unwrap_err(), &["which is the limit"]);
-    invite(new(100, InvitationRole::Organiser, soon)).await.unwrap();
+    invite(new(100, InvitationRole::Organiser, soon))
+        .await
+        .unwrap();
 }
 
 #[tokio::test]
@@ -221,7 +240,10 @@ async fn new_terms_block_uploads_until_accepted() {
         .store
         .activate_submission(Actor::Team(alpha.id), submission.id, f.now)
         .await;
-    assert!(matches!(not_accepted, Err(StoreError::TermsNotAccepted { version: 2 })));
+    assert!(matches!(
+        not_accepted,
+        Err(StoreError::TermsNotAccepted { version: 2 })
+    ));
     let upload = f
         .store
         .create_submission(
@@ -232,7 +254,10 @@ async fn new_terms_block_uploads_until_accepted() {
             f.now,
         )
         .await;
-    assert!(matches!(upload, Err(StoreError::TermsNotAccepted { version: 2 })));
+    assert!(matches!(
+        upload,
+        Err(StoreError::TermsNotAccepted { version: 2 })
+    ));
     // The active submission is still evaluated.
     let stage = f.stage(&plan()).await;
     let started = f.store.start_day(Actor::Organiser, stage, f.now).await;
@@ -280,7 +305,11 @@ async fn team_can_be_renamed_described_and_retired() {
         &["division", "no divisions"],
     );
     let unchanged = f.store.team(id).await.unwrap();
-    assert_eq!(unchanged.name.as_str(), "ALPHA", "a failed request changes nothing");
+    assert_eq!(
+        unchanged.name.as_str(),
+        "ALPHA",
+        "a failed request changes nothing"
+    );
     let divisions = ["Students".parse().unwrap(), "Open".parse().unwrap()];
     f.store
         .change_season(Actor::Organiser, None, Some(&divisions), f.now)

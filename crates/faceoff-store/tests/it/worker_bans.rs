@@ -26,11 +26,20 @@ async fn ban_requeues_shards_of_open_runs() {
     let evaluation = f.evaluate(submission.id, &plan()).await;
     // A worker with a similar name and the server's own slot are not affected.
     let (own, own_shard) = claim_for(&f, "slot-0").await;
-    assert_eq!(f.commit_shard(&own, &own_shard, 0).await, CommitOutcome::Stored);
+    assert_eq!(
+        f.commit_shard(&own, &own_shard, 0).await,
+        CommitOutcome::Stored
+    );
     let (similar, similar_shard) = claim_for(&f, "remote/rack-10/slot-0").await;
-    assert_eq!(f.commit_shard(&similar, &similar_shard, 0).await, CommitOutcome::Stored);
+    assert_eq!(
+        f.commit_shard(&similar, &similar_shard, 0).await,
+        CommitOutcome::Stored
+    );
     let (banned, banned_shard) = claim_for(&f, "remote/rack-1/slot-0").await;
-    assert_eq!(f.commit_shard(&banned, &banned_shard, 1).await, CommitOutcome::Stored);
+    assert_eq!(
+        f.commit_shard(&banned, &banned_shard, 1).await,
+        CommitOutcome::Stored
+    );
     let (running, running_shard) = claim_for(&f, "remote/rack-1/slot-1").await;
 
     let rack = worker("rack-1");
@@ -48,13 +57,19 @@ async fn ban_requeues_shards_of_open_runs() {
     assert!(matches!(repeated.await, Err(StoreError::Conflict(_))));
 
     // Its late outcomes change nothing, and both shards go to other workers.
-    assert_eq!(f.commit_shard(&banned, &banned_shard, 0).await, CommitOutcome::LeaseLost);
+    assert_eq!(
+        f.commit_shard(&banned, &banned_shard, 0).await,
+        CommitOutcome::LeaseLost
+    );
     let mut left = vec![banned_shard.id, running_shard.id];
     while let Some(claimed) = f.store.claim("slot-0", LEASE_S, f.now).await.unwrap() {
         match claimed.job {
             Job::Shard { shard, .. } => {
                 left.retain(|id| *id != shard.id);
-                assert_eq!(f.commit_shard(&claimed.claim, &shard, 0).await, CommitOutcome::Stored);
+                assert_eq!(
+                    f.commit_shard(&claimed.claim, &shard, 0).await,
+                    CommitOutcome::Stored
+                );
             }
             Job::Scoring { .. } => {
                 let done = f.finish(&claimed.claim, 0.5, "datasets/alpha").await;
@@ -65,7 +80,10 @@ async fn ban_requeues_shards_of_open_runs() {
         }
     }
     assert!(left.is_empty(), "{left:?}");
-    assert_eq!(f.commit_shard(&running, &running_shard, 0).await, CommitOutcome::LeaseLost);
+    assert_eq!(
+        f.commit_shard(&running, &running_shard, 0).await,
+        CommitOutcome::LeaseLost
+    );
     assert!(matches!(
         f.state(evaluation.id).await,
         EvaluationState::Finished { .. }
@@ -113,8 +131,14 @@ async fn remote_leases_survive_a_server_restart() {
     }
     assert!(next.contains(&unstarted.job) && next.contains(&own.job));
     assert!(!next.contains(&remote.job));
-    assert_eq!(f.commit_shard(&own, &own_shard, 0).await, CommitOutcome::LeaseLost);
-    assert_eq!(f.commit_shard(&remote, &shard, 0).await, CommitOutcome::Stored);
+    assert_eq!(
+        f.commit_shard(&own, &own_shard, 0).await,
+        CommitOutcome::LeaseLost
+    );
+    assert_eq!(
+        f.commit_shard(&remote, &shard, 0).await,
+        CommitOutcome::Stored
+    );
     let is_leased_by = async |name: &str| {
         let worker = worker(name);
         f.store

@@ -58,7 +58,9 @@ fn shard(recording: Option<&str>) -> JobPayload {
             max_faults: 6,
             perturbations: Default::default(),
         },
-        output: recording.map_or(OutputFiles::None, |key| OutputFiles::Recording(key.to_owned())),
+        output: recording.map_or(OutputFiles::None, |key| {
+            OutputFiles::Recording(key.to_owned())
+        }),
     }
 }
 

@@ -1,5 +1,5 @@
 //! The agent protocol and the jobs of slots: valid and invalid answers of agents, and round trips of jobs.
 
 mod answers;
-mod robustness;
 mod job;
+mod robustness;

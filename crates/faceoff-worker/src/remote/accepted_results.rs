@@ -3,10 +3,10 @@
 use super::{
     dispatch::{Dispatcher, POLL_INTERVAL},
     grants::{Acceptance, open_grant, store_result},
-    pending_results::PendingResult,
     names,
+    pending_results::PendingResult,
 };
-use crate::server::{ReleaseReason, LeaseStatus, JobServer};
+use crate::server::{JobServer, LeaseStatus, ReleaseReason};
 use anyhow::Context as _;
 use async_nats::jetstream::{self, AckKind};
 use faceoff_store::{Actor, StoreError, WorkerName};
@@ -182,7 +182,10 @@ impl Dispatcher {
             result.end = JobEnd::Shutdown;
         }
         if let JobEnd::PlatformFault { reason } = &mut result.end {
-            *reason = escape_unprintable(reason).chars().take(MAX_REASON_CHARS).collect();
+            *reason = escape_unprintable(reason)
+                .chars()
+                .take(MAX_REASON_CHARS)
+                .collect();
         }
         let failed = matches!(result.end, JobEnd::PlatformFault { .. });
         let was_played = matches!(result.end, JobEnd::Done { .. });
@@ -256,8 +259,10 @@ impl Dispatcher {
                 bucket.fetch_files(&grant, server.store.artifacts()).await?;
             }
             let job_grant = grant.clone();
-            let stored = tokio::task::spawn_blocking(move || store_result(&server, &checks, &job_grant, result))
-                .await??;
+            let stored = tokio::task::spawn_blocking(move || {
+                store_result(&server, &checks, &job_grant, result)
+            })
+            .await??;
             if let Some(bucket) = &bucket {
                 bucket.delete_files(&grant).await;
             }
@@ -271,7 +276,8 @@ impl Dispatcher {
             }
             let server = self.server.clone();
             let lease_copy = lease.clone();
-            let renewed = tokio::task::spawn_blocking(move || server.renew(&lease_copy, episodes_done)).await;
+            let renewed =
+                tokio::task::spawn_blocking(move || server.renew(&lease_copy, episodes_done)).await;
             if let Err(error) = renewed.map_err(anyhow::Error::from).flatten() {
                 tracing::warn!(job = %lease.job_id, cause = format!("{error:#}"), "the lease of a result under check could not be renewed");
             }

@@ -168,7 +168,11 @@ impl Bucket {
     }
 
     /// Copies the files that were stored under a grant into the artifacts.
-    pub(super) async fn fetch_files(&self, grant: &Grant, artifacts: &Artifacts) -> anyhow::Result<()> {
+    pub(super) async fn fetch_files(
+        &self,
+        grant: &Grant,
+        artifacts: &Artifacts,
+    ) -> anyhow::Result<()> {
         for name in writable_files(grant) {
             let Some(to) = grant.storage_key(name) else {
                 continue;

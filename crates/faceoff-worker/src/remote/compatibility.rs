@@ -5,7 +5,10 @@ use faceoff_types::{PythonInventory, RuntimeContent};
 use faceoff_wire::remote::WorkerCapabilities;
 
 /// The reason why a worker gets no jobs from this server; `None` if it is compatible.
-pub(super) fn incompatibility(own: &WorkerCapabilities, required: &WorkerCapabilities) -> Option<String> {
+pub(super) fn incompatibility(
+    own: &WorkerCapabilities,
+    required: &WorkerCapabilities,
+) -> Option<String> {
     if own.program != required.program {
         return Some(format!(
             "the worker runs another program (version {}, BLAKE3 {}) than the server (version {}, BLAKE3 {}): only the same program \
@@ -38,7 +41,8 @@ pub(super) fn incompatibility(own: &WorkerCapabilities, required: &WorkerCapabil
 /// The difference between a worker's and the server's runtime; `None` if there is none. A runtime that is broken on the
 /// server is not compared.
 fn runtime_difference(own: &RuntimeContent, required: &RuntimeContent) -> Option<String> {
-    let describe = |version: Option<&String>| version.map_or_else(|| "none".to_owned(), Clone::clone);
+    let describe =
+        |version: Option<&String>| version.map_or_else(|| "none".to_owned(), Clone::clone);
     let libc = |own: &Option<String>, required: &Option<String>| {
         (own != required).then(|| {
             format!(
@@ -71,7 +75,9 @@ fn runtime_difference(own: &RuntimeContent, required: &RuntimeContent) -> Option
                 || libc(&own.libc, &required.libc),
                 |(name, own, required)| {
                     let (own, required) = (describe(own), describe(required));
-                    Some(format!("its package {name} is {own}, the server's {required}"))
+                    Some(format!(
+                        "its package {name} is {own}, the server's {required}"
+                    ))
                 },
             )
         }
@@ -173,7 +179,12 @@ mod tests {
                 "aa",
                 vec![
                     native_runtime.clone(),
-                    ("python3", RuntimeContent::Failed { reason: "gone".into() }),
+                    (
+                        "python3",
+                        RuntimeContent::Failed {
+                            reason: "gone".into(),
+                        },
+                    ),
                 ],
                 "it does not work there: gone",
             ),
@@ -189,7 +200,12 @@ mod tests {
         // A runtime that is broken on the server is not required.
         let broken = capabilities(
             "aa",
-            &[("python3", RuntimeContent::Failed { reason: "gone".into() })],
+            &[(
+                "python3",
+                RuntimeContent::Failed {
+                    reason: "gone".into(),
+                },
+            )],
         );
         assert_eq!(
             incompatibility(&capabilities("aa", &[("python3", numpy())]), &broken),

@@ -1,12 +1,12 @@
 //! Checks in advance whether a worker on this machine would get jobs.
 
 use super::{
-    connection::{REQUEST_TIMEOUT, NatsConfig},
+    connection::{NatsConfig, REQUEST_TIMEOUT},
     names::Names,
 };
 use crate::boxed;
 use anyhow::Context as _;
-use faceoff_wire::remote::{WorkerResponse, WorkerRequest, WorkerCapabilities};
+use faceoff_wire::remote::{WorkerCapabilities, WorkerRequest, WorkerResponse};
 use std::time::Duration;
 
 /// Result of the check of the connection to the server.
@@ -23,7 +23,11 @@ const CONNECT_TIMEOUT: Duration = Duration::from_secs(5);
 
 /// Connects to NATS and asks the server, as a worker with this name would, without any side effects.
 #[boxed]
-pub async fn check_connection(nats: &NatsConfig, name: &str, capabilities: &WorkerCapabilities) -> ConnectionCheck {
+pub async fn check_connection(
+    nats: &NatsConfig,
+    name: &str,
+    capabilities: &WorkerCapabilities,
+) -> ConnectionCheck {
     let connected = async {
         let options = nats.options(name).await?;
         let connecting = options

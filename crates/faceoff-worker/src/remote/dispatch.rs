@@ -1,15 +1,15 @@
 //! The server's side of remote work: publishes jobs for free remote slots and accepts their results.
 
 use super::{
-    requests::{RequestHandler, claim},
     bucket::{Bucket, BucketConfig},
-    result_checks::ResultChecks,
     connection::NatsConfig,
     grants::grant_for,
-    pending_results::PendingResults,
     names::{self, ALL, Names, SERVER, UNCLAIMED},
+    pending_results::PendingResults,
+    published_jobs::{PublishedJob, PublishedJobs},
+    requests::{RequestHandler, claim},
+    result_checks::ResultChecks,
     streams::{MESSAGES_LOST, Streams, is_ahead},
-    published_jobs::{PublishedJobs, PublishedJob},
 };
 use crate::{
     boxed,
@@ -26,8 +26,8 @@ use faceoff_store::{JobFilter, Store, StoreError, Workers};
 use faceoff_types::Clock;
 use faceoff_wire::{
     grant::GrantKey,
-    remote::{WorkerCapabilities, RemoteJob},
-    job::{Lease, JobSpec},
+    job::{JobSpec, Lease},
+    remote::{RemoteJob, WorkerCapabilities},
 };
 use futures::StreamExt as _;
 use std::{
@@ -142,11 +142,14 @@ pub async fn dispatch(
     tokio::join!(
         supervisor.run("publish jobs", || dispatcher.publish_jobs(&shutdown)),
         supervisor.run("accept results", || dispatcher.accept_results(&shutdown)),
-        supervisor.run("keep the leases of pending results", || dispatcher.keep_pending(&shutdown)),
+        supervisor.run("keep the leases of pending results", || dispatcher
+            .keep_pending(&shutdown)),
         supervisor.run("answer workers", || requests.run(&shutdown)),
         supervisor.run("relay live games", || requests.relay_games(&shutdown)),
     );
-    dispatcher.requeue_jobs(dispatcher.published_jobs.take_all(), None).await;
+    dispatcher
+        .requeue_jobs(dispatcher.published_jobs.take_all(), None)
+        .await;
     Ok(())
 }
 
@@ -162,7 +165,10 @@ async fn resume_leases(server: &LocalServer) -> anyhow::Result<()> {
     match resumed.await {
         Ok(0) => Ok(()),
         Ok(jobs) => {
-            tracing::info!(jobs, "remote workers have jobs from before the server's start");
+            tracing::info!(
+                jobs,
+                "remote workers have jobs from before the server's start"
+            );
             Ok(())
         }
         // They expire anyway.
@@ -207,7 +213,8 @@ impl Supervisor<'_> {
                 tracing::error!(cause, "cannot {task}; trying again");
                 // While NATS is unreachable, problems that follow from it are not shown.
                 let is_nats_down = self.workers.has_problem(REACH_NATS);
-                self.workers.set_problem(task, (!is_nats_down).then_some(&*cause));
+                self.workers
+                    .set_problem(task, (!is_nats_down).then_some(&*cause));
                 logged = cause;
             }
             tokio::select! {
@@ -244,9 +251,16 @@ impl Dispatcher {
             signal.borrow_and_update();
             let late = self.published_jobs.take_late(Instant::now());
             self.requeue_jobs(late, Some(&stream)).await;
-            let info = consumer.info().await.context("reading the number of waiting slots")?;
+            let info = consumer
+                .info()
+                .await
+                .context("reading the number of waiting slots")?;
             if checked_at.elapsed() >= POLL_INTERVAL {
-                let state = &stream.info().await.context("reading the state of the stream of jobs")?.state;
+                let state = &stream
+                    .info()
+                    .await
+                    .context("reading the state of the stream of jobs")?
+                    .state;
                 anyhow::ensure!(!is_ahead(info, state), MESSAGES_LOST);
                 checked_at = Instant::now();
             }
@@ -274,7 +288,8 @@ impl Dispatcher {
             return Ok(false);
         };
         let (lease, description) = (job.lease.clone(), job.payload.to_string());
-        self.published_jobs.add(lease.clone(), description, Instant::now());
+        self.published_jobs
+            .add(lease.clone(), description, Instant::now());
         match self.publish(*job).await {
             Ok(sequence) => {
                 self.published_jobs

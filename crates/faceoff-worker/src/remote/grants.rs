@@ -3,25 +3,31 @@
 use super::result_checks::ResultChecks;
 use crate::{
     local::LocalServer,
-    server::{ReleaseReason, LeaseStatus, JobServer},
+    server::{JobServer, LeaseStatus, ReleaseReason},
 };
 use faceoff_store::StoreError;
 use faceoff_wire::{
-    grant::{Grant, GrantKey, ExpectedRecording, WriteScope},
+    grant::{ExpectedRecording, Grant, GrantKey, WriteScope},
+    job::{JobPayload, JobReport, JobSpec, Lease, OutputFiles},
     remote::{JobEnd, ResultMessage},
-    job::{JobPayload, OutputFiles, Lease, JobSpec, JobReport},
 };
 
 /// The grant for a job that this program issues.
 pub(super) fn grant_for(job: &JobSpec, program: &str) -> Grant {
     let (bundles, write_scope, expected_recording) = match &job.payload {
         JobPayload::Shard {
-            agent, output, spec, ..
+            agent,
+            output,
+            spec,
+            ..
         } => {
             let (write_scope, expected_recording) = match output {
                 OutputFiles::None => (WriteScope::None, ExpectedRecording::None),
                 OutputFiles::Clips(key) => (WriteScope::File(key.clone()), ExpectedRecording::None),
-                OutputFiles::Recording(key) => (WriteScope::Folder(key.clone()), ExpectedRecording::Shard(spec.clone())),
+                OutputFiles::Recording(key) => (
+                    WriteScope::Folder(key.clone()),
+                    ExpectedRecording::Shard(spec.clone()),
+                ),
             };
             (vec![agent.bundle.clone()], write_scope, expected_recording)
         }
@@ -33,7 +39,10 @@ pub(super) fn grant_for(job: &JobSpec, program: &str) -> Grant {
         } => {
             let bundles = agents.each_ref().map(|agent| agent.bundle.clone());
             let (write_scope, expected_recording) = match recording {
-                Some(key) => (WriteScope::Folder(key.clone()), ExpectedRecording::Game(spec.clone())),
+                Some(key) => (
+                    WriteScope::Folder(key.clone()),
+                    ExpectedRecording::Game(spec.clone()),
+                ),
                 None => (WriteScope::None, ExpectedRecording::None),
             };
             (bundles.into(), write_scope, expected_recording)
@@ -119,7 +128,9 @@ fn store_report(
         if !server.store.workers().close_files(lease.nonce) {
             return Ok(Acceptance::FilesPending);
         }
-        if let Some(difference) = checks.find_difference(grant, &report, server.store.artifacts())? {
+        if let Some(difference) =
+            checks.find_difference(grant, &report, server.store.artifacts())?
+        {
             return Ok(Acceptance::Rejected(difference));
         }
     }

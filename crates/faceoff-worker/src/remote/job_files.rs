@@ -41,22 +41,23 @@ impl JobFiles {
         let links = self.objects.as_ref().map(|objects| &objects.bundles);
         let link = links.map(|links| links.get(blake3));
         let from = self.file_request(Method::GET, &format!("bundles/{blake3}"), link)?;
-        transfer.run(
-            async |http, progress| {
-                let response = check_status(self.request(http, &from).send().await?).await?;
-                let mut file = tokio::fs::File::create(archive).await?;
-                let mut bytes = response.bytes_stream();
-                while let Some(piece) = bytes.try_next().await? {
-                    progress.add(piece.len());
-                    file.write_all(&piece).await?;
-                }
-                file.flush().await?;
-                Ok(())
-            },
-            ended,
-        )
-        .await
-        .with_context(|| format!("fetching the bundle {}", without_query(&from.url)))
+        transfer
+            .run(
+                async |http, progress| {
+                    let response = check_status(self.request(http, &from).send().await?).await?;
+                    let mut file = tokio::fs::File::create(archive).await?;
+                    let mut bytes = response.bytes_stream();
+                    while let Some(piece) = bytes.try_next().await? {
+                        progress.add(piece.len());
+                        file.write_all(&piece).await?;
+                    }
+                    file.flush().await?;
+                    Ok(())
+                },
+                ended,
+            )
+            .await
+            .with_context(|| format!("fetching the bundle {}", without_query(&from.url)))
     }
 
     /// Stores a file under this name, with retries as in [`Self::fetch_bundle`].
@@ -70,27 +71,28 @@ impl JobFiles {
         let links = self.objects.as_ref().map(|objects| &objects.files);
         let link = links.map(|links| links.get(name));
         let to = self.file_request(Method::PUT, &format!("files/{name}"), link)?;
-        transfer.run(
-            async |http, progress| {
-                let body = tokio::fs::File::open(file).await?;
-                let bytes = body.metadata().await?.len();
-                progress.set_total(bytes);
-                let sent = progress.clone();
-                let pieces =
-                    ReaderStream::new(body).inspect_ok(move |piece| sent.add(piece.len()));
-                let response = self
-                    .request(http, &to)
-                    .header(header::CONTENT_LENGTH, bytes)
-                    .body(reqwest::Body::wrap_stream(pieces))
-                    .send()
-                    .await?;
-                let _ = check_status(response).await?;
-                Ok(())
-            },
-            ended,
-        )
-        .await
-        .with_context(|| format!("storing a file at {}", without_query(&to.url)))
+        transfer
+            .run(
+                async |http, progress| {
+                    let body = tokio::fs::File::open(file).await?;
+                    let bytes = body.metadata().await?.len();
+                    progress.set_total(bytes);
+                    let sent = progress.clone();
+                    let pieces =
+                        ReaderStream::new(body).inspect_ok(move |piece| sent.add(piece.len()));
+                    let response = self
+                        .request(http, &to)
+                        .header(header::CONTENT_LENGTH, bytes)
+                        .body(reqwest::Body::wrap_stream(pieces))
+                        .send()
+                        .await?;
+                    let _ = check_status(response).await?;
+                    Ok(())
+                },
+                ended,
+            )
+            .await
+            .with_context(|| format!("storing a file at {}", without_query(&to.url)))
     }
 
     /// The request for a file: by its link, if files are transferred through a bucket.

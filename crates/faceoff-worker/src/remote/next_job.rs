@@ -2,13 +2,13 @@
 
 use super::{
     connection::REQUEST_TIMEOUT,
+    names::{self, JOBS_CONSUMER},
     server_client::ServerClient,
     worker_link::with_timeout,
-    names::{self, JOBS_CONSUMER},
 };
 use anyhow::Context as _;
 use async_nats::jetstream::{Message, consumer::PullConsumer};
-use faceoff_wire::remote::{WorkerResponse, WorkerRequest, JobEnd, RemoteJob};
+use faceoff_wire::remote::{JobEnd, RemoteJob, WorkerRequest, WorkerResponse};
 use futures::StreamExt as _;
 use std::{
     sync::PoisonError,
@@ -35,7 +35,10 @@ impl ServerClient {
         if registered_at().is_some_and(|at| at.elapsed() < REGISTRATION_VALIDITY) {
             return Ok(true);
         }
-        let response = self.link.request(&WorkerRequest::Register(self.link.capabilities.clone())).await?;
+        let response = self
+            .link
+            .request(&WorkerRequest::Register(self.link.capabilities.clone()))
+            .await?;
         let reason = match response {
             WorkerResponse::Accepted => None,
             WorkerResponse::Refused { reason } => Some(reason),
@@ -67,7 +70,9 @@ impl ServerClient {
         let found = self
             .jetstream
             .get_consumer_from_stream(JOBS_CONSUMER, stream);
-        let found: PullConsumer = with_timeout(found).await.context("looking up the consumer of jobs")?;
+        let found: PullConsumer = with_timeout(found)
+            .await
+            .context("looking up the consumer of jobs")?;
         *cached() = Some(found.clone());
         Ok(found)
     }
@@ -109,7 +114,10 @@ impl ServerClient {
     /// registers again to learn the reason.
     fn read(&self, message: &Message) -> Option<RemoteJob> {
         let link = &self.link;
-        let mut logged = link.unreadable.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut logged = link
+            .unreadable
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner);
         match serde_json::from_slice::<RemoteJob>(&message.payload) {
             Ok(job) => {
                 logged.clear();

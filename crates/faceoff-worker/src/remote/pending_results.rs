@@ -82,7 +82,9 @@ impl PendingResults {
     }
 
     fn processing(&self) -> MutexGuard<'_, HashSet<Uuid>> {
-        self.processing.lock().unwrap_or_else(PoisonError::into_inner)
+        self.processing
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
     }
 }
 

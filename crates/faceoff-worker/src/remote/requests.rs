@@ -1,18 +1,18 @@
 //! Answers requests of remote workers, and forwards their live updates of games.
 
 use super::{
-    pending_results::PendingResults,
     compatibility::incompatibility,
     names::{self, ALL, Names, UNCLAIMED},
-    streams::Streams,
+    pending_results::PendingResults,
     published_jobs::PublishedJobs,
+    streams::Streams,
 };
 use async_nats::{Client, Message};
-use faceoff_store::{JobClaim, Store, StoreError, SlotReport, WorkerInfo, WorkerName};
+use faceoff_store::{JobClaim, SlotReport, Store, StoreError, WorkerInfo, WorkerName};
 use faceoff_types::{Clock, escape_unprintable};
 use faceoff_wire::{
-    remote::{WorkerResponse, WorkerRequest, WorkerCapabilities, LiveGameMessage, LiveGameUpdate},
     job::Lease,
+    remote::{LiveGameMessage, LiveGameUpdate, WorkerCapabilities, WorkerRequest, WorkerResponse},
 };
 use futures::StreamExt as _;
 use std::{
@@ -75,7 +75,8 @@ impl RequestHandler {
         let requests = self.client.subscribe(self.names.requests(ALL)).await?;
         let renewals = Renewals::default();
         // Requests are handled concurrently, so that none waits for another's database write.
-        requests.take_until(shutdown.cancelled())
+        requests
+            .take_until(shutdown.cancelled())
             .for_each_concurrent(MAX_CONCURRENT, |request| self.reply_to(request, &renewals))
             .await;
         anyhow::ensure!(shutdown.is_cancelled(), "the connection to NATS has ended");
@@ -122,9 +123,14 @@ impl RequestHandler {
             }
         };
         let ban = self.store.workers().ban_reason(worker.as_str());
-        let ban = ban.map(|reason| format!("the server accepts no results of this worker: {reason}"));
-        if let (WorkerRequest::StartJob { .. } | WorkerRequest::RenewLease { .. } | WorkerRequest::ResultPending { .. }, Some(reason)) =
-            (&request, &ban)
+        let ban =
+            ban.map(|reason| format!("the server accepts no results of this worker: {reason}"));
+        if let (
+            WorkerRequest::StartJob { .. }
+            | WorkerRequest::RenewLease { .. }
+            | WorkerRequest::ResultPending { .. },
+            Some(reason),
+        ) = (&request, &ban)
         {
             return refused(reason);
         }
@@ -132,14 +138,19 @@ impl RequestHandler {
         let backoff = || self.store.workers().backoff_reason(worker.as_str(), now);
         let granted = match request {
             WorkerRequest::Register(capabilities) => {
-                let reason = ban.or_else(|| incompatibility(&capabilities, &self.required)).or_else(backoff);
+                let reason = ban
+                    .or_else(|| incompatibility(&capabilities, &self.required))
+                    .or_else(backoff);
                 let info = info(&capabilities);
                 let workers = self.store.workers();
                 workers.record_poll(worker.as_str(), info, reason.as_deref(), now);
                 return response_for(reason);
             }
             WorkerRequest::CheckRegistration(capabilities) => {
-                return response_for(ban.or_else(|| incompatibility(&capabilities, &self.required)).or_else(backoff));
+                return response_for(
+                    ban.or_else(|| incompatibility(&capabilities, &self.required))
+                        .or_else(backoff),
+                );
             }
             WorkerRequest::StartJob { lease, slot } if names::is_subject_token(&slot) => {
                 if let Some(reason) = backoff() {
@@ -154,7 +165,10 @@ impl RequestHandler {
                 trouble,
             } => {
                 let trouble = trouble.map(|problem| -> String {
-                    escape_unprintable(&problem).chars().take(MAX_PROBLEM_CHARS).collect()
+                    escape_unprintable(&problem)
+                        .chars()
+                        .take(MAX_PROBLEM_CHARS)
+                        .collect()
                 });
                 let held = self.renew(&worker, &lease, episodes_done, renewals).await;
                 self.record_renewal(&worker, &lease, held, trouble.as_deref())
@@ -164,10 +178,14 @@ impl RequestHandler {
                 episodes_done,
                 sequence,
             } => {
-                let held = self.store.is_leased_by(&worker, lease.job_id, lease.nonce).await;
+                let held = self
+                    .store
+                    .is_leased_by(&worker, lease.job_id, lease.nonce)
+                    .await;
                 if matches!(held, Ok(true)) {
                     let now = Instant::now();
-                    self.pending_results.add(lease, episodes_done, sequence, now);
+                    self.pending_results
+                        .add(lease, episodes_done, sequence, now);
                 }
                 held
             }
@@ -217,14 +235,25 @@ impl RequestHandler {
         renewals: &Renewals,
     ) -> Result<bool, StoreError> {
         let every = Duration::from_secs(self.lease_s.into()) / 3;
-        if !self.store.is_leased_by(worker, lease.job_id, lease.nonce).await? {
+        if !self
+            .store
+            .is_leased_by(worker, lease.job_id, lease.nonce)
+            .await?
+        {
             return Ok(false);
         }
         if !renewals.is_due(lease.nonce, done, every, Instant::now()) {
             return Ok(true);
         }
         let is_its_slot = lease.slot.starts_with(&names::slot(worker, ""));
-        let claim = claim(lease, if is_its_slot { &lease.slot } else { worker.as_str() });
+        let claim = claim(
+            lease,
+            if is_its_slot {
+                &lease.slot
+            } else {
+                worker.as_str()
+            },
+        );
         let now = self.clock.now();
         let renewed = self.store.heartbeat(&claim, done, self.lease_s, now);
         let held = renewed.await?;
@@ -249,7 +278,13 @@ impl RequestHandler {
                     description: None,
                     problem: trouble,
                 };
-                workers.record_job(worker.as_str(), slot, lease.job_id, report, self.clock.now());
+                workers.record_job(
+                    worker.as_str(),
+                    slot,
+                    lease.job_id,
+                    report,
+                    self.clock.now(),
+                );
             }
             (Ok(false), _) => workers.end_job(lease.job_id),
             _ => {}
@@ -265,7 +300,8 @@ impl RequestHandler {
                 () = shutdown.cancelled() => return Ok(()),
                 message = updates.next() => message,
             };
-            let message = message.ok_or_else(|| anyhow::anyhow!("the connection to NATS has ended"))?;
+            let message =
+                message.ok_or_else(|| anyhow::anyhow!("the connection to NATS has ended"))?;
             let Ok(update) = serde_json::from_slice::<LiveGameMessage>(&message.payload) else {
                 continue;
             };
@@ -279,11 +315,12 @@ impl RequestHandler {
             if self.streams.are_owned() && has_lease.unwrap_or_default() {
                 let live = self.store.live_games();
                 match update.update {
-                    LiveGameUpdate::Started { steps } => live.begin(update.game, update.attempt, steps),
-                    LiveGameUpdate::Progress {
-                        events,
-                        position,
-                    } => live.advance(update.game, update.attempt, events, Some(position)),
+                    LiveGameUpdate::Started { steps } => {
+                        live.begin(update.game, update.attempt, steps)
+                    }
+                    LiveGameUpdate::Progress { events, position } => {
+                        live.advance(update.game, update.attempt, events, Some(position))
+                    }
                     LiveGameUpdate::Ended => live.end_attempt(update.game, update.attempt),
                 }
             }
@@ -309,7 +346,10 @@ fn response_for(reason: Option<String>) -> WorkerResponse {
 
 /// The description of a worker for organisers, with a limited number of labels.
 fn info(capabilities: &WorkerCapabilities) -> WorkerInfo {
-    let labels = capabilities.labels.iter().take(WorkerCapabilities::MAX_LABELS);
+    let labels = capabilities
+        .labels
+        .iter()
+        .take(WorkerCapabilities::MAX_LABELS);
     WorkerInfo {
         version: capabilities.version.clone(),
         slots: capabilities.slots,

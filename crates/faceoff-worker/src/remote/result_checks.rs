@@ -11,7 +11,7 @@ use faceoff_dataset::{
 use faceoff_store::Artifacts;
 use faceoff_types::{EpisodeOutcome, Side};
 use faceoff_wire::{
-    grant::{Grant, GrantKey, ExpectedRecording},
+    grant::{ExpectedRecording, Grant, GrantKey},
     job::{GameFiles, JobReport},
 };
 use std::{ops::Range, path::Path};
@@ -198,7 +198,9 @@ mod tests {
         assert_eq!(all, [0, 1, 2, 3]);
         assert!(sample_for(1, 1, 3, 5..5).is_empty());
         // Over many leases, all episodes are drawn.
-        let mut seen: Vec<u32> = (0..500).flat_map(|nonce| sample_for(1, nonce, 2, 0..50)).collect();
+        let mut seen: Vec<u32> = (0..500)
+            .flat_map(|nonce| sample_for(1, nonce, 2, 0..50))
+            .collect();
         seen.sort_unstable();
         seen.dedup();
         assert_eq!(seen.len(), 50);

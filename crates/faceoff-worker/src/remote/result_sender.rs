@@ -4,8 +4,8 @@ use super::server_client::{RETRY_INTERVAL, ServerClient};
 use anyhow::Context as _;
 use async_nats::HeaderMap;
 use faceoff_wire::{
-    remote::{JobEnd, ResultMessage},
     job::Lease,
+    remote::{JobEnd, ResultMessage},
 };
 use std::time::{Duration, Instant};
 

@@ -1,17 +1,17 @@
 //! The server as a remote slot sees it. Jobs, requests and results go over NATS, files over the server's HTTP or a bucket.
 
-use super::{connection::REQUEST_TIMEOUT, worker_link::WorkerLink, job_files::JobFiles};
+use super::{connection::REQUEST_TIMEOUT, job_files::JobFiles, worker_link::WorkerLink};
 use crate::{
     full_disk,
-    server::{ClaimResult, GameUpdate, ReleaseReason, LeaseStatus, QueueVersion, JobServer},
+    server::{ClaimResult, GameUpdate, JobServer, LeaseStatus, QueueVersion, ReleaseReason},
 };
 use anyhow::Context as _;
 use async_nats::jetstream::{self, consumer::PullConsumer};
 use faceoff_dataset::CLIPS_FILE;
 use faceoff_types::{BundleRef, GameId};
 use faceoff_wire::{
-    remote::{WorkerResponse, WorkerRequest, JobEnd, RemoteJob, LiveGameMessage, LiveGameUpdate},
-    job::{Lease, JobReport},
+    job::{JobReport, Lease},
+    remote::{JobEnd, LiveGameMessage, LiveGameUpdate, RemoteJob, WorkerRequest, WorkerResponse},
 };
 use std::{
     path::Path,
@@ -191,13 +191,9 @@ impl JobServer for ServerClient {
     fn publish_game(&self, lease: &Lease, (game, attempt): (GameId, u32), update: GameUpdate) {
         let update = match update {
             GameUpdate::Started { steps } => LiveGameUpdate::Started { steps },
-            GameUpdate::Progress {
-                events,
-                position,
-            } => LiveGameUpdate::Progress {
-                events,
-                position,
-            },
+            GameUpdate::Progress { events, position } => {
+                LiveGameUpdate::Progress { events, position }
+            }
             GameUpdate::Ended => LiveGameUpdate::Ended,
         };
         let message = LiveGameMessage {
@@ -246,7 +242,8 @@ impl JobServer for ServerClient {
         };
         let files = self.files();
         self.link.runtime.block_on(async {
-            let sent = tokio::time::timeout(REQUEST_TIMEOUT, self.send_result(lease, &files.grant, end));
+            let sent =
+                tokio::time::timeout(REQUEST_TIMEOUT, self.send_result(lease, &files.grant, end));
             sent.await.context("informing the server")?.map(drop)
         })
     }

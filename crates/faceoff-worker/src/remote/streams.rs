@@ -3,7 +3,7 @@
 
 use super::{
     connection::REQUEST_TIMEOUT,
-    names::{ALL, Names, JOBS_CONSUMER, RESULTS_CONSUMER},
+    names::{ALL, JOBS_CONSUMER, Names, RESULTS_CONSUMER},
 };
 use anyhow::Context as _;
 use async_nats::{
@@ -14,7 +14,7 @@ use async_nats::{
         stream::{self, DiscardPolicy, RawMessageErrorKind, RetentionPolicy, Stream},
     },
 };
-use faceoff_wire::{remote::ResultMessage, job::Lease};
+use faceoff_wire::{job::Lease, remote::ResultMessage};
 use std::{
     sync::atomic::{AtomicBool, Ordering},
     time::Duration,
@@ -69,7 +69,8 @@ impl Streams {
 
     pub(super) async fn results(&self) -> anyhow::Result<PullConsumer> {
         // The owner of the first stream owns the second. Otherwise two new servers could create one each.
-        self.owned_stream(&self.jobs_config(), &self.are_owned[0]).await?;
+        self.owned_stream(&self.jobs_config(), &self.are_owned[0])
+            .await?;
         let stream = self.stream(self.results_config(), &self.are_owned[1]);
         consumer(&stream.await?, results_consumer()).await
     }
@@ -104,7 +105,8 @@ impl Streams {
         let name = self.names.results_stream();
         let stream = self.jetstream.get_stream_no_info(&name).await?;
         // The client has no timeout of its own while NATS is unreachable.
-        let response = tokio::time::timeout(REQUEST_TIMEOUT, stream.get_raw_message(sequence)).await;
+        let response =
+            tokio::time::timeout(REQUEST_TIMEOUT, stream.get_raw_message(sequence)).await;
         match response.context("NATS has not answered in time")? {
             // After a loss another message may have this number.
             Ok(message) => {
@@ -142,7 +144,11 @@ impl Streams {
     }
 
     /// The stream, created if necessary; an error if another server owns it.
-    async fn owned_stream(&self, wanted: &stream::Config, known: &AtomicBool) -> anyhow::Result<Stream> {
+    async fn owned_stream(
+        &self,
+        wanted: &stream::Config,
+        known: &AtomicBool,
+    ) -> anyhow::Result<Stream> {
         let name = &wanted.name;
         let stream = self.jetstream.get_or_create_stream(wanted.clone()).await;
         let stream = stream.with_context(|| format!("setting up the stream {name}"))?;

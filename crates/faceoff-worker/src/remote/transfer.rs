@@ -213,7 +213,9 @@ impl Attempts {
             Some(TransientError::Busy {
                 retry_after: Some(delay),
                 ..
-            }) => (*delay).min(timeouts.max_retry_delay).max(timeouts.retry_delay),
+            }) => (*delay)
+                .min(timeouts.max_retry_delay)
+                .max(timeouts.retry_delay),
             _ => timeouts.retry_delay,
         })
     }

@@ -1,11 +1,11 @@
 //! The process of a remote worker.
 
 use super::{
-    connection::{REQUEST_TIMEOUT, NatsConfig},
-    server_client::ServerClient,
-    worker_link::WorkerLink,
+    connection::{NatsConfig, REQUEST_TIMEOUT},
     names::{self, Names},
+    server_client::ServerClient,
     transfer::{FileTransfer, TransferTimeouts},
+    worker_link::WorkerLink,
 };
 use crate::{
     boxed,
@@ -45,7 +45,10 @@ const IDLE_CHECK_INTERVAL: Duration = Duration::from_secs(1);
 /// # Errors
 /// If a name is invalid, the scratch folder cannot be locked, or a slot dies.
 #[boxed]
-pub async fn run_remote_worker(config: RemoteWorker, shutdown: CancellationToken) -> anyhow::Result<()> {
+pub async fn run_remote_worker(
+    config: RemoteWorker,
+    shutdown: CancellationToken,
+) -> anyhow::Result<()> {
     let names = Names::new(&config.nats.name)?;
     let name = config.name.parse::<WorkerName>().ok();
     let name = name.filter(|name| name.as_str() != names::SERVER);

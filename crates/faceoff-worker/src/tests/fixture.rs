@@ -11,10 +11,11 @@ use crate::{
     slot_threads::SlotThreads,
 };
 use faceoff_metrics::Metrics;
-use faceoff_replay::{EpisodeLine, Key, PackWriter, ClipIndex};
+use faceoff_replay::{ClipIndex, EpisodeLine, Key, PackWriter};
 use faceoff_runner::{
-    AgentEnvironment, AssembledDataset, CLIPS_FILE, EvaluationMeta, LiveFeedSink, GameReport, GameSpec,
-    Observer, PlatformFault, ShardReport, ShardSpec, ValidationReport, ValidationSpec, TimeLimits,
+    AgentEnvironment, AssembledDataset, CLIPS_FILE, EvaluationMeta, GameReport, GameSpec,
+    LiveFeedSink, Observer, PlatformFault, ShardReport, ShardSpec, TimeLimits, ValidationReport,
+    ValidationSpec,
     bundle::{Bundle, BundleError, BundleLimits},
 };
 use faceoff_sandbox::{Isolation, Limits};

@@ -1,8 +1,8 @@
 //! Full disks at moments that a real disk cannot be made to choose.
 
 use super::{
-    intercepted_server::{InterceptedServer, Interception},
     fixture::*,
+    intercepted_server::{InterceptedServer, Interception},
 };
 use faceoff_runner::PlatformFault;
 use faceoff_store::*;
@@ -51,7 +51,9 @@ async fn commit_waits_for_disk_space_without_replaying() {
     let running = server.start_intercepted_slots(1, &evaluator, |local| {
         InterceptedServer::new(local, move |moment| match moment {
             // Fails most calls, although the report was stored.
-            Interception::Committed(_) if failures.fetch_add(1, Ordering::SeqCst) % 4 < 3 => Err(full()),
+            Interception::Committed(_) if failures.fetch_add(1, Ordering::SeqCst) % 4 < 3 => {
+                Err(full())
+            }
             _ => Ok(()),
         })
     });

@@ -1,8 +1,8 @@
 //! Games: jobs, attempts, recordings and live updates, with a scripted evaluator.
 
 use super::{
-    intercepted_server::{InterceptedServer, Interception},
     fixture::*,
+    intercepted_server::{InterceptedServer, Interception},
 };
 use crate::server::{ClaimResult, JobServer as _};
 use faceoff_runner::PlatformFault;
@@ -58,7 +58,11 @@ async fn one_game(server: &Server, rules: TournamentRules) -> Game {
 }
 
 /// Waits until the game's state satisfies a condition.
-async fn wait_for_state(server: &Server, id: GameId, condition: impl Fn(&GameState) -> bool) -> GameState {
+async fn wait_for_state(
+    server: &Server,
+    id: GameId,
+    condition: impl Fn(&GameState) -> bool,
+) -> GameState {
     let mut events = server.store.events();
     loop {
         let state = server.store.game(id).await.unwrap().state;
@@ -157,7 +161,10 @@ async fn platform_fault_ends_game_without_result_until_rerun() {
         reason.contains("the recording could not be made"),
         "{reason}"
     );
-    assert_eq!(ends(&server, game).await, [AttemptOutcome::PlatformFailed; 5]);
+    assert_eq!(
+        ends(&server, game).await,
+        [AttemptOutcome::PlatformFailed; 5]
+    );
     running.stop().await;
 
     let rerun = server
@@ -179,7 +186,11 @@ async fn platform_fault_ends_game_without_result_until_rerun() {
         let log = server.store.game_log(game, side).await.unwrap();
         assert_eq!(log.as_deref(), Some(expected));
     }
-    assert_eq!(seeds.lock().unwrap().len(), 1, "all attempts have the same seed");
+    assert_eq!(
+        seeds.lock().unwrap().len(),
+        1,
+        "all attempts have the same seed"
+    );
     running.stop().await;
 }
 

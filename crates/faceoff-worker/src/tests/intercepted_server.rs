@@ -2,10 +2,10 @@
 
 use crate::{
     local::LocalServer,
-    server::{ClaimResult, GameUpdate, ReleaseReason, LeaseStatus, QueueVersion, JobServer},
+    server::{ClaimResult, GameUpdate, JobServer, LeaseStatus, QueueVersion, ReleaseReason},
 };
 use faceoff_types::{BundleRef, GameId};
-use faceoff_wire::job::{Lease, JobReport};
+use faceoff_wire::job::{JobReport, Lease};
 use std::{path::Path, sync::Arc, time::Duration};
 use tokio_util::sync::CancellationToken;
 

@@ -1,8 +1,8 @@
 //! Shutdowns, lost leases, cancelled evaluations and restarts.
 
 use super::{
-    intercepted_server::{InterceptedServer, Interception},
     fixture::*,
+    intercepted_server::{InterceptedServer, Interception},
 };
 use faceoff_runner::PlatformFault;
 use faceoff_store::*;

@@ -1,13 +1,13 @@
 //! The content of jobs from the local server, and the meaning of its responses.
 
 use super::{
-    intercepted_server::{InterceptedServer, Interception},
     fixture::*,
+    intercepted_server::{InterceptedServer, Interception},
 };
-use crate::server::{ClaimResult, LeaseStatus, JobServer as _};
+use crate::server::{ClaimResult, JobServer as _, LeaseStatus};
 use faceoff_store::*;
-use faceoff_types::{Profile, ValidationOutcome, Task};
-use faceoff_wire::job::{JobPayload, OutputFiles, JobSpec, JobReport};
+use faceoff_types::{Profile, Task, ValidationOutcome};
+use faceoff_wire::job::{JobPayload, JobReport, JobSpec, OutputFiles};
 
 async fn next(server: &Server) -> Option<JobSpec> {
     let local = server.local();
@@ -32,7 +32,11 @@ async fn report(server: &Server, job: &JobSpec) -> JobReport {
             timing: Vec::new(),
             log: String::new(),
         }),
-        JobPayload::Shard { spec, output: keeps, .. } => {
+        JobPayload::Shard {
+            spec,
+            output: keeps,
+            ..
+        } => {
             let recording = match keeps {
                 OutputFiles::Recording(key) => Some(key.clone()),
                 OutputFiles::Clips(_) | OutputFiles::None => None,
@@ -232,7 +236,10 @@ async fn dataset_is_kept_when_its_commit_fails() {
     let job = scoring_job(&server).await;
     let report = self::report(&server, &job).await;
     assert_eq!(commit(&server, &job, report).await, LeaseStatus::Held);
-    let EvaluationState::Finished { dataset: current, .. } = server.wait_for_end(id).await else {
+    let EvaluationState::Finished {
+        dataset: current, ..
+    } = server.wait_for_end(id).await
+    else {
         panic!("it finishes")
     };
     assert_ne!(current, dataset);
@@ -249,13 +256,19 @@ async fn dataset_of_a_lost_lease_is_removed() {
     let job = scoring_job(&server).await;
     assert_eq!(job.lease.job_id, late.lease.job_id);
     let (first, second) = (report(&server, &job).await, report(&server, &late).await);
-    assert_eq!(commit(&server, &late, second.clone()).await, LeaseStatus::Lost);
+    assert_eq!(
+        commit(&server, &late, second.clone()).await,
+        LeaseStatus::Lost
+    );
     assert_eq!(commit(&server, &job, first).await, LeaseStatus::Held);
     let JobReport::Scoring { dataset, .. } = second else {
         panic!("{second:?}")
     };
     assert!(!server.has(&dataset).await);
-    let EvaluationState::Finished { dataset: current, .. } = server.wait_for_end(id).await else {
+    let EvaluationState::Finished {
+        dataset: current, ..
+    } = server.wait_for_end(id).await
+    else {
         panic!("it finishes")
     };
     assert!(server.has(&current).await);

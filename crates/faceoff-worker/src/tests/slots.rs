@@ -1,7 +1,7 @@
 //! Jobs from claim to commit, and platform faults.
 
 use super::fixture::*;
-use crate::{slot::Backoff, cleanup};
+use crate::{cleanup, slot::Backoff};
 use faceoff_replay::{Key, Pack};
 use faceoff_runner::PlatformFault;
 use faceoff_store::*;

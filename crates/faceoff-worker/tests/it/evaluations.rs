@@ -105,7 +105,10 @@ async fn failing_agent_gets_reason_and_log() {
     // This agent fails only after a validation run of up to 500 control steps and the rest of an episode. The faults of all
     // shards add up.
     let late = server.upload("Late", "GOOD_EPISODES = \"15\"").await;
-    assert!(matches!(server.wait_for_validation(late).await, SubmissionState::Valid));
+    assert!(matches!(
+        server.wait_for_validation(late).await,
+        SubmissionState::Valid
+    ));
     let plan = RunPlan {
         tasks: vec![Task::Defend],
         episodes_per_task: 60,

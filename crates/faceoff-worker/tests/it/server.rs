@@ -153,7 +153,10 @@ impl Server {
             timing: Vec::new(),
             log: String::new(),
         };
-        self.store.commit_validation(&claim, outcome, now).await.unwrap();
+        self.store
+            .commit_validation(&claim, outcome, now)
+            .await
+            .unwrap();
         self.store.submission(id).await.unwrap().team
     }
 

@@ -52,7 +52,9 @@ impl Client {
         let partial = PathBuf::from(name);
         let fetched = fetch(response, &partial).await;
         let checked = match fetched {
-            Ok(bytes) => check_archive(&partial).await.map(|manifest| (manifest, bytes)),
+            Ok(bytes) => check_archive(&partial)
+                .await
+                .map(|manifest| (manifest, bytes)),
             Err(error) => Err(error),
         };
         if checked.is_err() {

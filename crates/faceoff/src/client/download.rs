@@ -100,7 +100,12 @@ impl Client {
         })
     }
 
-    async fn request_file(&self, path: &str, part: &PartialFile, from: u64) -> anyhow::Result<Response> {
+    async fn request_file(
+        &self,
+        path: &str,
+        part: &PartialFile,
+        from: u64,
+    ) -> anyhow::Result<Response> {
         let mut request = self.request(Method::GET, path);
         if let (true, Some(tag)) = (from > 0, &part.tag) {
             request = request
@@ -139,9 +144,7 @@ impl FileInfo {
                 .and_then(|(part, total)| {
                     Some((part.split_once('-')?.0.parse::<u64>().ok()?, total))
                 })
-                .with_context(|| {
-                    format!("the server sent the invalid content range {range:?}")
-                })?;
+                .with_context(|| format!("the server sent the invalid content range {range:?}"))?;
             ensure!(
                 from == resumed_at,
                 "the server was asked for the file from byte {resumed_at}, but sent it from byte {from}"

@@ -41,7 +41,9 @@ fn next_page(headers: &HeaderMap) -> anyhow::Result<Option<String>> {
     let target = link.strip_prefix('<').and_then(|link| link.split_once('>'));
     let path = target.and_then(|(target, _)| target.strip_prefix(API_BASE));
     let path = path.with_context(|| {
-        format!("the server links to the next page of a list as {link:?}, which is no path of its API")
+        format!(
+            "the server links to the next page of a list as {link:?}, which is no path of its API"
+        )
     })?;
     Ok(Some(path.to_owned()))
 }
@@ -57,7 +59,10 @@ mod tests {
             next_page(&headers)
         };
         let link = "</api/v1/teams?limit=2&after=x>; rel=\"next\"";
-        assert_eq!(parse(link).unwrap().as_deref(), Some("/teams?limit=2&after=x"));
+        assert_eq!(
+            parse(link).unwrap().as_deref(),
+            Some("/teams?limit=2&after=x")
+        );
         assert_eq!(parse("</other>; rel=\"help\"").unwrap(), None);
         assert!(parse("<http://elsewhere/>; rel=\"next\"").is_err());
         assert_eq!(next_page(&HeaderMap::new()).unwrap(), None);

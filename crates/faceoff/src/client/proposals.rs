@@ -26,11 +26,7 @@ impl Client {
     }
 
     /// Organiser: proposes a re-evaluation of results; the old ones count until it is applied.
-    pub async fn propose(
-        &self,
-        stage: StageId,
-        new: &NewProposal,
-    ) -> anyhow::Result<ProposalView> {
+    pub async fn propose(&self, stage: StageId, new: &NewProposal) -> anyhow::Result<ProposalView> {
         let request = self.request(Method::POST, &format!("/stages/{stage}/proposals"));
         read_json(self.send(request.json(new)).await?).await
     }

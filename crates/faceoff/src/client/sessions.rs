@@ -37,7 +37,9 @@ impl Client {
                 .header(header::COOKIE, &cookie)
                 .header("sec-fetch-site", "same-origin")
         };
-        let created = self.send(browser_request(Method::POST, "/tokens").json(new)).await;
+        let created = self
+            .send(browser_request(Method::POST, "/tokens").json(new))
+            .await;
         let created = match created {
             Ok(response) => read_json::<NewTokenView>(response).await,
             Err(error) => Err(error),

@@ -50,7 +50,9 @@ impl Decoder {
         for part in piece.split_inclusive(|byte| *byte == b'\n') {
             self.line.extend_from_slice(part);
             if self.line.len() + self.event.data.len() > LONGEST_EVENT_BYTES {
-                bail!("the server sent an event of more than 1 MiB; is it another version of Faceoff?");
+                bail!(
+                    "the server sent an event of more than 1 MiB; is it another version of Faceoff?"
+                );
             }
             if self.line.pop_if(|byte| *byte == b'\n').is_some() {
                 self.line.pop_if(|byte| *byte == b'\r');

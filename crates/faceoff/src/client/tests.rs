@@ -7,13 +7,13 @@ use faceoff_api::{
     views::{evaluation::EvaluationStatus, submission::SubmissionStatus},
 };
 use faceoff_http::{
-    Capacity, ConnectionLimits, HttpConfig, HttpLimits, LinkKey, AgentResources, RateLimits,
+    AgentResources, Capacity, ConnectionLimits, HttpConfig, HttpLimits, LinkKey, RateLimits,
 };
 use faceoff_metrics::{Metrics, Process};
-use faceoff_store::{ClaimedJob, Store, Job};
+use faceoff_store::{ClaimedJob, Job, Store};
 use faceoff_types::{
-    Clock, DayDeadline, Profile, Ruleset, ValidationOutcome, StageRules, StageSettings, CountingResult, Task,
-    TimeLimits, Zone,
+    Clock, CountingResult, DayDeadline, Profile, Ruleset, StageRules, StageSettings, Task,
+    TimeLimits, ValidationOutcome, Zone,
 };
 use indicatif::ProgressBar;
 use jiff::Timestamp;
@@ -132,7 +132,10 @@ async fn submission_passes_from_upload_to_evaluation() {
     assert_eq!(files, ["agent.py", "agent.toml"]);
 
     let claimed = site.store.claim("slot 0", 60, now());
-    let ClaimedJob { claim, job } = claimed.await.unwrap().expect("the validation run is queued");
+    let ClaimedJob { claim, job } = claimed
+        .await
+        .unwrap()
+        .expect("the validation run is queued");
     assert!(matches!(job, Job::Validation { .. }), "{job:?}");
     let outcome = ValidationOutcome::Valid {
         runtime: "native".into(),
@@ -207,10 +210,7 @@ async fn submission_passes_from_upload_to_evaluation() {
         std::fs::read(&archive).unwrap()
     );
     let storage = client.team_storage(team.team.id).await.unwrap();
-    assert_eq!(
-        (storage.bundles, storage.bundle_bytes),
-        (1, uploaded.bytes)
-    );
+    assert_eq!((storage.bundles, storage.bundle_bytes), (1, uploaded.bytes));
     let all = site.organiser.storage().await.unwrap();
     assert_eq!(all[0].proposal_bytes, Some(0));
     let deletion = DeleteSubmission::default();

@@ -9,7 +9,7 @@ use std::{io, path::Path};
 
 /// The configuration for servers without TLS: it trusts no authority.
 pub fn plain_client_config() -> ClientConfig {
-with_roots(RootCertStore::empty())
+    with_roots(RootCertStore::empty())
 }
 
 /// The configuration for servers with TLS. It trusts the authorities of the machine (`SSL_CERT_FILE` and

@@ -61,7 +61,8 @@ impl Client {
         id: TournamentId,
         change: &TournamentChange,
     ) -> anyhow::Result<TournamentView> {
-        self.call_with_body(Method::PATCH, &tournament_path(id, ""), change).await
+        self.call_with_body(Method::PATCH, &tournament_path(id, ""), change)
+            .await
     }
 
     /// Organiser: enters teams.
@@ -71,7 +72,8 @@ impl Client {
         teams: Vec<TeamName>,
     ) -> anyhow::Result<TournamentView> {
         let path = tournament_path(id, "/entrants");
-        self.call_with_body(Method::POST, &path, &NewEntrants { teams }).await
+        self.call_with_body(Method::POST, &path, &NewEntrants { teams })
+            .await
     }
 
     /// Organiser: removes a team from a tournament.
@@ -95,7 +97,8 @@ impl Client {
 
     /// Organiser: draws the next round and starts it.
     pub async fn start_round(&self, id: TournamentId) -> anyhow::Result<RoundView> {
-        self.call(Method::POST, &tournament_path(id, "/rounds")).await
+        self.call(Method::POST, &tournament_path(id, "/rounds"))
+            .await
     }
 
     /// Organiser: pauses a tournament: no further game starts.
@@ -104,13 +107,17 @@ impl Client {
         id: TournamentId,
         reason: String,
     ) -> anyhow::Result<TournamentView> {
-        self.call_with_body(Method::POST, &tournament_path(id, "/pause"), &Reason { reason })
-            .await
+        self.call_with_body(
+            Method::POST,
+            &tournament_path(id, "/pause"),
+            &Reason { reason },
+        )
+        .await
     }
 
-    
     pub async fn resume_tournament(&self, id: TournamentId) -> anyhow::Result<TournamentView> {
-        self.call(Method::POST, &tournament_path(id, "/resume")).await
+        self.call(Method::POST, &tournament_path(id, "/resume"))
+            .await
     }
 
     /// Organiser: closes a tournament permanently; `confirm` is its name.
@@ -159,12 +166,14 @@ impl Client {
         times: u32,
     ) -> anyhow::Result<ChampionSharesView> {
         let path = tournament_path(id, "/replays");
-        self.call_with_body(Method::POST, &path, &NewReplays { times }).await
+        self.call_with_body(Method::POST, &path, &NewReplays { times })
+            .await
     }
 
     /// Organiser: cancels the unfinished replays.
     pub async fn cancel_replays(&self, id: TournamentId) -> anyhow::Result<ChampionSharesView> {
-        self.call(Method::DELETE, &tournament_path(id, "/replays")).await
+        self.call(Method::DELETE, &tournament_path(id, "/replays"))
+            .await
     }
 }
 

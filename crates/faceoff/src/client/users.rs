@@ -3,19 +3,19 @@
 use super::Client;
 use faceoff_api::{
     requests::{
-        Confirmation, JoinRequest, NewAnnouncement, NewAnswer, NewInvitation, NewPassword, NewQuestion,
-        NewTerms, NewToken, Reason, RegistrationRequest, SeasonChange, TeamChange,
+        Confirmation, JoinRequest, NewAnnouncement, NewAnswer, NewInvitation, NewPassword,
+        NewQuestion, NewTerms, NewToken, Reason, RegistrationRequest, SeasonChange, TeamChange,
     },
     views::{
         announcement::{AnnouncementView, QuestionView, TermsView},
         invitation::{InvitationView, NewInvitationView, NewRegistrationView, RegistrationView},
-        user::{NewAccountView, UserView, CallerView},
         season::SeasonView,
         team::TeamView,
         token::{NewTokenView, TokenView},
+        user::{CallerView, NewAccountView, UserView},
     },
 };
-use faceoff_types::{InvitationId, UserId, QuestionId, RegistrationId, TeamId, TokenId};
+use faceoff_types::{InvitationId, QuestionId, RegistrationId, TeamId, TokenId, UserId};
 use reqwest::Method;
 
 impl Client {
@@ -60,18 +60,15 @@ impl Client {
     }
 
     /// Sets the caller's password and revokes all their other tokens and sessions.
-    pub async fn set_password(
-        &self,
-        id: UserId,
-        new: &NewPassword,
-    ) -> anyhow::Result<UserView> {
+    pub async fn set_password(&self, id: UserId, new: &NewPassword) -> anyhow::Result<UserView> {
         self.call_with_body(Method::PUT, &format!("/people/{id}/password"), new)
             .await
     }
 
     /// Registers a team; only this response has its link.
     pub async fn register(&self, new: &RegistrationRequest) -> anyhow::Result<NewRegistrationView> {
-        self.call_with_body(Method::POST, "/registrations", new).await
+        self.call_with_body(Method::POST, "/registrations", new)
+            .await
     }
 
     /// Creates an invitation; only this response has its link.
@@ -92,7 +89,8 @@ impl Client {
 
     /// Accepts an invitation; only this response has the token.
     pub async fn join(&self, join: &JoinRequest) -> anyhow::Result<NewAccountView> {
-        self.call_with_body(Method::POST, "/invitations/accept", join).await
+        self.call_with_body(Method::POST, "/invitations/accept", join)
+            .await
     }
 
     pub async fn team(&self, id: TeamId) -> anyhow::Result<TeamView> {
@@ -118,7 +116,8 @@ impl Client {
 
     /// Returns a retired team to the competition.
     pub async fn return_team(&self, id: TeamId) -> anyhow::Result<TeamView> {
-        self.call(Method::POST, &format!("/teams/{id}/return")).await
+        self.call(Method::POST, &format!("/teams/{id}/return"))
+            .await
     }
 
     /// All versions of the terms, the newest first.
@@ -128,7 +127,8 @@ impl Client {
 
     /// Organiser: publishes a new version of the terms.
     pub async fn publish_terms(&self, text: String) -> anyhow::Result<TermsView> {
-        self.call_with_body(Method::POST, "/terms", &NewTerms { text }).await
+        self.call_with_body(Method::POST, "/terms", &NewTerms { text })
+            .await
     }
 
     /// Accepts the terms.
@@ -144,7 +144,8 @@ impl Client {
 
     pub async fn announce(&self, title: String, text: String) -> anyhow::Result<AnnouncementView> {
         let new = NewAnnouncement { title, text };
-        self.call_with_body(Method::POST, "/announcements", &new).await
+        self.call_with_body(Method::POST, "/announcements", &new)
+            .await
     }
 
     /// The questions that the caller may read, the newest first.
@@ -188,7 +189,8 @@ impl Client {
         reason: String,
     ) -> anyhow::Result<RegistrationView> {
         let path = format!("/registrations/{id}/refuse");
-        self.call_with_body(Method::POST, &path, &Reason { reason }).await
+        self.call_with_body(Method::POST, &path, &Reason { reason })
+            .await
     }
 
     /// Organiser: opens or closes registration, or sets the divisions.

@@ -40,7 +40,6 @@ impl Client {
             .await
     }
 
-    
     pub async fn remove_webhook(&self, id: WebhookId) -> anyhow::Result<()> {
         let request = self.request(Method::DELETE, &format!("/webhooks/{id}"));
         self.send(request).await.map(drop)

@@ -1,25 +1,25 @@
 //! `faceoff admin`: the organisers' half of the API.
 
+mod announcements;
+mod authentication;
 mod day;
 mod export;
-mod team_lookup;
 mod lines;
-mod announcements;
 mod people;
-mod results;
 mod proposal;
-mod authentication;
+mod results;
 mod stage;
 mod storage;
+mod team_lookup;
 mod teams;
 mod tournament;
 mod workers;
 
 use super::{
     ca_file::CaFile,
-    stage_lookup::find_stage,
     output::{lines_or, print},
     season::season_text,
+    stage_lookup::find_stage,
     token::{self, TokenAction},
     webhook::{self, WebhookAction},
 };
@@ -272,7 +272,9 @@ impl AdminCommand {
                 text,
                 public,
             } => announcements::answer(&client, self.json, question, text, public).await,
-            Action::PublishTerms { file } => announcements::publish_terms(&client, self.json, &file).await,
+            Action::PublishTerms { file } => {
+                announcements::publish_terms(&client, self.json, &file).await
+            }
             Action::Day(action) => day::act(&client, self.json, action).await,
             Action::Proposal { action } => proposal::act(&client, self.json, action).await,
             Action::Stage { action } => stage::act(&client, self.json, action).await,
@@ -284,7 +286,11 @@ impl AdminCommand {
                 };
                 let day = client.start_day(stage).await?;
                 print(self.json, &day, || {
-                    let mut lines = vec![format!("{}: {} evaluations started", day.day, day.created.len())];
+                    let mut lines = vec![format!(
+                        "{}: {} evaluations started",
+                        day.day,
+                        day.created.len()
+                    )];
                     lines.extend(day.created.iter().map(evaluation_line));
                     lines.extend(
                         day.without_submission

@@ -75,11 +75,9 @@ impl AtomicFolder {
             match old_lock.try_lock() {
                 Ok(()) => fs::remove_dir_all(&folder)
                     .with_context(|| format!("removing {}", folder.display()))?,
-                Err(TryLockError::WouldBlock) => bail!(
-                    "another {} into {} is running",
-                    kind.name,
-                    target.display()
-                ),
+                Err(TryLockError::WouldBlock) => {
+                    bail!("another {} into {} is running", kind.name, target.display())
+                }
                 Err(TryLockError::Error(error)) => {
                     return Err(error).with_context(|| format!("locking {}", lock_path.display()));
                 }
@@ -93,7 +91,8 @@ impl AtomicFolder {
             .mode(0o700)
             .create(&folder)
             .with_context(|| format!("creating the folder {}", folder.display()))?;
-        let lock = File::create_new(&lock_path).with_context(|| format!("creating {}", lock_path.display()))?;
+        let lock = File::create_new(&lock_path)
+            .with_context(|| format!("creating {}", lock_path.display()))?;
         lock.lock()
             .with_context(|| format!("locking {}", lock_path.display()))?;
         Ok(Self {
@@ -144,7 +143,8 @@ impl AtomicFolder {
         let content = self.sync_content(folders)?;
         // The content first gets the new name of the old target, then both names are exchanged in one step. So the
         // target always exists, and the old one is never inside the temporary folder that is removed.
-        fs::rename(&content, old_target).with_context(|| format!("naming {}", old_target.display()))?;
+        fs::rename(&content, old_target)
+            .with_context(|| format!("naming {}", old_target.display()))?;
         if let Err(error) = renameat_with(CWD, old_target, CWD, target, RenameFlags::EXCHANGE) {
             // This is the new content, which can be created again.
             let _ = fs::remove_dir_all(old_target);
@@ -175,10 +175,12 @@ fn check_disk(target: &Path, parent: &Path) -> anyhow::Result<()> {
         return Ok(());
     };
     if found.is_symlink() {
-        bail!("{} is a symbolic link: name the folder itself", target.display());
+        bail!(
+            "{} is a symbolic link: name the folder itself",
+            target.display()
+        );
     }
-    let parent =
-        fs::metadata(parent).with_context(|| format!("reading {}", parent.display()))?;
+    let parent = fs::metadata(parent).with_context(|| format!("reading {}", parent.display()))?;
     if found.dev() != parent.dev() {
         bail!(
             "{} is a mount point, and the folder is built beside its target and renamed: name a \

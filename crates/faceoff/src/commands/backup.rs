@@ -4,9 +4,9 @@ pub mod files;
 pub mod manifest;
 
 use super::{
+    atomic_folder::{self, AtomicFolder, FolderKind},
     output::print,
     serve::ADMIN_TOKEN_FILE,
-    atomic_folder::{self, AtomicFolder, FolderKind},
     storage::bytes,
 };
 use crate::config::Config;
@@ -128,12 +128,7 @@ fn back_up(data_dir: &Path, target: &Path, now: Timestamp) -> anyhow::Result<Man
     let mut files = BTreeMap::new();
     files.insert(DATABASE.to_owned(), files::make_private(&database)?);
     let artifacts = folder.join(ARTIFACTS);
-    copy_tree(
-        &data_dir.join(ARTIFACTS),
-        &artifacts,
-        ARTIFACTS,
-        &mut files,
-    )?;
+    copy_tree(&data_dir.join(ARTIFACTS), &artifacts, ARTIFACTS, &mut files)?;
     let token = data_dir.join(ADMIN_TOKEN_FILE);
     if token.exists() {
         let file = copy_file(&token, &folder.join(ADMIN_TOKEN_FILE))?;
@@ -162,7 +157,10 @@ fn back_up(data_dir: &Path, target: &Path, now: Timestamp) -> anyhow::Result<Man
 }
 
 /// Files that the database refers to and that are missing or damaged in the data folder.
-fn missing_files(needed: &[RequiredArtifact], copied: &BTreeMap<String, CopiedFile>) -> Vec<Missing> {
+fn missing_files(
+    needed: &[RequiredArtifact],
+    copied: &BTreeMap<String, CopiedFile>,
+) -> Vec<Missing> {
     let path = |key: &str| format!("{ARTIFACTS}/{key}");
     let mut missing = Vec::new();
     for item in needed {

@@ -2,7 +2,7 @@
 
 pub(super) mod table;
 
-use super::{stage_lookup::find_stage, output::print, server::ServerArgs};
+use super::{output::print, server::ServerArgs, stage_lookup::find_stage};
 use clap::{Args, ValueEnum};
 use faceoff_api::requests::{BoardBy, BoardQuery};
 use faceoff_types::{DivisionName, Task};

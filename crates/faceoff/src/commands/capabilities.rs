@@ -9,7 +9,10 @@ use std::fs;
 ///
 /// # Errors
 /// If the program's own file cannot be read.
-pub fn own_capabilities(agent: &AgentEnvironment, slots: usize) -> anyhow::Result<WorkerCapabilities> {
+pub fn own_capabilities(
+    agent: &AgentEnvironment,
+    slots: usize,
+) -> anyhow::Result<WorkerCapabilities> {
     let program = std::env::current_exe().context("finding this program's file")?;
     let mut hasher = blake3::Hasher::new();
     fs::File::open(&program)

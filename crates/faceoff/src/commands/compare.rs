@@ -8,7 +8,7 @@ use anyhow::Context;
 use clap::Args;
 use faceoff_api::requests::ComparisonQuery;
 use faceoff_dataset::Dataset;
-use faceoff_scoring::{Comparison, EpisodeSummary, ComparedEvaluation, SolvedEpisodes};
+use faceoff_scoring::{ComparedEvaluation, Comparison, EpisodeSummary, SolvedEpisodes};
 use faceoff_types::{EpisodeOutcome, EvaluationId, Profile, Task};
 use faceoff_wire::dataset::DatasetManifest;
 use serde::Serialize;
@@ -142,7 +142,10 @@ fn open(path: &str) -> anyhow::Result<Evaluation> {
         let episodes = dataset.episodes()?.into_iter();
         let outcomes: Vec<EpisodeOutcome> = episodes.map(|record| record.outcome).collect();
         Ok(Evaluation {
-            summary: EpisodeSummary::from_outcomes(&outcomes, &dataset.manifest().variation.tier_bounds)?,
+            summary: EpisodeSummary::from_outcomes(
+                &outcomes,
+                &dataset.manifest().variation.tier_bounds,
+            )?,
             manifest: dataset.manifest().clone(),
         })
     };

@@ -346,14 +346,19 @@ impl Server {
 }
 
 /// Waits for the validation of a submission; an error if the agent is not valid.
-async fn wait_for_validation(client: &Client, submission: &SubmissionView) -> anyhow::Result<String> {
+async fn wait_for_validation(
+    client: &Client,
+    submission: &SubmissionView,
+) -> anyhow::Result<String> {
     loop {
         let current = client.submission(submission.id).await?;
         match current.status {
             SubmissionStatus::Validating => tokio::time::sleep(POLL).await,
             SubmissionStatus::Valid { .. } => {
                 let agent = current.agent_name.unwrap_or_default();
-                return Ok(format!("agent “{agent}” starts, responds and meets the time limits"));
+                return Ok(format!(
+                    "agent “{agent}” starts, responds and meets the time limits"
+                ));
             }
             SubmissionStatus::Invalid { reason, log } => {
                 let log = log.unwrap_or_default();

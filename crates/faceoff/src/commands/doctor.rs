@@ -1,10 +1,10 @@
 //! `faceoff doctor`: checks what a host offers to agents and their sandbox, and how to fix what is missing.
 
 mod check;
-mod worker_admission;
+mod clock;
 mod permissions;
 mod report;
-mod clock;
+mod worker_admission;
 
 use crate::{
     config::{Config, RuntimeConfig},

@@ -3,11 +3,11 @@
 mod ablation;
 mod differences;
 mod files;
-mod server_stage;
 mod logs;
+mod notes;
 mod pool;
 mod profile_run;
-mod notes;
+mod server_stage;
 mod table;
 
 use super::{ca_file::CaFile, local_bundle, output::print};
@@ -97,7 +97,11 @@ struct EvalView<'a> {
 
 impl EvalCommand {
     const fn notes(&self) -> Notes {
-        if self.json { Notes::Stderr } else { Notes::Stdout }
+        if self.json {
+            Notes::Stderr
+        } else {
+            Notes::Stdout
+        }
     }
 
     /// Evaluates the bundle, prints the result and writes the files.
@@ -171,7 +175,8 @@ impl EvalCommand {
             let faults = ablation::run(&setup, &self.out, self.json)?;
             return self.check_faults(faults);
         }
-        let outcome = profile_run::run_profile(&setup, self.profile.unwrap_or(rules.profile), &self.out)?;
+        let outcome =
+            profile_run::run_profile(&setup, self.profile.unwrap_or(rules.profile), &self.out)?;
         let view = EvalView {
             agent: &setup.bundle.manifest.name,
             results: self.out.join(RESULTS),

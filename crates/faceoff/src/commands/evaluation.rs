@@ -39,7 +39,12 @@ impl EvaluationCommand {
     pub fn run(self) -> anyhow::Result<()> {
         // Public evaluations need no token.
         super::block_on(async {
-            show(&self.server.client_or_visitor()?, self.server.json, &self.args).await
+            show(
+                &self.server.client_or_visitor()?,
+                self.server.json,
+                &self.args,
+            )
+            .await
         })
     }
 }
@@ -106,7 +111,8 @@ fn violations_text(violations: &ViolationsView) -> String {
             }));
         }
         lines.extend(
-            by_constraint.computation_time
+            by_constraint
+                .computation_time
                 .iter()
                 .map(|slow| format!("{task:<8} episode {:>5}  slow answers", slow.episode)),
         );

@@ -5,7 +5,7 @@ mod watch;
 use super::{
     output::{download_bar, download_text, print},
     server::ServerArgs,
-    tournament::{lookup::find_tournament_or_newest, games},
+    tournament::{games, lookup::find_tournament_or_newest},
 };
 use crate::client::Client;
 use anyhow::{Context, bail};
@@ -103,7 +103,9 @@ impl GameCommand {
             Action::Test { tournament } => {
                 let id = find_tournament_or_newest(&client, tournament.as_deref()).await?;
                 let requested = client.request_test_games(id, None).await?;
-                print(self.server.json, &requested, || games::requested_text(&requested))
+                print(self.server.json, &requested, || {
+                    games::requested_text(&requested)
+                })
             }
             Action::Friendly {
                 opponent,
@@ -166,7 +168,9 @@ pub(super) async fn own_side(
         .await
         .context("the side is unknown: name it with --side, or give the team's token")?;
     let Some(team) = who.team else {
-        bail!("the token does not belong to a team: name the side with --side 1 (home) or --side 2 (away)");
+        bail!(
+            "the token does not belong to a team: name the side with --side 1 (home) or --side 2 (away)"
+        );
     };
     let own = Side::BOTH
         .into_iter()

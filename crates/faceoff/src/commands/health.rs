@@ -21,7 +21,12 @@ impl HealthCommand {
     /// If the server cannot be reached or is unhealthy; the error names the reason.
     pub fn run(self) -> anyhow::Result<()> {
         super::block_on(async {
-            let health = self.server.client_or_visitor()?.health().await.map_err(as_unhealthy)?;
+            let health = self
+                .server
+                .client_or_visitor()?
+                .health()
+                .await
+                .map_err(as_unhealthy)?;
             print(self.server.json, &health, || health_text(&health))
         })
     }
@@ -68,7 +73,7 @@ mod tests {
         assert_eq!(Exit::of(&unhealthy), Exit::Failed);
         assert!(
             unhealthy
-            .to_string()
+                .to_string()
                 .ends_with("the database cannot be written")
         );
         let broken = as_unhealthy(refused(StatusCode::INTERNAL_SERVER_ERROR).into());

@@ -1,8 +1,8 @@
 //! `faceoff import`: unpacks the archive of a season into a data folder that `faceoff serve` shows.
 
 use super::{
-    output::print,
     atomic_folder::{self, AtomicFolder, FolderKind, create_private},
+    output::print,
 };
 use anyhow::{Context, bail};
 use clap::Args;

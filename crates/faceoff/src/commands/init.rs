@@ -32,7 +32,9 @@ impl InitCommand {
         let mut file = match File::create_new(&self.file) {
             Ok(file) => file,
             Err(error) if error.kind() == ErrorKind::AlreadyExists => {
-                bail!("{shown} already exists and was not changed; name another file, or remove it first")
+                bail!(
+                    "{shown} already exists and was not changed; name another file, or remove it first"
+                )
             }
             Err(error) => return Err(error).with_context(|| format!("creating {shown}")),
         };

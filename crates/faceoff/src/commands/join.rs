@@ -11,7 +11,7 @@ use faceoff_api::{
     requests::{FoundedTeam, JoinRequest},
     views::user::CallerView,
 };
-use faceoff_types::{DivisionName, UserName, TeamName};
+use faceoff_types::{DivisionName, TeamName, UserName};
 use serde::Serialize;
 use std::fs;
 
@@ -135,10 +135,15 @@ impl JoinCommand {
                     println!("token {}", joined.secret);
                     return Err(error);
                 }
-                let view = SignedIn { who: &joined.caller };
+                let view = SignedIn {
+                    who: &joined.caller,
+                };
                 return print(self.json, &view, || {
                     let who = whoami::whoami_text(&joined.caller);
-                    format!("{who}\nsigned in to {server}, token stored in {}", file.display())
+                    format!(
+                        "{who}\nsigned in to {server}, token stored in {}",
+                        file.display()
+                    )
                 });
             }
             print(self.json, &joined, || {

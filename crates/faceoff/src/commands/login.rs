@@ -65,14 +65,19 @@ impl LoginCommand {
         let file = credentials::path()?;
         let credentials = Credentials::load(&file)?;
         let named = self.server.or_else(|| std::env::var("FACEOFF_SERVER").ok());
-        let server = named.as_deref().or(credentials.default_server()).unwrap_or(DEFAULT_SERVER);
+        let server = named
+            .as_deref()
+            .or(credentials.default_server())
+            .unwrap_or(DEFAULT_SERVER);
         // Later commands may run in other folders.
         let ca_file: Option<PathBuf> = match self.ca.path() {
             Some(path) => Some(
                 fs::canonicalize(path)
                     .with_context(|| format!("looking for {}", path.display()))?,
             ),
-            None => credentials.login(server).and_then(|login| login.ca_file.clone()),
+            None => credentials
+                .login(server)
+                .and_then(|login| login.ca_file.clone()),
         };
         let client = Client::new(server, None, ca_file.as_deref())?;
         let made_here = self.name.is_some();
@@ -108,7 +113,10 @@ impl LoginCommand {
         };
         // Loaded again, because another command may have changed the file while the user was typing.
         let mut credentials = Credentials::load(&file)?;
-        let replaced = credentials.login(server).filter(|old| old.made_here).cloned();
+        let replaced = credentials
+            .login(server)
+            .filter(|old| old.made_here)
+            .cloned();
         // A stored token that is entered again was still created here.
         let is_same = replaced
             .as_ref()
@@ -136,7 +144,9 @@ impl LoginCommand {
                 file.display()
             );
             if !view.default {
-                text.push_str(&format!("; it is not the default server, use --server {server}"));
+                text.push_str(&format!(
+                    "; it is not the default server, use --server {server}"
+                ));
             }
             text
         })

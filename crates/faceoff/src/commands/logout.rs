@@ -66,15 +66,14 @@ impl LogoutCommand {
             .is_some_and(|other| other.token == login.token)
         {
             credentials.remove(&server);
-            }
-            credentials.save(&file)?;
-            let summary =
-                json!({ "server": server, "token_revoked": revoked, "default": credentials.default_server() });
-            print(self.json, &summary, || {
-                let outcome = match (should_revoke, revoked) {
-                    (true, true) => "the token is revoked",
-                    (true, false) => "the token was already invalid",
-                    (false, _) => "the token is deleted here, but still valid",
+        }
+        credentials.save(&file)?;
+        let summary = json!({ "server": server, "token_revoked": revoked, "default": credentials.default_server() });
+        print(self.json, &summary, || {
+            let outcome = match (should_revoke, revoked) {
+                (true, true) => "the token is revoked",
+                (true, false) => "the token was already invalid",
+                (false, _) => "the token is deleted here, but still valid",
             };
             let next = match credentials.default_server() {
                 Some(next) if next != server => format!("; the default server is now {next}"),

@@ -74,7 +74,8 @@ impl NewCommand {
             Language::Python => ("python3 -m unittest", ".", "../"),
             Language::Rust => ("cargo test && sh pack.sh", "bundle", ""),
         };
-        let summary = json!({ "folder": self.folder, "name": name, "task": task, "files": written });
+        let summary =
+            json!({ "folder": self.folder, "name": name, "task": task, "files": written });
         print(self.json, &summary, || {
             format!(
                 "{folder}: an agent for the task {task}; README.md explains its files. Next:\n\n  cd {folder}\n  {test_command}\n  \

@@ -41,11 +41,7 @@ pub(super) fn download_text(done: &DownloadedFile) -> String {
         0 => String::new(),
         at => format!(" (resumed after {at})"),
     };
-    let checked = if done.checked {
-        " (verified)"
-    } else {
-        ""
-    };
+    let checked = if done.checked { " (verified)" } else { "" };
     format!(
         "{}: {} bytes{resumed}, BLAKE3 {}{checked}",
         done.file.display(),

@@ -1,25 +1,25 @@
 //! `faceoff play`: one game or a series of games between two bundles.
 
 mod bar;
-mod platform_fault;
+mod matchup;
 mod options;
+mod platform_fault;
 mod results;
 mod series;
 mod series_results;
-mod matchup;
 mod table;
 
 use anyhow::{Context, bail};
 use bar::Bar;
-use platform_fault::with_advice;
 use clap::Args;
 use faceoff_dataset::game::{GAME_FILE, remove_game, side_file};
 use faceoff_runner::GameReport;
 use faceoff_types::Side;
+use matchup::Matchup;
 use options::PlayOptions;
+use platform_fault::with_advice;
 use results::Results;
 use series_results::Kind;
-use matchup::Matchup;
 use std::fs;
 
 /// File of an evaluation, whose `results.json` would be overwritten.

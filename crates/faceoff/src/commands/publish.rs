@@ -37,8 +37,8 @@ impl PublishCommand {
             } = &published.status
             {
                 text.push_str(&format!("\ndataset {path}"));
-                }
-                text
+            }
+            text
         })
     }
 }

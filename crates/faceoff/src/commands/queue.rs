@@ -3,11 +3,11 @@ use faceoff_api::views::queue::QueueView;
 /// Position in the queue and expected end.
 pub fn queue_text(queue: &QueueView) -> String {
     let expected = match queue.expected_at {
-        Some(at) => format!("expected to finish at {}", at.strftime("%Y-%m-%d %H:%M UTC")),
+        Some(at) => format!(
+            "expected to finish at {}",
+            at.strftime("%Y-%m-%d %H:%M UTC")
+        ),
         None => "finish time unknown".to_owned(),
     };
-    format!(
-        "position {} of {}, {expected}",
-        queue.position, queue.total
-    )
+    format!("position {} of {}, {expected}", queue.position, queue.total)
 }

@@ -47,7 +47,11 @@ impl RegisterCommand {
             accepted_terms: self.accept_terms,
         };
         super::block_on(async {
-            let created = self.server.client_or_visitor()?.register(&registration).await?;
+            let created = self
+                .server
+                .client_or_visitor()?
+                .register(&registration)
+                .await?;
             print(self.server.json, &created, || {
                 format!(
                     "registered; waiting for the approval of an organiser\n{}\nThe link is not shown again. It shows the state of the \

@@ -1,13 +1,13 @@
 //! `faceoff restore`: creates a data folder from a backup.
 
 use super::{
+    atomic_folder::{self, AtomicFolder, FolderKind},
     backup::{
         self, files,
         manifest::{ARTIFACTS, DATABASE, Manifest},
     },
     output::print,
     serve::lock,
-    atomic_folder::{self, AtomicFolder, FolderKind},
     storage::bytes,
 };
 use anyhow::{Context as _, bail, ensure};

@@ -44,7 +44,9 @@ fn runtimes_text(offered: &RuntimesView) -> String {
         .map(|stage| (stage.name.as_str(), &stage.runtimes, &stage.limits))
         .collect();
     let tournaments = offered.tournaments.iter();
-    contests.extend(tournaments.map(|contest| (contest.name.as_str(), &contest.runtimes, &contest.limits)));
+    contests.extend(
+        tournaments.map(|contest| (contest.name.as_str(), &contest.runtimes, &contest.limits)),
+    );
     if contests.is_empty() {
         lines.push(format!("limits: {}", limits_text(&offered.limits)));
     }

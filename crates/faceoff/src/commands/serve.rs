@@ -1,28 +1,28 @@
 //! `faceoff serve`: API, pages, worker slots and schedule in one process.
 
-mod http;
 mod archived_season;
 mod data_folder;
-mod runtime_inventory;
-mod remote;
+mod http;
 mod monitoring;
+mod remote;
+mod runtime_inventory;
 
 pub use data_folder::{ADMIN_TOKEN_FILE, lock};
 pub use http::shutdown_signal;
 
 use super::atomic_folder::create_private;
 use crate::{client, config::Config, descriptors::Descriptors, log::LogFormat, machine};
-use http::serve_http;
 use anyhow::{Context, bail};
 use clap::Args;
-use faceoff_http::{Capacity, CapacityMonitor, ConnectionLimits, HttpConfig, AgentResources};
+use data_folder::{empty_folder, link_key, set_admin_token};
+use faceoff_http::{AgentResources, Capacity, CapacityMonitor, ConnectionLimits, HttpConfig};
 use faceoff_metrics::Metrics;
 use faceoff_notify::Deliverer;
 use faceoff_sandbox::{HostFeature, Layer, MemoryImage, Runtime, affinity, probe_host};
-use faceoff_store::{Actor, JobFilter, FreeSpace, Store};
+use faceoff_store::{Actor, FreeSpace, JobFilter, Store};
 use faceoff_types::Clock;
 use faceoff_worker::{CpuLayout, SlotThreads, SlotsConfig, WorkerConfig};
-use data_folder::{empty_folder, link_key, set_admin_token};
+use http::serve_http;
 use jiff::Timestamp;
 use sd_notify::NotifyState;
 use std::{collections::BTreeMap, io::Write as _, net::SocketAddr, path::PathBuf, thread};
@@ -105,7 +105,7 @@ impl ServeCommand {
             .name("service".to_owned())
             .spawn(move || serve_with_low_priority(config, connections, cpus, threads, resources))
             .context("starting the service thread")?;
-            // This thread keeps its CPUs and its priority, which the threads of the slots inherit.
+        // This thread keeps its CPUs and its priority, which the threads of the slots inherit.
         starter.run();
         service
             .join()
@@ -196,9 +196,7 @@ async fn serve(
                 config.server.listen
             )
         })?;
-    let address = listener
-        .local_addr()
-        .context("reading the bound address")?;
+    let address = listener.local_addr().context("reading the bound address")?;
     let clock = Clock::new(Timestamp::now);
     let season = store.season().await.context("reading the season")?;
     config
@@ -254,7 +252,7 @@ async fn serve(
     let webhooks_enabled = rules.enabled;
     let deliverer = Deliverer::new(store.clone(), clock.clone(), rules, tls)
         .context("setting up the delivery of webhooks")?;
-        // Kept as long as agents run.
+    // Kept as long as agents run.
     let _image = in_memory(&mut agent.runtimes, config.sandbox.resident_bytes);
     let workers = WorkerConfig {
         slots: SlotsConfig {
@@ -306,10 +304,19 @@ async fn serve(
         watch.run(shutdown_requested.cancelled_owned()).await;
         Ok(())
     });
-    parts.spawn(monitoring::count_changes(store.clone(), metrics, shutdown.clone()));
+    parts.spawn(monitoring::count_changes(
+        store.clone(),
+        metrics,
+        shutdown.clone(),
+    ));
     if let Some(listener) = metrics_listener {
         let store = store.clone();
-        parts.spawn(monitoring::serve_metrics(listener, store, site, shutdown.clone()));
+        parts.spawn(monitoring::serve_metrics(
+            listener,
+            store,
+            site,
+            shutdown.clone(),
+        ));
     }
     let shutdown_requested = shutdown.clone();
     parts.spawn(async move {
@@ -379,10 +386,7 @@ pub fn check_sandbox(features: &[HostFeature], given_up: &[Layer]) -> anyhow::Re
         if given_up.contains(&feature.layer) {
             tracing::warn!(layer = ?feature.layer, found = feature.found, "sandbox layer given up by configuration");
         } else {
-            let cure = feature
-                .cure
-                .as_deref()
-                .unwrap_or("not known for this host");
+            let cure = feature.cure.as_deref().unwrap_or("not known for this host");
             missing.push(format!(
                 "{}: {}\n    fix: {cure}",
                 layer_name(feature.layer),

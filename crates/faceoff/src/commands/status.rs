@@ -1,6 +1,8 @@
 //! `faceoff status`: prints the team's current state.
 
-use super::{evaluation_text::status_text, output::print, server::ServerArgs, submissions::status_lines};
+use super::{
+    evaluation_text::status_text, output::print, server::ServerArgs, submissions::status_lines,
+};
 use crate::{
     client::{ApiError, Client},
     exit::Exit,
@@ -68,7 +70,9 @@ impl StatusCommand {
             match self.request_status(client).await {
                 Ok(status) => {
                     is_disconnected = false;
-                    if last.as_ref().map(TeamStatus::without_estimates) == Some(status.without_estimates()) {
+                    if last.as_ref().map(TeamStatus::without_estimates)
+                        == Some(status.without_estimates())
+                    {
                         interval = (interval * 2).min(MAX_INTERVAL);
                     } else {
                         interval = MIN_INTERVAL;
@@ -95,10 +99,7 @@ impl StatusCommand {
 
     fn print_status(&self, status: &TeamStatus, is_repeated: bool) -> anyhow::Result<()> {
         if self.server.json {
-            println!(
-                "{}",
-                serde_json::to_string(status).context("writing JSON")?
-            );
+            println!("{}", serde_json::to_string(status).context("writing JSON")?);
             return Ok(());
         }
         if is_repeated {
@@ -124,13 +125,20 @@ impl TeamStatus {
             me: me.clone(),
             evaluations: evaluations.clone(),
         };
-        let submissions = status.me.validating.iter_mut().map(|submission| &mut submission.queue);
-        let evaluations = status.evaluations.iter_mut().map(|evaluation| &mut evaluation.queue);
+        let submissions = status
+            .me
+            .validating
+            .iter_mut()
+            .map(|submission| &mut submission.queue);
+        let evaluations = status
+            .evaluations
+            .iter_mut()
+            .map(|evaluation| &mut evaluation.queue);
         let today = std::iter::once(&mut status.me.today.queue);
         for queue in submissions.chain(evaluations).chain(today).flatten() {
             queue.expected_at = None;
-            }
-            status
+        }
+        status
     }
 
     fn text(&self) -> String {

@@ -192,8 +192,13 @@ pub(super) fn status_lines(me: &MeView) -> Vec<String> {
         lines.push(format!("  next: {}", pending.next));
     }
     match me.active_submission {
-        Some(active) => lines.push(format!("submission {active}: {}", next_cutoff_text(me, active))),
-        None => lines.push("the team has no active submission; upload one with faceoff submit BUNDLE".to_owned()),
+        Some(active) => lines.push(format!(
+            "submission {active}: {}",
+            next_cutoff_text(me, active)
+        )),
+        None => lines.push(
+            "the team has no active submission; upload one with faceoff submit BUNDLE".to_owned(),
+        ),
     }
     lines
 }
@@ -207,7 +212,9 @@ pub(super) fn submission_line(submission: &SubmissionView) -> String {
         },
         SubmissionStatus::Valid { .. } => "valid".to_owned(),
         SubmissionStatus::Invalid { reason, .. } => format!("invalid: {reason}"),
-        SubmissionStatus::ValidationError { reason } => format!("validation failed by a platform fault: {reason}"),
+        SubmissionStatus::ValidationError { reason } => {
+            format!("validation failed by a platform fault: {reason}")
+        }
     };
     let mut line = format!(
         "{}  {}  {}  {state}",

@@ -79,7 +79,9 @@ impl SubmitCommand {
             SubmissionStatus::Valid { .. } => Ok(()),
             SubmissionStatus::Invalid { reason, .. } => bail!("invalid: {reason}"),
             SubmissionStatus::ValidationError { reason } => {
-                bail!("the validation failed by a platform fault ({reason}); submit the bundle again")
+                bail!(
+                    "the validation failed by a platform fault ({reason}); submit the bundle again"
+                )
             }
             SubmissionStatus::Validating => bail!("the validation has no result"),
         }
@@ -106,8 +108,8 @@ async fn wait_for_validation(
     client: &Client,
     mut submission: SubmissionView,
 ) -> anyhow::Result<SubmissionView> {
-    let spinner =
-        ProgressBar::new_spinner().with_message("validating: does the agent start, respond and meet the time limits?");
+    let spinner = ProgressBar::new_spinner()
+        .with_message("validating: does the agent start, respond and meet the time limits?");
     spinner.enable_steady_tick(Duration::from_millis(100));
     while submission.status == SubmissionStatus::Validating {
         tokio::time::sleep(POLL).await;
@@ -131,9 +133,6 @@ fn print_timing(timing: &ValidationTiming) {
 
 fn print_log(log: Option<&str>) {
     if let Some(log) = log.filter(|log| !log.trim().is_empty()) {
-        println!(
-            "--- agent log ---\n{}\n--- end of log ---",
-            log.trim_end()
-        );
+        println!("--- agent log ---\n{}\n--- end of log ---", log.trim_end());
     }
 }

@@ -13,7 +13,7 @@ use faceoff_api::{
     requests::{InvitedRole, NewInvitation, TeamChange},
     views::team::TeamView,
 };
-use faceoff_types::{InvitationId, UserId, TeamId, TeamName};
+use faceoff_types::{InvitationId, TeamId, TeamName, UserId};
 use jiff::Timestamp;
 
 /// Shows and changes the team, invites members, and asks the organisers.
@@ -145,7 +145,10 @@ async fn act(client: &Client, json: bool, action: Action) -> anyhow::Result<()> 
             let people = client.users().await?;
             print(json, &people, || {
                 let lines = people.iter().map(person_line).collect();
-                lines_or(lines, "no members yet; invite one with faceoff team invite NOTE")
+                lines_or(
+                    lines,
+                    "no members yet; invite one with faceoff team invite NOTE",
+                )
             })
         }
         Action::Invite { note } => {
@@ -216,9 +219,16 @@ async fn news(client: &Client, json: bool) -> anyhow::Result<()> {
             .map(|news| format!("{}  {}\n{}\n", time_text(news.at), news.title, news.text));
         let answers = questions.iter().map(|question| {
             let answer = question.answer.as_deref().unwrap_or("no answer yet");
-            format!("{}  {}\n→ {answer}\n", time_text(question.at), question.text)
+            format!(
+                "{}  {}\n→ {answer}\n",
+                time_text(question.at),
+                question.text
+            )
         });
-        lines_or(announcements.chain(answers).collect(), "no announcements or questions yet")
+        lines_or(
+            announcements.chain(answers).collect(),
+            "no announcements or questions yet",
+        )
     })
 }
 

@@ -67,7 +67,10 @@ pub(super) async fn act(client: &Client, json: bool, action: TokenAction) -> any
             print(json, &tokens, || {
                 let now = Timestamp::now();
                 let lines = tokens.iter().map(|token| token_line(token, now)).collect();
-                lines_or(lines, "no tokens yet; create one with faceoff token create NAME")
+                lines_or(
+                    lines,
+                    "no tokens yet; create one with faceoff token create NAME",
+                )
             })
         }
         TokenAction::Create { name, days, team } => {

@@ -1,7 +1,7 @@
 //! `faceoff tournament`: shows tournaments, and withdraws a team from one.
 
-pub(super) mod lookup;
 pub(super) mod games;
+pub(super) mod lookup;
 pub(super) mod text;
 
 use super::{output::print, score::table, server::ServerArgs};
@@ -72,12 +72,16 @@ impl TournamentCommand {
         match self.action {
             Action::List => {
                 let tournaments = client.tournaments().await?;
-                print(self.server.json, &tournaments, || text::tournament_list(&tournaments))
+                print(self.server.json, &tournaments, || {
+                    text::tournament_list(&tournaments)
+                })
             }
             Action::Show { tournament } => {
                 let id = find_tournament_or_newest(&client, tournament.as_deref()).await?;
                 let tournament = client.tournament(id).await?;
-                print(self.server.json, &tournament, || text::tournament_text(&tournament))
+                print(self.server.json, &tournament, || {
+                    text::tournament_text(&tournament)
+                })
             }
             Action::Games { tournament, round } => {
                 let id = find_tournament_or_newest(&client, tournament.as_deref()).await?;
@@ -97,7 +101,9 @@ impl TournamentCommand {
             Action::Certainty { tournament } => {
                 let id = find_tournament_or_newest(&client, tournament.as_deref()).await?;
                 let certainty = client.champion_shares(id).await?;
-                print(self.server.json, &certainty, || text::champion_shares_text(&certainty))
+                print(self.server.json, &certainty, || {
+                    text::champion_shares_text(&certainty)
+                })
             }
             Action::Withdraw {
                 tournament,

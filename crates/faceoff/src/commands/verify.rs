@@ -99,7 +99,9 @@ impl VerifyCommand {
             Ok(simulated) => {
                 if !self.json {
                     let text = match &simulated {
-                        VerifiedRecording::Evaluation(evaluation) => describe(&self.dataset, evaluation),
+                        VerifiedRecording::Evaluation(evaluation) => {
+                            describe(&self.dataset, evaluation)
+                        }
                         VerifiedRecording::Game(played) => game::describe(&self.dataset, played),
                     };
                     println!("{text}");
@@ -141,7 +143,9 @@ impl VerifyCommand {
 
     fn verify_recording(&self) -> Result<VerifiedRecording, Failure> {
         if !GameRecording::is_at(&self.dataset)? {
-            return Ok(VerifiedRecording::Evaluation(Box::new(self.verify_dataset()?)));
+            return Ok(VerifiedRecording::Evaluation(Box::new(
+                self.verify_dataset()?,
+            )));
         }
         game::refuse_season(self.secret.is_some())?;
         let simulated = game::verify(&self.dataset, self.blake3.as_ref())?;

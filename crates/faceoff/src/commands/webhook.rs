@@ -7,7 +7,7 @@ use super::{
 use crate::client::Client;
 use clap::{Args, Subcommand};
 use faceoff_api::{
-    requests::{NewWebhook, WebhookRevival, WebhookChanges},
+    requests::{NewWebhook, WebhookChanges, WebhookRevival},
     views::webhook::{DeliveryStateView, DeliveryView, NewWebhookView, WebhookState, WebhookView},
 };
 use faceoff_types::WebhookId;
@@ -99,7 +99,10 @@ pub(super) async fn act(client: &Client, json: bool, action: WebhookAction) -> a
             let webhooks = client.webhooks().await?;
             print(json, &webhooks, || {
                 let lines = webhooks.iter().map(webhook_line).collect();
-                lines_or(lines, "no webhooks yet; create one with faceoff webhook create NAME URL")
+                lines_or(
+                    lines,
+                    "no webhooks yet; create one with faceoff webhook create NAME URL",
+                )
             })
         }
         WebhookAction::Create { name, url, about } => {
@@ -107,8 +110,8 @@ pub(super) async fn act(client: &Client, json: bool, action: WebhookAction) -> a
                 .create_webhook(&NewWebhook { name, url, about })
                 .await?;
             print(json, &created, || new_webhook_text(&created))
-            }
-            WebhookAction::Change {
+        }
+        WebhookAction::Change {
             webhook,
             name,
             url,
@@ -190,8 +193,12 @@ fn webhook_line(webhook: &WebhookView) -> String {
 fn delivery_line(delivery: &DeliveryView) -> String {
     let state = match delivery.state {
         DeliveryStateView::Waiting { next_at } => format!("next attempt at {}", time_text(next_at)),
-        DeliveryStateView::Delivered { ended_at: settled_at } => format!("delivered {}", time_text(settled_at)),
-        DeliveryStateView::GivenUp { ended_at: settled_at } => format!("failed {}", time_text(settled_at)),
+        DeliveryStateView::Delivered {
+            ended_at: settled_at,
+        } => format!("delivered {}", time_text(settled_at)),
+        DeliveryStateView::GivenUp {
+            ended_at: settled_at,
+        } => format!("failed {}", time_text(settled_at)),
     };
     let last = delivery.last.as_ref().map_or_else(String::new, |last| {
         let status = last

@@ -1,8 +1,8 @@
 //! `faceoff worker`: runs a remote worker.
 
 use super::{
-    files_client::files_client,
     capabilities::own_capabilities,
+    files_client::files_client,
     serve::{check_sandbox, in_memory},
 };
 use crate::{config::Config, log::LogFormat};
@@ -121,7 +121,7 @@ impl WorkerCommand {
             slots = worker.slots.cpus.slots.len(),
             nats = worker.nats.url,
             "worker started"
-            );
+        );
         tokio::runtime::Builder::new_multi_thread()
             .enable_all()
             .build()

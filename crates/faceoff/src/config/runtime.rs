@@ -59,7 +59,8 @@ impl TryFrom<Fields> for RuntimeConfig {
                 path,
             }),
             _ => Err(
-                "expected a runtime with either `folder`, or `read_only_paths` and `path`".to_owned(),
+                "expected a runtime with either `folder`, or `read_only_paths` and `path`"
+                    .to_owned(),
             ),
         }
     }

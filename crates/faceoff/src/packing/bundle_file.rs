@@ -50,7 +50,11 @@ impl BundleFile {
             .metadata()
             .with_context(|| format!("reading {}", path.display()))?
             .len();
-        Ok(Self { source, name, bytes })
+        Ok(Self {
+            source,
+            name,
+            bytes,
+        })
     }
 
     /// The packed files of a folder; `None` for an archive, which is not opened.

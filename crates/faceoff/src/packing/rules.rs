@@ -96,7 +96,10 @@ mod tests {
                 ".ipynb_checkpoints" => "notebooks".to_owned(),
                 name => format!("`{name}`"),
             };
-            assert!(section.contains(&expected), "{rule} is not documented as {expected}");
+            assert!(
+                section.contains(&expected),
+                "{rule} is not documented as {expected}"
+            );
         }
     }
 }

@@ -58,7 +58,7 @@ impl Selection {
         selection.add_folder(Path::new(""), &rules)?;
         ensure!(
             selection
-            .entries
+                .entries
                 .iter()
                 .any(|entry| entry.path == Path::new("agent.toml")),
             "{} leaves out agent.toml, which every bundle needs",

@@ -3,13 +3,13 @@
 use faceoff_api::token::hash_token;
 use faceoff_archive::{Edition, Entry, FORMAT, Manifest, Writer};
 use faceoff_http::{
-    Capacity, ConnectionLimits, HttpConfig, HttpLimits, LinkKey, AgentResources, RateLimits,
+    AgentResources, Capacity, ConnectionLimits, HttpConfig, HttpLimits, LinkKey, RateLimits,
 };
 use faceoff_metrics::{Metrics, Process};
-use faceoff_store::{Actor, ClaimedJob, Store, UploadQuota, Job};
+use faceoff_store::{Actor, ClaimedJob, Job, Store, UploadQuota};
 use faceoff_types::{
-    BundleRef, Clock, EvaluationId, EvaluationResult, Profile, Ruleset, ValidationOutcome, StageRules,
-    StageSettings, Task, TimeLimits, Zone,
+    BundleRef, Clock, EvaluationId, EvaluationResult, Profile, Ruleset, StageRules, StageSettings,
+    Task, TimeLimits, ValidationOutcome, Zone,
 };
 use jiff::Timestamp;
 use serde_json::Value;
@@ -159,7 +159,8 @@ async fn run_day(store: &Store) -> EvaluationId {
         .unwrap();
     let mut stage = Some(store.stages().await.unwrap()[0].id);
     loop {
-        let Some(ClaimedJob { claim, job: work }) = store.claim("slot 0", 60, now()).await.unwrap() else {
+        let Some(ClaimedJob { claim, job: work }) = store.claim("slot 0", 60, now()).await.unwrap()
+        else {
             panic!("there is no job, but the day is not over");
         };
         match work {
@@ -171,7 +172,10 @@ async fn run_day(store: &Store) -> EvaluationId {
                     timing: Vec::new(),
                     log: String::new(),
                 };
-                store.commit_validation(&claim, outcome, now()).await.unwrap();
+                store
+                    .commit_validation(&claim, outcome, now())
+                    .await
+                    .unwrap();
                 let stage = stage.take().unwrap();
                 store.start_day(host.clone(), stage, now()).await.unwrap();
             }
@@ -317,7 +321,8 @@ async fn exported_season_is_shown_on_another_host() {
             &export(&["public.tar.zst"]),
             &["already exists and was not changed"],
         );
-        let message: Value = serde_json::from_str(&done(&export(&["--json", "all.tar.zst"]))).unwrap();
+        let message: Value =
+            serde_json::from_str(&done(&export(&["--json", "all.tar.zst"]))).unwrap();
         assert_eq!(message["edition"], "organiser");
         let mut left: Vec<_> = fs::read_dir(&folder)
             .unwrap()

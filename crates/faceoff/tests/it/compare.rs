@@ -118,7 +118,12 @@ fn local_evaluations_with_equal_episodes_are_compared() {
     }
     let table = faceoff(&["compare", "a", "a"], folder);
     let table = text(&table.stdout);
-    for part in ["A: hold (a)", "statistically tied", "95 % interval", "score"] {
+    for part in [
+        "A: hold (a)",
+        "statistically tied",
+        "95 % interval",
+        "score",
+    ] {
         assert!(table.contains(part), "{part:?} is not in {table}");
     }
 

@@ -115,7 +115,10 @@ fn difference_ends_with_1_and_unreadable_dataset_with_2() {
         "{code}: {message}"
     );
     let (code, message) = verify(&good, &["--day", "2026-11-21"]);
-    assert!(code == 2 && message.contains("--secret"), "{code}: {message}");
+    assert!(
+        code == 2 && message.contains("--secret"),
+        "{code}: {message}"
+    );
     let missing = faceoff(&["verify", dir.path().join("none").to_str().unwrap()]);
     assert_eq!(missing.status.code(), Some(2));
 

@@ -25,7 +25,10 @@ fn configuration_is_written_once_and_valid() {
     let second = init();
     assert_eq!(second.status.code(), Some(1));
     let message = String::from_utf8_lossy(&second.stderr);
-    assert!(message.contains("already exists and was not changed"), "{message}");
+    assert!(
+        message.contains("already exists and was not changed"),
+        "{message}"
+    );
     let content = fs::read_to_string(&file).expect("the file exists");
     assert!(content.ends_with("# mine\n"), "{content}");
 
@@ -39,5 +42,8 @@ fn configuration_is_written_once_and_valid() {
     let misspelled = doctor(&written.replace("episodes_per_task", "episodes_pre_task"));
     assert_eq!(misspelled.status.code(), Some(1));
     let message = String::from_utf8_lossy(&misspelled.stderr);
-    assert!(message.contains("did you mean `episodes_per_task`?"), "{message}");
+    assert!(
+        message.contains("did you mean `episodes_per_task`?"),
+        "{message}"
+    );
 }

@@ -227,7 +227,10 @@ fn mirrored_pairs_share_a_seed_and_swap_sides() {
     );
     let mean = &results["goal_difference"];
     assert_eq!((&mean["of"], &mean["mean"]), (&2.into(), &0.0.into()));
-    assert!(mean["mean_ci95"].is_null(), "there is no interval with two pairs");
+    assert!(
+        mean["mean_ci95"].is_null(),
+        "there is no interval with two pairs"
+    );
     let spread = &results["spread"];
     assert_eq!(spread["of_independent_games"], 0.0);
     assert!(spread["ratio"].is_null(), "there is no variance");
@@ -269,7 +272,10 @@ fn series_alternates_sides_and_counts_goals_by_agent() {
     let output = play([&hold, &broken], &out, &args);
     assert!(output.status.success(), "{}", text(&output.stderr));
     let stdout = text(&output.stdout);
-    assert!(stdout.contains("hold won 2 games, drew 0, lost 0"), "{stdout}");
+    assert!(
+        stdout.contains("hold won 2 games, drew 0, lost 0"),
+        "{stdout}"
+    );
     assert!(
         stdout.contains("per game: mean +10.00, variance 0.00"),
         "{stdout}"

@@ -144,7 +144,10 @@ fn fault_is_shown_with_the_agents_error() {
         stdout.contains("the agent's fault ended the episode"),
         "{stdout}"
     );
-    assert!(stdout.contains("ValueError: 7 (agent.py, line "), "{stdout}");
+    assert!(
+        stdout.contains("ValueError: 7 (agent.py, line "),
+        "{stdout}"
+    );
     assert!(fs::read_to_string(page).unwrap().contains("ValueError: 7"));
 }
 
@@ -192,5 +195,8 @@ fn invalid_replay_is_refused_with_a_reason() {
         "{message}"
     );
     let message = refused(&dir.join("bundle"), "0", "none.html");
-    assert!(message.contains("as the dataset of an evaluation"), "{message}");
+    assert!(
+        message.contains("as the dataset of an evaluation"),
+        "{message}"
+    );
 }

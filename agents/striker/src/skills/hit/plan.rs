@@ -6,7 +6,7 @@ use crate::field::{Field, Vec2};
 use crate::keeper::Keeper;
 use crate::motion::{Pace, Target};
 use crate::puck::{DRAG, MALLET_RESTITUTION};
-use crate::scene::{Scene, waypoint, lean_side};
+use crate::scene::{Scene, lean_side, waypoint};
 use crate::skills::aim::strike_towards;
 
 /// Duration of the run-up, seconds.
@@ -194,7 +194,8 @@ fn aim_at(scene: &Scene<'_>, left: f64, aim: Aim, side: Side, speed: Option<f64>
     if (mallet - field.clamp_mallet(mallet)).norm() > 1e-9 || mallet.x > -0.25 {
         return None;
     }
-    let chance = goal_chance(field, scene.keeper, scene.time + left, &struck, aim) - WAITING_COST * left;
+    let chance =
+        goal_chance(field, scene.keeper, scene.time + left, &struck, aim) - WAITING_COST * left;
     Some(Plan {
         contact_time: scene.time + left,
         aim,

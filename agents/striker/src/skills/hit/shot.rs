@@ -123,7 +123,13 @@ fn flight(length: f64, speed: f64) -> Option<f64> {
     (share <= 0.9).then(|| -(1.0 - share).ln() / DRAG)
 }
 
-fn straight_chance(field: &Field, opponent: Option<&Opponent>, time: f64, struck: &Puck, aim: f64) -> f64 {
+fn straight_chance(
+    field: &Field,
+    opponent: Option<&Opponent>,
+    time: f64,
+    struck: &Puck,
+    aim: f64,
+) -> f64 {
     let length = (Vec2::new(field.half_length, aim) - struck.pos).norm();
     let Some(flight) = flight(length, struck.vel.norm()) else {
         return 0.0;

@@ -79,7 +79,13 @@ pub fn try_normal(field: &Field, puck: &Puck, index: usize, best: &mut Option<St
 
 /// Mean value of a strike over variations of uncertain parameters (contact normal, speed), if it
 /// exceeds `least`. Gentler strikes have a small advantage.
-fn strike_value(field: &Field, puck: &Puck, normal: Vec2, velocity: Vec2, least: f64) -> Option<f64> {
+fn strike_value(
+    field: &Field,
+    puck: &Puck,
+    normal: Vec2,
+    velocity: Vec2,
+    least: f64,
+) -> Option<f64> {
     const VARIATIONS: [(f64, f64); 7] = [
         (0.0, 1.0),
         (0.05, 1.0),

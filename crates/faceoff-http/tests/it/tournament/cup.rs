@@ -2,7 +2,7 @@
 
 use super::fake_slot::{self, GameOutcome};
 use crate::site::{ADMIN, Answer, Site, TestTeam, string};
-use faceoff_store::{JobClaim, Game};
+use faceoff_store::{Game, JobClaim};
 use faceoff_types::Seed;
 use reqwest::Method;
 use serde_json::{Value, json};
@@ -106,7 +106,10 @@ impl Cup {
     }
 
     /// Plays the next game; `None` if no game is queued.
-    pub async fn play_next(&self, outcome: impl Fn(&Game, [&str; 2]) -> GameOutcome) -> Option<Game> {
+    pub async fn play_next(
+        &self,
+        outcome: impl Fn(&Game, [&str; 2]) -> GameOutcome,
+    ) -> Option<Game> {
         fake_slot::play_next(&self.site, outcome).await
     }
 

@@ -1,7 +1,7 @@
 //! Decisions during a tournament: withdrawal, disqualification, voiding, re-running, pausing and closing.
 
 use super::{
-    cup::{Cup, team_names, first_by_name_wins},
+    cup::{Cup, first_by_name_wins, team_names},
     fake_slot::GameOutcome,
 };
 use crate::site::{ADMIN, string};
@@ -52,13 +52,20 @@ async fn withdrawn_team_keeps_its_finished_rounds() {
     assert_eq!(row(&view, "A")["points_per_round"][0], 6);
     cup.play(first_by_name_wins).await;
     let view = cup.view().await;
-    assert_eq!(view["phase"], "played", "its open games do not block the round");
+    assert_eq!(
+        view["phase"], "played",
+        "its open games do not block the round"
+    );
     // Of round 2 only the game of B and C counts, also if others were played.
     assert_eq!(row(&view, "A")["points_per_round"], json!([6, 0]));
     assert_eq!(row(&view, "B")["points_per_round"], json!([3, 3]));
     assert_eq!(row(&view, "C")["points_per_round"], json!([0, 0]));
     assert_eq!(row(&view, "A")["left"], "withdrawn");
-    assert_eq!(names(&view), ["A", "B", "C"], "the withdrawn team keeps its rank");
+    assert_eq!(
+        names(&view),
+        ["A", "B", "C"],
+        "the withdrawn team keeps its rank"
+    );
     for game in cup.games().await {
         let (home, away) = team_names(&game);
         let with_a = [home, away].contains(&"A".to_owned());
@@ -159,7 +166,8 @@ async fn voided_game_is_rerun_on_the_same_seed() {
     let cup = Cup::open(&["A", "B"], json!({})).await;
     cup.start_round().await;
     let (claim, game, seed) = cup.claim().await.unwrap();
-    cup.commit(&claim, &game, seed, GameOutcome::goals(5, 0)).await;
+    cup.commit(&claim, &game, seed, GameOutcome::goals(5, 0))
+        .await;
     let path = format!("/api/v1/games/{}", game.id);
     let ruling = json!({ "reason": "a fan stood still" });
     let post = async |action: &str, body: &Value| {
@@ -209,7 +217,8 @@ async fn voided_game_is_rerun_on_the_same_seed() {
         (game.id, seed),
         "the same game on the same seed"
     );
-    cup.commit(&claim, &again, seed, GameOutcome::goals(0, 1)).await;
+    cup.commit(&claim, &again, seed, GameOutcome::goals(0, 1))
+        .await;
     let played = cup.site.get(&path, None).await.json(200);
     assert_eq!(
         (&played["attempt"], &played["result"]["winner"]),
@@ -258,7 +267,8 @@ async fn paused_tournament_finishes_running_games_only() {
         .await
         .problem(409, "conflict", &["paused"]);
     assert!(cup.claim().await.is_none());
-    cup.commit(&claim, &game, seed, GameOutcome::goals(1, 0)).await;
+    cup.commit(&claim, &game, seed, GameOutcome::goals(1, 0))
+        .await;
     assert!(cup.claim().await.is_none());
     let waiting = cup
         .games()

@@ -64,7 +64,10 @@ async fn own_side_is_available_at_once_and_both_once_published() {
             file_statuses(&cup, &id, Some(cup.token(&away))).await,
             [403, 403, 200, 403]
         );
-        assert_eq!(file_statuses(&cup, &id, Some(cup.token(other))).await, [403; 4]);
+        assert_eq!(
+            file_statuses(&cup, &id, Some(cup.token(other))).await,
+            [403; 4]
+        );
         assert_eq!(file_statuses(&cup, &id, Some(ADMIN)).await, [200; 4]);
         assert_eq!(seed(&cup, &id, Some(cup.token(&home))).await, Value::Null);
         assert_ne!(seed(&cup, &id, Some(ADMIN)).await, Value::Null);
@@ -106,7 +109,10 @@ async fn own_side_is_available_at_once_and_both_once_published() {
             .await;
         assert_eq!(log.body, format!("{away} was here\n"));
         assert!(log.header("content-type").starts_with("text/plain"));
-        assert_eq!(file_statuses(&cup, &id, Some(cup.token(other))).await[3], 403);
+        assert_eq!(
+            file_statuses(&cup, &id, Some(cup.token(other))).await[3],
+            403
+        );
     }
 }
 
@@ -123,7 +129,10 @@ async fn downloaded_files_match_the_hashes_in_the_game() {
         ("sides/1", &recording["side_blake3"][0], "side-1.zip"),
         ("sides/2", &recording["side_blake3"][1], "side-2.zip"),
     ] {
-        let answer = cup.site.get(&format!("{path}/{resource}"), Some(ADMIN)).await;
+        let answer = cup
+            .site
+            .get(&format!("{path}/{resource}"), Some(ADMIN))
+            .await;
         assert_eq!(
             *hash,
             json!(blake3::hash(answer.body.as_bytes()).to_string())

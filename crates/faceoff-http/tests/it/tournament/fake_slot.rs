@@ -3,10 +3,10 @@
 use crate::site::Site;
 use faceoff_scoring::{
     tier_of,
-    tournament::{Forfeit, GameTally, GameScore, SideScore, final_score, judge},
+    tournament::{Forfeit, GameScore, GameTally, SideScore, final_score, judge},
 };
 use faceoff_store::{
-    JobClaim, ClaimedJob, CommitOutcome, Game, GameCommit, GamePurpose, GameRecording, Job,
+    ClaimedJob, CommitOutcome, Game, GameCommit, GamePurpose, GameRecording, Job, JobClaim,
 };
 use faceoff_types::{
     ComputationTimeSummary, ForfeitCause, GameLimits, Profile, Ruleset, Seed, ViolationCounts,
@@ -122,7 +122,11 @@ pub async fn names(site: &Site, game: &Game) -> [String; 2] {
 }
 
 /// Commits the result of a game with its files.
-pub async fn commit(site: &Site, (claim, game, seed): (&JobClaim, &Game, Seed), outcome: GameOutcome) {
+pub async fn commit(
+    site: &Site,
+    (claim, game, seed): (&JobClaim, &Game, Seed),
+    outcome: GameOutcome,
+) {
     let team_names = names(site, game).await;
     let recording = match game.purpose {
         GamePurpose::Replay { .. } => None,
@@ -159,7 +163,10 @@ async fn store_files(site: &Site, claim: &JobClaim, game: &Game) -> GameRecordin
 }
 
 /// Plays the next game; `None` if no game is queued.
-pub async fn play_next(site: &Site, outcome: impl Fn(&Game, [&str; 2]) -> GameOutcome) -> Option<Game> {
+pub async fn play_next(
+    site: &Site,
+    outcome: impl Fn(&Game, [&str; 2]) -> GameOutcome,
+) -> Option<Game> {
     let (claim, game, seed) = claim(site).await?;
     let [home, away] = names(site, &game).await;
     let outcome = outcome(&game, [&home, &away]);

@@ -1,7 +1,7 @@
 //! Tournament formats: round robin with byes, groups with a final, Swiss, and mirrored pairs.
 
 use super::{
-    cup::{Cup, team_names, first_by_name_wins},
+    cup::{Cup, first_by_name_wins, team_names},
     fake_slot::GameOutcome,
 };
 use crate::site::{ADMIN, Site, result, string};
@@ -68,7 +68,10 @@ async fn game_shows_its_seed_label_but_not_the_seed() {
     let cup = Cup::open(&["A", "B", "C", "D"], json!({})).await;
     cup.start_round().await;
     let games = cup.games().await;
-    let labels: Vec<String> = games.iter().map(|game| string(&game["seed_label"])).collect();
+    let labels: Vec<String> = games
+        .iter()
+        .map(|game| string(&game["seed_label"]))
+        .collect();
     assert_eq!(labels[0], "tournament/1/round/1/meeting/1");
     let distinct: BTreeSet<&String> = labels.iter().collect();
     assert_eq!(distinct.len(), 6);

@@ -5,7 +5,7 @@ use crate::{
     html::{rows, texts},
     site::string,
 };
-use faceoff_episode::{AnswerTiming, Arena, RallyEntry, RunningGame, Response};
+use faceoff_episode::{AnswerTiming, Arena, RallyEntry, Response, RunningGame};
 use faceoff_replay::{CHUNK_STEPS, Clip, GameClipRecorder};
 use faceoff_store::Game;
 use faceoff_types::{GameLimits, Interpolation, Profile, Seed, Side};
@@ -103,7 +103,10 @@ async fn game_page_shows_result_and_reason() {
         rows.iter().any(|row| row.starts_with("Penalty points")),
         "{rows:?}"
     );
-    assert!(html.html().contains("The replay of this game is no longer stored"));
+    assert!(
+        html.html()
+            .contains("The replay of this game is no longer stored")
+    );
 
     let waiting = cup.games().await;
     let waiting = waiting
@@ -112,7 +115,11 @@ async fn game_page_shows_result_and_reason() {
         .unwrap();
     let path = format!("/games/{}", string(&waiting["id"]));
     let html = cup.site.get(&path, None).await;
-    assert!(html.body.contains("Waiting for a free slot."), "{}", html.body);
+    assert!(
+        html.body.contains("Waiting for a free slot."),
+        "{}",
+        html.body
+    );
     assert_eq!(cup.site.get("/games/nothing", None).await.status, 404);
 }
 
@@ -166,8 +173,7 @@ async fn game_page_shows_statistics_of_its_clips() {
     // The arms do not move, so the puck stays where it was served.
     let found = rows(&html, "[aria-labelledby=possession] tbody tr");
     assert!(
-        found[0] == "Puck on own half 100.0 0.0"
-            || found[0] == "Puck on own half 0.0 100.0",
+        found[0] == "Puck on own half 100.0 0.0" || found[0] == "Puck on own half 0.0 100.0",
         "{found:?}"
     );
     assert_eq!(found[1], "Last to touch the puck 0.0 0.0");
@@ -197,6 +203,10 @@ async fn game_page_shows_statistics_of_its_clips() {
         let replay = html.select(&replay).next().unwrap();
         replay.attr("data-samples").unwrap().to_owned()
     };
-    assert_eq!(samples(&hidden), "45001", "the length by the rules, not that of the game");
+    assert_eq!(
+        samples(&hidden),
+        "45001",
+        "the length by the rules, not that of the game"
+    );
     assert!(texts(&hidden, "[aria-labelledby=possession]").is_empty());
 }

@@ -80,7 +80,11 @@ async fn live_stream_is_resumed_without_a_gap() {
     live.advance(game.id, 1, vec![goal(300, [1, 0])], Some(position(301)));
     let event = stream.next().await.unwrap();
     assert_eq!(
-        (event.name.as_str(), event.id.as_deref(), &event.data["kind"]),
+        (
+            event.name.as_str(),
+            event.id.as_deref(),
+            &event.data["kind"]
+        ),
         ("happening", Some("1.1"), &json!("goal"))
     );
     assert_eq!(stream.next().await.unwrap().name, "position");
@@ -121,7 +125,8 @@ async fn live_stream_is_resumed_without_a_gap() {
     assert_eq!(resumed.next().await, None, "the stream ends with the game");
 
     // A stream that is opened after the end has all events at once, and ends.
-    cup.commit(&claim, &game, seed, GameOutcome::goals(3, 0)).await;
+    cup.commit(&claim, &game, seed, GameOutcome::goals(3, 0))
+        .await;
     let mut late = open(&cup, game.id, None).await;
     let mut names = Vec::new();
     while let Some(event) = late.next().await {
@@ -179,7 +184,8 @@ async fn live_stream_waits_for_the_start_and_restarts_on_retry() {
 #[tokio::test]
 async fn live_stream_of_a_finished_game_has_its_result() {
     let (cup, claim, game, seed) = running_game().await;
-    cup.commit(&claim, &game, seed, GameOutcome::goals(4, 1)).await;
+    cup.commit(&claim, &game, seed, GameOutcome::goals(4, 1))
+        .await;
     let mut stream = open(&cup, game.id, None).await;
     let snapshot = stream.next().await.unwrap();
     assert_eq!(
@@ -234,5 +240,9 @@ async fn shutdown_does_not_wait_for_the_end_of_games() {
     let mut stream = open(&cup, game.id, None).await;
     assert_eq!(stream.next().await.unwrap().name, "snapshot");
     cup.site.shut_down().await;
-    assert_eq!(stream.next().await, None, "the stream ends without an error");
+    assert_eq!(
+        stream.next().await,
+        None,
+        "the stream ends without an error"
+    );
 }

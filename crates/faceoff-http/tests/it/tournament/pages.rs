@@ -56,7 +56,11 @@ fn unusual_outcome(_: &Game, [home, away]: [&str; 2]) -> GameOutcome {
         penalty_points: [1.25, 2.5],
         ..GameOutcome::goals(UNUSUAL_SCORE[0], UNUSUAL_SCORE[1])
     };
-    if home > away { outcome } else { outcome.swapped() }
+    if home > away {
+        outcome
+    } else {
+        outcome.swapped()
+    }
 }
 
 /// Asserts that a page reveals no result of games that end by [`unusual_outcome`].
@@ -213,7 +217,10 @@ async fn schedule_shows_voided_games_with_their_reason() {
         "{results:?}"
     );
     let hidden = open_without_results(&cup.site, &path(&cup)).await;
-    assert!(!hidden.body.contains("lamp"), "a reason may reveal the result");
+    assert!(
+        !hidden.body.contains("lamp"),
+        "a reason may reveal the result"
+    );
 }
 
 #[tokio::test]
@@ -235,7 +242,10 @@ async fn excluded_game_names_the_team_that_left() {
         "its two games are struck through in both rows"
     );
     let results = texts(&html, ".games td:last-child");
-    assert!(results.iter().any(|result| result.ends_with(&words)), "{results:?}");
+    assert!(
+        results.iter().any(|result| result.ends_with(&words)),
+        "{results:?}"
+    );
     let teams = texts(&html, "[data-live-region=entrants] th");
     let left = format!("{home} withdrawn from round 1: the arm is sold");
     assert!(teams.contains(&left), "{teams:?}");
@@ -376,7 +386,10 @@ async fn pair_page_compares_two_teams_independent_of_sides() {
     let games = texts(&html, "[aria-labelledby=numbers] tbody td:nth-of-type(1)");
     assert_eq!(games, ["5 : 2", "5 : 2"], "the page's first team first");
     let swapped = page(&cup.site, &format!("{}/teams/{b}/{a}", path(&cup))).await;
-    let games = texts(&swapped, "[aria-labelledby=numbers] tbody td:nth-of-type(1)");
+    let games = texts(
+        &swapped,
+        "[aria-labelledby=numbers] tbody td:nth-of-type(1)",
+    );
     assert_eq!(games, ["2 : 5", "2 : 5"]);
     let tournament = page(&cup.site, &path(&cup)).await;
     assert!(links(&tournament, "main a").contains(&pair_path));
@@ -441,9 +454,14 @@ async fn running_game_page_shows_score_and_live_stream() {
 
     let hidden_page = open_without_results(&cup.site, &game_path).await;
     let hidden_page = Html::parse_document(&hidden_page.body);
-    assert_eq!(stream(&hidden_page), None, "the stream would reveal the score");
+    assert_eq!(
+        stream(&hidden_page),
+        None,
+        "the stream would reveal the score"
+    );
     assert!(texts(&hidden_page, ".verdict").is_empty());
-    cup.commit(&claim, &game, seed, GameOutcome::goals(3, 0)).await;
+    cup.commit(&claim, &game, seed, GameOutcome::goals(3, 0))
+        .await;
     let finished = page(&cup.site, &game_path).await;
     assert_eq!(stream(&finished), None);
     assert!(texts(&finished, ".verdict")[0].starts_with("3 : 0"));

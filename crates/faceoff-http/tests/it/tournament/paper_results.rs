@@ -136,11 +136,7 @@ async fn tournament_of_the_paper_has_its_standings() {
         ratings,
         serde_json::to_value(rate(&entries).unwrap()).unwrap()
     );
-    assert_eq!(
-        ratings,
-        get("ratings").await,
-        "ratings are deterministic"
-    );
+    assert_eq!(ratings, get("ratings").await, "ratings are deterministic");
     let best = &ratings["results"][0]["ratings"][0];
     assert_eq!(
         (&best["team"], &best["ci95"][1]),

@@ -63,7 +63,10 @@ async fn repeated_schedules_give_the_champion_probabilities() {
         Some(ADMIN),
     );
     let cancelled = Answer::of(request.send().await.unwrap()).await.json(200);
-    assert_eq!((&cancelled["given_up"], &cancelled["games"]), (&json!(1), &json!(12)));
+    assert_eq!(
+        (&cancelled["given_up"], &cancelled["games"]),
+        (&json!(1), &json!(12))
+    );
     assert!(cup.claim().await.is_none());
     let all = certainty(&cup).await;
     let shares: Vec<(String, &Value)> = all["champions"]

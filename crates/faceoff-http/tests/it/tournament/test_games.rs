@@ -63,7 +63,9 @@ async fn test_game_is_private_and_does_not_count() {
         (&json!("test"), &json!("A"), &json!("Organisers"))
     );
     let path = format!("/api/v1/games/{}", string(&game["id"]));
-    cup.play_next(|_, _| GameOutcome::goals(3, 0)).await.unwrap();
+    cup.play_next(|_, _| GameOutcome::goals(3, 0))
+        .await
+        .unwrap();
     for (token, is_visible) in [
         (None, false),
         (Some(cup.token("B")), false),
@@ -73,7 +75,12 @@ async fn test_game_is_private_and_does_not_count() {
     ] {
         for resource in ["", "/live", "/recording", "/sides/1"] {
             let answer = cup.site.get(&format!("{path}{resource}"), token).await;
-            assert_eq!(answer.status != 404, is_visible, "{resource} {}", answer.body);
+            assert_eq!(
+                answer.status != 404,
+                is_visible,
+                "{resource} {}",
+                answer.body
+            );
         }
     }
     // The team may download its own side at once, but never both sides, which contain the seed.
@@ -119,7 +126,11 @@ async fn daily_quota_of_test_games_applies_to_teams_only() {
         format!("/api/v1/games/{}", string(&played.json(201)["id"]))
     );
     let refused = test_game(&cup, "A").await;
-    let problem = refused.problem(429, "daily-game-quota-exceeded", &["at most 2", "requested 2"]);
+    let problem = refused.problem(
+        429,
+        "daily-game-quota-exceeded",
+        &["at most 2", "requested 2"],
+    );
     assert_eq!(
         (&problem["limit"], &problem["used"]),
         (&json!(2), &json!(2))
@@ -139,7 +150,11 @@ async fn daily_quota_of_test_games_applies_to_teams_only() {
     let some = cup
         .post("test-games", json!({ "teams": ["A", "Organisers"] }))
         .await;
-    some.problem(409, "conflict", &["Organisers", "cannot play against itself"]);
+    some.problem(
+        409,
+        "conflict",
+        &["Organisers", "cannot play against itself"],
+    );
     cup.site.next_day();
     test_game(&cup, "A").await.json(201);
     // A team cannot start test games of another team.

@@ -2,9 +2,9 @@
 //! like a real worker: it claims jobs, commits results and scores evaluations.
 
 use crate::site::{Site, score_outcomes};
-use faceoff_store::{ClaimedJob, RunOwner, ShardCommit, Job};
+use faceoff_store::{ClaimedJob, Job, RunOwner, ShardCommit};
 use faceoff_types::{
-    ComputationTime, EpisodeEnd, EpisodeOutcome, EvaluationId, RunId, ValidationOutcome, Task,
+    ComputationTime, EpisodeEnd, EpisodeOutcome, EvaluationId, RunId, Task, ValidationOutcome,
     Violations,
 };
 use std::collections::HashMap;
@@ -64,7 +64,12 @@ pub struct FakeWorker {
 impl FakeWorker {
     /// Performs the validation runs, which come before all other jobs in the queue.
     pub async fn perform_validations(&mut self, site: &Site) {
-        while let Some(claimed) = site.store.claim("fake-worker", 60, site.now()).await.unwrap() {
+        while let Some(claimed) = site
+            .store
+            .claim("fake-worker", 60, site.now())
+            .await
+            .unwrap()
+        {
             if !matches!(claimed.job, Job::Validation { .. }) {
                 let released = site.store.release(&claimed.claim, site.now());
                 return released.await.unwrap();
@@ -77,7 +82,11 @@ impl FakeWorker {
     pub async fn work(&mut self, site: &Site, at_most: usize) {
         let target = self.scored + at_most;
         while self.scored < target {
-            let claimed = site.store.claim("fake-worker", 60, site.now()).await.unwrap();
+            let claimed = site
+                .store
+                .claim("fake-worker", 60, site.now())
+                .await
+                .unwrap();
             let Some(claimed) = claimed else { return };
             self.perform(site, claimed).await;
         }
@@ -103,7 +112,10 @@ impl FakeWorker {
                 bundle,
                 ..
             } => {
-                assert!(!matches!(owner, RunOwner::Ablation(_)), "the test starts no ablation");
+                assert!(
+                    !matches!(owner, RunOwner::Ablation(_)),
+                    "the test starts no ablation"
+                );
                 // An agent has the same strength every day, but solves other episodes.
                 let strength = 300 + u64::from(bundle.blake3.as_bytes()[0]) * 2;
                 let first = u128::from_le_bytes(*shard.id.as_uuid().as_bytes()) as u64;

@@ -128,7 +128,10 @@ impl Season {
 
     async fn void_evaluation(&mut self) {
         let evaluations = self.evaluations(VOIDED_EVALUATION).await;
-        let (id, name) = (string(&evaluations[0]["id"]), string(&evaluations[0]["team_name"]));
+        let (id, name) = (
+            string(&evaluations[0]["id"]),
+            string(&evaluations[0]["team_name"]),
+        );
         let void = format!("/evaluations/{id}/void");
         let unconfirmed = self.post(&void, reason("the table was tilted")).await;
         unconfirmed.problem(409, "not-confirmed", &[&name]);
@@ -195,7 +198,12 @@ impl Season {
         let day = OVERFULL_DAY;
         let states = async |season: &Self| {
             let evaluations = season.evaluations(day).await;
-            let count = |state: &str| evaluations.iter().filter(|one| one["state"] == state).count();
+            let count = |state: &str| {
+                evaluations
+                    .iter()
+                    .filter(|one| one["state"] == state)
+                    .count()
+            };
             (count("finished"), count("not_played"), evaluations.len())
         };
         let (finished, not_played, all) = states(self).await;
@@ -259,7 +267,10 @@ impl Season {
             .post(&format!("/stages/{stage}/days"), body)
             .await
             .json(200);
-        assert_eq!(day["created"].as_array().unwrap().len(), self.active_teams());
+        assert_eq!(
+            day["created"].as_array().unwrap().len(),
+            self.active_teams()
+        );
         self.worker.work(&self.site, usize::MAX / 2).await;
     }
 
@@ -303,7 +314,10 @@ impl Season {
         let [first, last] = days;
         let (first, last) = (first.await, last.await);
         let max_retained = self.active_teams() / 4;
-        assert!(first < max_retained, "{first} of day {RETENTION_SET} are kept");
+        assert!(
+            first < max_retained,
+            "{first} of day {RETENTION_SET} are kept"
+        );
         assert_eq!(last, self.active_teams(), "the last stage has no retention");
     }
 

@@ -3,7 +3,7 @@
 
 use super::fake_worker::FakeWorker;
 use crate::site::{ADMIN, Answer, GZIP, Site, TestTeam, string};
-use faceoff_worker::{start_due, clean_up};
+use faceoff_worker::{clean_up, start_due};
 use jiff::{SignedDuration, Timestamp, ToSpan, civil::Date, tz::TimeZone};
 use reqwest::Method;
 use serde_json::{Value, json};
@@ -144,7 +144,9 @@ impl Season {
             self.upload(index, 0).await;
         }
         for index in 0..team_count {
-            if (number + index) % DAYS_PER_SUBMISSION == 0 && number > 0 && !self.teams[index].is_inactive
+            if (number + index) % DAYS_PER_SUBMISSION == 0
+                && number > 0
+                && !self.teams[index].is_inactive
             {
                 self.upload(index, number).await;
             }
@@ -191,7 +193,8 @@ impl Season {
         assert_eq!(started, self.active_teams(), "day {day}");
         let before = self.worker.scored;
         self.site.advance(1);
-        let evaluations = super::organiser_actions::finished_evaluations(day).unwrap_or(usize::MAX / 2);
+        let evaluations =
+            super::organiser_actions::finished_evaluations(day).unwrap_or(usize::MAX / 2);
         self.worker.work(&self.site, evaluations).await;
         self.worker.scored - before
     }

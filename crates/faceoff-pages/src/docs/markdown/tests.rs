@@ -69,10 +69,7 @@ fn links_point_to_pages_or_name_a_file() {
 #[test]
 fn heading_ids_follow_github_rules() {
     for (heading, id) in [
-        (
-            "The day: cutoff and release",
-            "the-day-cutoff-and-release",
-        ),
+        ("The day: cutoff and release", "the-day-cutoff-and-release"),
         ("Which `files`?", "which-files"),
         ("Time – measured, fairly", "time--measured-fairly"),
         ("Über snake_case", "über-snake_case"),

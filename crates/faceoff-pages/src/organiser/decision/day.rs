@@ -1,11 +1,11 @@
 //! Decisions about an evaluation day.
 
-use super::preview::{PUBLIC_REASON, DecisionPreview, day_page, sentence};
+use super::preview::{DecisionPreview, PUBLIC_REASON, day_page, sentence};
 use faceoff_api::requests;
 use faceoff_service::{
-    services::{rulings, evaluations},
     app::AppState,
     problem::Problem,
+    services::{evaluations, rulings},
     views::capacity,
 };
 use faceoff_store::Actor;

@@ -1,14 +1,14 @@
 //! Decisions about an evaluation.
 
-use super::preview::{PUBLIC_REASON, DecisionPreview, day_page, sentence};
+use super::preview::{DecisionPreview, PUBLIC_REASON, day_page, sentence};
 use faceoff_api::{
     requests::{self, NewExtraEvaluation},
     views::evaluation::EvaluationView,
 };
 use faceoff_service::{
-    services::{rulings, evaluations},
     app::AppState,
     problem::Problem,
+    services::{evaluations, rulings},
     views::{evaluation, visibility::Visibility},
 };
 use faceoff_store::Actor;

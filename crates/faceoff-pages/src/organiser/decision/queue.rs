@@ -1,9 +1,9 @@
 //! Decisions about the queue.
 
-use super::preview::{PUBLIC_REASON, DecisionPreview};
+use super::preview::{DecisionPreview, PUBLIC_REASON};
 use crate::figures::utc_minute;
 use faceoff_api::requests;
-use faceoff_service::{services::rulings, app::AppState, problem::Problem, views::ruling};
+use faceoff_service::{app::AppState, problem::Problem, services::rulings, views::ruling};
 use faceoff_store::Actor;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -1,8 +1,8 @@
 //! Decisions about a stage and its result.
 
-use super::preview::{PUBLIC_REASON, DecisionPreview, sentence};
+use super::preview::{DecisionPreview, PUBLIC_REASON, sentence};
 use faceoff_api::requests;
-use faceoff_service::{services::stage_results, app::AppState, problem::Problem};
+use faceoff_service::{app::AppState, problem::Problem, services::stage_results};
 use faceoff_store::Actor;
 use faceoff_types::StageId;
 

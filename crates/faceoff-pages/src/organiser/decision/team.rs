@@ -1,11 +1,11 @@
 //! Decisions about teams and registrations.
 
-use super::preview::{PUBLIC_REASON, DecisionPreview, sentence};
+use super::preview::{DecisionPreview, PUBLIC_REASON, sentence};
 use faceoff_api::requests;
 use faceoff_service::{
-    services::{registrations, rulings},
     app::AppState,
     problem::Problem,
+    services::{registrations, rulings},
 };
 use faceoff_store::Actor;
 use faceoff_types::{RegistrationId, TeamId};
@@ -70,7 +70,8 @@ impl TeamDecision {
                         "The team is created. Its first member joins with the link of the registration within seven days."
                             .to_owned()
                     } else {
-                        "The team is not created. The link of the registration shows your reason.".to_owned()
+                        "The team is not created. The link of the registration shows your reason."
+                            .to_owned()
                     },
                     reason_readers: (!approves).then_some("visible to the registered contact"),
                     confirm_name: None,

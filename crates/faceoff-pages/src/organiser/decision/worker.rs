@@ -2,7 +2,7 @@
 
 use super::preview::DecisionPreview;
 use faceoff_api::requests;
-use faceoff_service::{services::workers, app::AppState, problem::Problem};
+use faceoff_service::{app::AppState, problem::Problem, services::workers};
 use faceoff_store::{Actor, WorkerName};
 
 #[derive(Debug, Clone)]

@@ -133,7 +133,10 @@ impl<'a> Archive<'a> {
     }
 
     fn reader(&self, path: &Path) -> Result<CancellableReader<'a, std::fs::File>, BundleError> {
-        Ok(CancellableReader::new(File::open(path)?.into_file(), self.budget))
+        Ok(CancellableReader::new(
+            File::open(path)?.into_file(),
+            self.budget,
+        ))
     }
 
     /// Reads a JSON document.
@@ -159,7 +162,10 @@ impl<'a> Archive<'a> {
         serde_json::from_slice(&bytes).map_err(|error| {
             // The message may quote the document.
             let message = error.to_string();
-            invalid(format_args!("cannot be read: {name}: {}", escape_unprintable(&message)))
+            invalid(format_args!(
+                "cannot be read: {name}: {}",
+                escape_unprintable(&message)
+            ))
         })
     }
 
@@ -183,7 +189,9 @@ impl<'a> Archive<'a> {
         for top in self.top_level_names() {
             let path = self.into.join(top);
             match self.nodes.get(top) {
-                Some(Node::Folder { is_created: true, .. }) => fs::remove_dir_all(path)?,
+                Some(Node::Folder {
+                    is_created: true, ..
+                }) => fs::remove_dir_all(path)?,
                 Some(Node::File) => fs::remove_file(path)?,
                 Some(Node::Folder { .. } | Node::Link { .. }) | None => {}
             }

@@ -4,7 +4,7 @@ use super::{
     archive::{Archive, DOCKER_LIST, OCI_INDEX},
     digest::Digest,
     env,
-    messages::{invalid, dockerfile_hint},
+    messages::{dockerfile_hint, invalid},
 };
 use crate::bundle::error::BundleError;
 use faceoff_types::escape_unprintable;
@@ -257,7 +257,9 @@ fn read_docker_list(archive: &mut Archive<'_>) -> Result<DockerImage, BundleErro
     match (images.pop_first(), images.len()) {
         (Some(image), 0) => Ok(image),
         (Some(_), more) => Err(several(more + 1, &tags)),
-        (None, _) => Err(with_image_hint(invalid("is missing: manifest.json names none"))),
+        (None, _) => Err(with_image_hint(invalid(
+            "is missing: manifest.json names none",
+        ))),
     }
 }
 
@@ -265,7 +267,8 @@ fn read_oci_layout(archive: &mut Archive<'_>) -> Result<(DockerImage, Config), B
     let list: OciList = archive.document(OCI_INDEX).map_err(with_image_hint)?;
     let image = choose(collect_images(archive, list)?)?;
     let image: OciImage = archive.document(&Digest::parse(&image.digest)?.blob_path())?;
-    let blob_path = |part: &Descriptor| Digest::parse(&part.digest).map(|digest| digest.blob_path());
+    let blob_path =
+        |part: &Descriptor| Digest::parse(&part.digest).map(|digest| digest.blob_path());
     let layers = image.layers.unwrap_or_default();
     let image = DockerImage {
         config: blob_path(&image.config)?,
@@ -277,7 +280,10 @@ fn read_oci_layout(archive: &mut Archive<'_>) -> Result<(DockerImage, Config), B
 }
 
 /// All images of a list and of its nested lists, each once.
-fn collect_images(archive: &mut Archive<'_>, list: OciList) -> Result<Vec<Descriptor>, BundleError> {
+fn collect_images(
+    archive: &mut Archive<'_>,
+    list: OciList,
+) -> Result<Vec<Descriptor>, BundleError> {
     let mut images = Vec::new();
     let mut seen = BTreeSet::new();
     let mut todo = list.manifests.unwrap_or_default();
@@ -331,7 +337,9 @@ fn choose(mut images: Vec<Descriptor>) -> Result<Descriptor, BundleError> {
     match (images.pop(), images.len()) {
         (Some(image), 0) => Ok(image),
         (Some(_), more) => Err(several(more + 1, &BTreeSet::new())),
-        (None, _) => Err(with_image_hint(invalid("is missing: index.json names none"))),
+        (None, _) => Err(with_image_hint(invalid(
+            "is missing: index.json names none",
+        ))),
     }
 }
 

@@ -25,7 +25,12 @@ pub(super) fn read(entries: &[String]) -> Result<BTreeMap<String, String>, Bundl
         )));
     }
     let read_one = |entry: &String| {
-        let shown = |text: &str| escape_unprintable(text).chars().take(80).collect::<String>();
+        let shown = |text: &str| {
+            escape_unprintable(text)
+                .chars()
+                .take(80)
+                .collect::<String>()
+        };
         let Some((name, value)) = entry.split_once('=') else {
             return Err(invalid(format_args!(
                 "sets the variable {:?} (ENV): expected NAME=VALUE",
@@ -64,9 +69,15 @@ mod tests {
 
     #[test]
     fn env_accepts_only_variables_for_programs() {
-        assert_eq!(result_text(&["A=b=c", "B=", "A=d"]), r#"{"A": "d", "B": ""}"#);
+        assert_eq!(
+            result_text(&["A=b=c", "B=", "A=d"]),
+            r#"{"A": "d", "B": ""}"#
+        );
         for wrong in ["", "A"] {
-            assert!(result_text(&[wrong]).contains("expected NAME=VALUE"), "{wrong:?}");
+            assert!(
+                result_text(&[wrong]).contains("expected NAME=VALUE"),
+                "{wrong:?}"
+            );
         }
         for odd in [
             "=x",

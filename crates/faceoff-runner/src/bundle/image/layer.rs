@@ -5,7 +5,7 @@ use super::{
     root::Root,
 };
 use crate::bundle::{
-    budget::{Budget, MultiStreamReader, MeteredReader},
+    budget::{Budget, MeteredReader, MultiStreamReader},
     error::BundleError,
     tar_archive,
 };
@@ -62,7 +62,10 @@ fn apply_tar<'a>(
     let mut hashed = HashingReader::new(reader);
     tar_archive::unpack(&mut hashed, root, budget)?;
     // The digest covers all bytes including padding. The bytes read here are not part of files, and count as overhead.
-    io::copy(&mut MeteredReader::new(&mut hashed, budget), &mut io::sink())
-        .map_err(BundleError::on_read(""))?;
+    io::copy(
+        &mut MeteredReader::new(&mut hashed, budget),
+        &mut io::sink(),
+    )
+    .map_err(BundleError::on_read(""))?;
     diff_id.check("its uncompressed content", hashed.into_hash())
 }

@@ -1,9 +1,9 @@
-use super::messages::{invalid, dockerfile_hint};
+use super::messages::{dockerfile_hint, invalid};
 use crate::bundle::{
     budget::Budget,
     entry::{
-        PATH_MAX_BYTES, check_target, invalid as invalid_entry, make_folder, normalise, add_hard_link,
-        write_new,
+        PATH_MAX_BYTES, add_hard_link, check_target, invalid as invalid_entry, make_folder,
+        normalise, write_new,
     },
     error::BundleError,
     sink::{Sink, Special},
@@ -428,7 +428,13 @@ impl<'a> Root<'a> {
                 name: name.to_owned(),
             };
             let disk_path = self.put(name, &location, Kind::File)?;
-            write_new(name, &disk_path, 0o644, &mut content.as_bytes(), self.budget)?;
+            write_new(
+                name,
+                &disk_path,
+                0o644,
+                &mut content.as_bytes(),
+                self.budget,
+            )?;
         }
         for name in SANDBOX_FOLDERS {
             let location = Location {

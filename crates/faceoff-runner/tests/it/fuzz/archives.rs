@@ -1,4 +1,4 @@
-use super::{assert_outcomes, rng::Rng, fuzz, mutation::mutate};
+use super::{assert_outcomes, fuzz, mutation::mutate, rng::Rng};
 use crate::archives::{MANIFEST, Tar, write};
 use faceoff_runner::bundle::{BundleError, BundleLimits, unpack};
 use flate2::{Compression, write::GzEncoder};

@@ -1,4 +1,4 @@
-use super::{assert_outcomes, rng::Rng, fuzz, mutation::mutate};
+use super::{assert_outcomes, fuzz, mutation::mutate, rng::Rng};
 use faceoff_dataset::{
     Dataset, DatasetError, Recorder, ShardFolder, ShardReport, assemble,
     verify::{VerifyError, verify},
@@ -62,7 +62,8 @@ fn record_dataset(dir: &Path) {
     let mut outcomes = Vec::new();
     for episode in spec.episodes.clone() {
         let interpolation = Some(Interpolation::Linear);
-        let mut course = RunningEpisode::begin(&arena, spec.task, episode, interpolation, &mut recorder);
+        let mut course =
+            RunningEpisode::begin(&arena, spec.task, episode, interpolation, &mut recorder);
         let outcome = loop {
             let question = course.question().unwrap();
             if question.step == 30 {

@@ -1,10 +1,10 @@
-use super::{assert_outcomes, datasets::ValidRecording, rng::Rng, fuzz};
+use super::{assert_outcomes, datasets::ValidRecording, fuzz, rng::Rng};
 use faceoff_dataset::{
     DatasetError,
     game::{GAME_FILE, GameRecorder, GameRecording, RecordedGame, verify_game},
     verify::VerifyError,
 };
-use faceoff_episode::{AnswerTiming, Arena, RallyEntry, RunningGame, Response, SideFault};
+use faceoff_episode::{AnswerTiming, Arena, RallyEntry, Response, RunningGame, SideFault};
 use faceoff_types::{
     AgentFaultKind, GameLimits, Interpolation, Profile, Ruleset, Seed, Side, SlotTiming,
 };
@@ -56,7 +56,10 @@ fn record_game(out: &Path) {
                         },
                         timing: answered,
                     },
-                    Some(action) => Response::Answer { action, timing: answered },
+                    Some(action) => Response::Answer {
+                        action,
+                        timing: answered,
+                    },
                 }
             });
             course.answer(responses).unwrap();

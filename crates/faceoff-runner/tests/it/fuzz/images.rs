@@ -1,4 +1,4 @@
-use super::{assert_outcomes, rng::Rng, fuzz, mutation::mutate};
+use super::{assert_outcomes, fuzz, mutation::mutate, rng::Rng};
 use crate::{
     archives::{Tar, write},
     image_archives::{Packing, TestImage, agent_layer, host_folder},

@@ -51,7 +51,9 @@ fn manifest_is_parsed_or_its_key_is_named() {
             Err(error) => {
                 let message = error.to_string();
                 assert!(
-                    message.chars().all(|c| is_printable(c) || "\n\t\r".contains(c)),
+                    message
+                        .chars()
+                        .all(|c| is_printable(c) || "\n\t\r".contains(c)),
                     "{message:?}"
                 );
                 match error {

@@ -4,11 +4,11 @@
 mod answers;
 mod archives;
 mod datasets;
-mod rng;
 mod games;
 mod images;
 mod manifests;
 mod mutation;
+mod rng;
 
 use rng::Rng;
 use std::{
@@ -71,7 +71,8 @@ fn fuzz(
             seed,
             number,
         };
-        *outcomes.entry(once(&mut Rng::new(target, seed, number)))
+        *outcomes
+            .entry(once(&mut Rng::new(target, seed, number)))
             .or_default() += 1;
         drop(run);
         runs_done += 1;
@@ -90,5 +91,8 @@ fn assert_outcomes(outcomes: &BTreeMap<String, u64>, kinds: &[&str]) {
         .iter()
         .filter(|kind| !outcomes.keys().any(|label| label.contains(*kind)))
         .collect();
-    assert!(missing.is_empty(), "missing: {missing:?}, found: {outcomes:#?}");
+    assert!(
+        missing.is_empty(),
+        "missing: {missing:?}, found: {outcomes:#?}"
+    );
 }

@@ -10,7 +10,8 @@ const HYBRID_OWN: &str = "4:memory:/no-such-cgroup\n2:cpu,cpuacct:/\n0::/\n";
 
 #[test]
 fn controllers_are_found_on_a_hybrid_host() {
-    let find = |controller| Hierarchy::find(controller, HYBRID_MOUNTS, HYBRID_OWN).expect(controller);
+    let find =
+        |controller| Hierarchy::find(controller, HYBRID_MOUNTS, HYBRID_OWN).expect(controller);
     // The kernel's name of the service's cgroup is not visible here, so the mount point is used.
     assert_eq!(
         find("memory"),

@@ -1,6 +1,6 @@
 //! Uncertainty of ratings: the bootstrap over games or mirrored pairs of games.
 
-use super::{bradley_terry::Model, trial_counts::TrialCounts, pools::pool_numbers};
+use super::{bradley_terry::Model, pools::pool_numbers, trial_counts::TrialCounts};
 use crate::draws::Draws;
 
 /// Bootstrap samples for the intervals of a pool.

@@ -5,14 +5,14 @@
 
 mod bootstrap;
 mod bradley_terry;
-mod trial_counts;
 mod pools;
 mod ratings;
-mod scale;
 mod sampling_units;
+mod scale;
+mod trial_counts;
 
 pub use bootstrap::{MIN_USABLE_SAMPLES, RESAMPLES};
 pub use ratings::{Pool, Prior, RatedSubmission, Rating, RatingError, Ratings, rate};
-pub use scale::{CENTRE, POINTS_PER_TENFOLD, PRIOR_SD, expected_score};
 pub use sampling_units::InvalidPair;
 pub(super) use sampling_units::sampling_units;
+pub use scale::{CENTRE, POINTS_PER_TENFOLD, PRIOR_SD, expected_score};

@@ -1,10 +1,10 @@
 use super::{
     bootstrap::{RESAMPLES, Samples, fit_from},
     bradley_terry::Model,
-    trial_counts::TrialCounts,
     pools::pool_numbers,
-    scale::{CENTRE, PRIOR_SD, PRIOR_SD_STRENGTH, rating_of},
     sampling_units::{InvalidPair, sampling_units},
+    scale::{CENTRE, PRIOR_SD, PRIOR_SD_STRENGTH, rating_of},
+    trial_counts::TrialCounts,
 };
 use crate::tournament::{game::PlayedGame, side::Side, submission_label::SubmissionLabel};
 use faceoff_types::TeamName;
@@ -209,7 +209,8 @@ impl RatingInput<'_> {
                 if members.len() > MAX_POOL {
                     return Err(RatingError::TooMany(members.len()));
                 }
-                let rated: Vec<&RatedSubmission> = members.iter().map(|member| rated[*member]).collect();
+                let rated: Vec<&RatedSubmission> =
+                    members.iter().map(|member| rated[*member]).collect();
                 Ok(rate_pool(&rated, units, basis))
             })
             .collect()

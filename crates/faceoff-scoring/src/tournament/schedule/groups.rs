@@ -29,7 +29,10 @@ pub(super) fn draw_groups(
 }
 
 /// A round robin in each group; matchday n of the round combines matchday n of all groups.
-pub(super) fn group_matchdays(groups: &[Vec<TeamName>], pairing_counts: &PairingCounts<'_>) -> Vec<Matchday> {
+pub(super) fn group_matchdays(
+    groups: &[Vec<TeamName>],
+    pairing_counts: &PairingCounts<'_>,
+) -> Vec<Matchday> {
     let mut all = Vec::<Matchday>::new();
     for group in groups {
         let group: Vec<&TeamName> = group.iter().collect();

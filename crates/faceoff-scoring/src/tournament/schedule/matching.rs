@@ -22,7 +22,10 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    fn most_pairs_by_enumeration(members: &[usize], may_meet: &impl Fn(usize, usize) -> bool) -> usize {
+    fn most_pairs_by_enumeration(
+        members: &[usize],
+        may_meet: &impl Fn(usize, usize) -> bool,
+    ) -> usize {
         let Some((first, rest)) = members.split_first() else {
             return 0;
         };

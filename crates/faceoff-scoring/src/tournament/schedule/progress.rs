@@ -120,7 +120,11 @@ impl<'a> Progress<'a> {
         Ok(())
     }
 
-    fn check_entrant(&self, team: &TeamName, place: impl FnOnce() -> String) -> Result<(), ScheduleError> {
+    fn check_entrant(
+        &self,
+        team: &TeamName,
+        place: impl FnOnce() -> String,
+    ) -> Result<(), ScheduleError> {
         if self.entrants.contains(team) {
             return Ok(());
         }

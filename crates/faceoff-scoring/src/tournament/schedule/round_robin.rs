@@ -10,7 +10,10 @@ use faceoff_types::TeamName;
 ///
 /// The home team is the one with fewer home games against this opponent. In their first game it follows from the positions,
 /// so that the numbers of home and away games of a team differ by at most one.
-pub(super) fn round_robin<'a>(teams: &[&'a TeamName], pairing_counts: &PairingCounts<'a>) -> Vec<Matchday> {
+pub(super) fn round_robin<'a>(
+    teams: &[&'a TeamName],
+    pairing_counts: &PairingCounts<'a>,
+) -> Vec<Matchday> {
     let count = teams.len();
     if count < 2 {
         return Vec::new();
@@ -33,14 +36,20 @@ pub(super) fn round_robin<'a>(teams: &[&'a TeamName], pairing_counts: &PairingCo
             }
             for step in 1..=(circle - 1) / 2 {
                 let positions = [(day + step) % circle, (day + circle - step) % circle];
-                matchday.pairings.push(pairing(teams, positions, pairing_counts));
+                matchday
+                    .pairings
+                    .push(pairing(teams, positions, pairing_counts));
             }
             matchday
         })
         .collect()
 }
 
-fn pairing<'a>(teams: &[&'a TeamName], positions: [usize; 2], pairing_counts: &PairingCounts<'a>) -> Pairing {
+fn pairing<'a>(
+    teams: &[&'a TeamName],
+    positions: [usize; 2],
+    pairing_counts: &PairingCounts<'a>,
+) -> Pairing {
     let [a, b] = positions.map(|position| teams[position]);
     let first_is_home = match pairing_counts.home_lead(a, b) {
         0 => is_home_at_first(positions, teams.len()),

@@ -25,7 +25,9 @@ pub(super) fn swiss(progress: &Progress<'_>, draws: &mut Draws) -> Matchday {
     let pairing_counts = progress.pairing_counts();
     for [upper, lower] in pairs(&teams, &pairing_counts) {
         let [a, b] = [teams[upper], teams[lower]];
-        matchday.pairings.push(pairing([a, b], &pairing_counts, draws));
+        matchday
+            .pairings
+            .push(pairing([a, b], &pairing_counts, draws));
     }
     matchday
 }
@@ -49,10 +51,8 @@ fn ranked_teams<'a>(progress: &Progress<'a>, draws: &mut Draws) -> Vec<&'a TeamN
     draws.shuffle(&mut teams);
     let byes = byes(progress.rounds);
     let standings = score_tournament_with(progress.games, progress.departures, &byes).standings;
-    let ranks: BTreeMap<&TeamName, u32> = standings
-        .iter()
-        .map(|row| (&row.team, row.rank))
-        .collect();
+    let ranks: BTreeMap<&TeamName, u32> =
+        standings.iter().map(|row| (&row.team, row.rank)).collect();
     teams.sort_by_key(|team| ranks.get(team).copied().unwrap_or(u32::MAX));
     teams
 }
@@ -103,8 +103,7 @@ fn pairs<'a>(teams: &[&'a TeamName], pairing_counts: &PairingCounts<'a>) -> Vec<
                 .into_iter()
                 .find(|other| most_pairs(&without(*other), have_not_met) + 1 == new_pairs)
         });
-        let opponent =
-            opponent.expect("the number of teams outside a maximum matching is even");
+        let opponent = opponent.expect("the number of teams outside a maximum matching is even");
         new_pairs -= 1;
         left = without(opponent);
         pairs.push([upper, opponent]);
@@ -113,7 +112,11 @@ fn pairs<'a>(teams: &[&'a TeamName], pairing_counts: &PairingCounts<'a>) -> Vec<
 }
 
 /// The home team is the one with fewer home games, then with fewer home games against this opponent, then a random one.
-fn pairing<'a>([a, b]: [&'a TeamName; 2], pairing_counts: &PairingCounts<'a>, draws: &mut Draws) -> Pairing {
+fn pairing<'a>(
+    [a, b]: [&'a TeamName; 2],
+    pairing_counts: &PairingCounts<'a>,
+    draws: &mut Draws,
+) -> Pairing {
     let lead = pairing_counts.home_balance(a) - pairing_counts.home_balance(b);
     let lead = if lead == 0 {
         pairing_counts.home_lead(a, b)

@@ -37,14 +37,20 @@ async fn check_accepts_entrants(tx: &mut Tx, tournament: &Tournament) -> Result<
     }
     if !games::pending(tx, tournament.id).await?.is_empty() {
         return Err(StoreError::Conflict(
-            "a round is under way: teams can be added before the first round, or between two".into(),
+            "a round is under way: teams can be added before the first round, or between two"
+                .into(),
         ));
     }
     Ok(())
 }
 
 /// Cancels a team's games that have no result.
-async fn cancel_open_games(tx: &mut Tx, id: TournamentId, team: TeamId, reason: &str) -> Result<()> {
+async fn cancel_open_games(
+    tx: &mut Tx,
+    id: TournamentId,
+    team: TeamId,
+    reason: &str,
+) -> Result<()> {
     let mut games = games::of_rounds(tx, id).await?;
     games.extend(
         games::test_and_friendly(tx, id, Some(team))
@@ -166,7 +172,9 @@ pub(crate) async fn remove_entrant(
         }
         (None, _) => current_round(tx, id).await?,
         // A team cannot avoid disqualification by withdrawing first.
-        (Some(left), DepartureKind::Disqualified) if left.kind == DepartureKind::Withdrawn => left.from_round,
+        (Some(left), DepartureKind::Disqualified) if left.kind == DepartureKind::Withdrawn => {
+            left.from_round
+        }
         (Some(_), _) => {
             return Err(StoreError::Conflict(format!(
                 "{} has left the tournament already",
@@ -177,7 +185,9 @@ pub(crate) async fn remove_entrant(
     let from_round = from_round.unwrap_or(latest);
     if from_round > latest || kind == DepartureKind::Withdrawn && from_round < latest {
         let expected = match kind {
-            DepartureKind::Withdrawn => format!("{latest}: a team that withdraws keeps its results of earlier rounds"),
+            DepartureKind::Withdrawn => {
+                format!("{latest}: a team that withdraws keeps its results of earlier rounds")
+            }
             DepartureKind::Disqualified => format!("1 to {latest}"),
         };
         return Err(StoreError::Conflict(format!(

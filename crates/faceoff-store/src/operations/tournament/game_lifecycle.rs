@@ -6,8 +6,8 @@ use crate::{
     event::{Event, Subject},
     operations::{
         commit::{CommitOutcome, wrong_job},
+        jobs::{Job, RunSeeds},
         purpose::Purpose,
-        jobs::{RunSeeds, Job},
     },
     queue::{self, Account, JobClaim, NewJob},
     store::Store,

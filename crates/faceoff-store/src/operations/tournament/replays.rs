@@ -134,7 +134,8 @@ impl Store {
             let mut count = 0;
             for game in games::open(tx, id).await? {
                 if let GamePurpose::Replay { .. } = game.purpose {
-                    game_lifecycle::cancel(tx, &game, "the organisers cancelled the replays").await?;
+                    game_lifecycle::cancel(tx, &game, "the organisers cancelled the replays")
+                        .await?;
                     count += 1;
                 }
             }

@@ -4,7 +4,7 @@ use crate::{
     event::{Actor, Event, Subject},
     operations::{
         purpose,
-        tournament::{game_lifecycle, current_entrants::current_entrants},
+        tournament::{current_entrants::current_entrants, game_lifecycle},
     },
     store::Store,
     tables::{
@@ -83,9 +83,7 @@ fn check_teams(
         all == of_playing
     };
     if !fits {
-        return conflict(
-            "the entrants have changed meanwhile: start the round again",
-        );
+        return conflict("the entrants have changed meanwhile: start the round again");
     }
     if with_games.is_empty() {
         return conflict("a round needs at least two teams: add more");
@@ -166,7 +164,8 @@ async fn queue_games(
                 };
                 let account = match account {
                     Some(known) => known,
-                    None => *account.insert(game_lifecycle::account(tx, &game, purpose::ROUND_GAME).await?),
+                    None => *account
+                        .insert(game_lifecycle::account(tx, &game, purpose::ROUND_GAME).await?),
                 };
                 game_lifecycle::enqueue_for(tx, &game, purpose::ROUND_GAME, account).await?;
                 count += 1;

@@ -6,7 +6,7 @@ use crate::{
     event::{Actor, Event, Subject},
     operations::{
         purpose,
-        tournament::{game_lifecycle, current_entrants::current_entrants, rounds},
+        tournament::{current_entrants::current_entrants, game_lifecycle, rounds},
     },
     store::Store,
     tables::{
@@ -50,7 +50,11 @@ async fn between_rounds(tx: &mut Tx, id: TournamentId, teams: &[TeamId]) -> Resu
 }
 
 /// A team's active submission, if the tournament accepts it.
-async fn active_submission(tx: &mut Tx, tournament: &Tournament, team: TeamId) -> Result<SubmissionId> {
+async fn active_submission(
+    tx: &mut Tx,
+    tournament: &Tournament,
+    team: TeamId,
+) -> Result<SubmissionId> {
     let active: Option<Submission> = submissions::active(tx)
         .await?
         .into_iter()

@@ -246,12 +246,14 @@ async fn refused_download_is_not_retried() {
             ("507 Insufficient Storage", "no storage space"),
         ] {
             let archive: &Path = &folder.path().join("agent.tar.gz");
-            let (fetched, ()) =
-                tokio::join!(files.fetch_bundle(&transfer, &bundle, archive, never_ends), async {
+            let (fetched, ()) = tokio::join!(
+                files.fetch_bundle(&transfer, &bundle, archive, never_ends),
+                async {
                     let (mut connection, _) = listener.accept().await.unwrap();
                     head(&mut connection).await;
                     respond(connection, status).await;
-                });
+                }
+            );
             let error = format!("{:#}", fetched.unwrap_err());
             assert!(error.contains(message), "{error}");
         }

@@ -56,7 +56,7 @@ async fn start_proxy_with(site: &Site, certificate: &Certificate, key: &KeyPair)
         }
     });
     address
-    }
+}
 
 fn write_ca_file(site: &Site, authority: &CertifiedIssuer<'static, KeyPair>) -> PathBuf {
     let file = site.folder.path().join("ca.pem");
@@ -111,7 +111,12 @@ async fn untrusted_tls_server_gets_no_token() {
     let unknown = start_tls_proxy(&site, &other, "localhost").await;
     let url = format!("https://localhost:{}", unknown.port());
     let refused = refusal(&Client::new(&url, Some(ADMIN), Some(&ca_file)).unwrap()).await;
-    for words in [url.as_str(), "unknown authority", "--ca-file", "UnknownIssuer"] {
+    for words in [
+        url.as_str(),
+        "unknown authority",
+        "--ca-file",
+        "UnknownIssuer",
+    ] {
         assert!(refused.contains(words), "{refused}");
     }
 

@@ -15,7 +15,9 @@ pub(super) async fn announce(
     text: String,
 ) -> anyhow::Result<()> {
     let announcement = client.announce(title, text).await?;
-    print(json, &announcement, || format!("announced ({})", announcement.id))
+    print(json, &announcement, || {
+        format!("announced ({})", announcement.id)
+    })
 }
 
 pub(super) async fn questions(client: &Client, json: bool) -> anyhow::Result<()> {
@@ -26,11 +28,7 @@ pub(super) async fn questions(client: &Client, json: bool) -> anyhow::Result<()>
                 .team
                 .map_or_else(String::new, |id| format!("  team:{id}"));
             let answer = question.answer.as_deref().unwrap_or("no answer yet");
-            let public = if question.public {
-                " (public)"
-            } else {
-                ""
-            };
+            let public = if question.public { " (public)" } else { "" };
             format!(
                 "{}{team}  {}\n  {}\n→ {answer}{public}",
                 question.id,

@@ -68,7 +68,7 @@ mod tests {
 
     #[test]
     fn only_loopback_addresses_are_local() {
-    for local in [
+        for local in [
             "http://127.0.0.1:8080",
             "http://localhost/",
             "http://[::1]:80",

@@ -1,12 +1,12 @@
 //! `faceoff admin freeze`, `unfreeze`, `missed-day` and `extra-turn`: interventions in boards and evaluation days.
 
-use super::{team_lookup::find_team, lines::evaluation_line};
+use super::{lines::evaluation_line, team_lookup::find_team};
 use crate::{
     client::Client,
-    commands::{stage_lookup::find_stage, output::print},
+    commands::{output::print, stage_lookup::find_stage},
 };
 use clap::Subcommand;
-use faceoff_api::requests::{NewExtraEvaluation, MissedDay};
+use faceoff_api::requests::{MissedDay, NewExtraEvaluation};
 use faceoff_types::StageDay;
 use jiff::civil::Date;
 

@@ -14,7 +14,7 @@ use faceoff_api::{
     requests::{InvitedRole, NewInvitation, SeasonChange},
     views::invitation::RegistrationView,
 };
-use faceoff_types::{DivisionName, InvitationId, UserId, RegistrationId};
+use faceoff_types::{DivisionName, InvitationId, RegistrationId, UserId};
 
 #[derive(Debug, Subcommand)]
 pub(super) enum PeopleAction {
@@ -91,7 +91,10 @@ async fn find_person(client: &Client, name_or_id: &str) -> anyhow::Result<UserId
         return Ok(id);
     }
     let people = client.users().await?;
-    match people.iter().find(|person| person.name.as_str() == name_or_id) {
+    match people
+        .iter()
+        .find(|person| person.name.as_str() == name_or_id)
+    {
         Some(person) => Ok(person.id),
         None => bail!("there is no user {name_or_id:?}; see faceoff admin people list"),
     }

@@ -3,16 +3,16 @@
 use crate::{
     client::Client,
     commands::{
-        stage_lookup::find_stage,
         output::{lines_or, print},
+        stage_lookup::find_stage,
     },
 };
 use clap::Subcommand;
 use faceoff_api::{
     requests::{NewProposal, Trial},
     views::proposal::{
-        ChangeView, ProposedEvaluationStatus, ProposedEvaluationView, ProposalKindView, ProposalStateView, ProposalView,
-        RankView,
+        ChangeView, ProposalKindView, ProposalStateView, ProposalView, ProposedEvaluationStatus,
+        ProposedEvaluationView, RankView,
     },
 };
 use faceoff_types::{EvaluationId, ProposalId, SubmissionId};
@@ -80,7 +80,10 @@ pub(super) async fn act(client: &Client, json: bool, action: ProposalAction) -> 
         ProposalAction::List => {
             let all = client.proposals().await?;
             return print(json, &all, || {
-                lines_or(all.iter().map(proposal_line).collect(), "no trials or proposals")
+                lines_or(
+                    all.iter().map(proposal_line).collect(),
+                    "no trials or proposals",
+                )
             });
         }
         ProposalAction::Show { proposal } => client.proposal(proposal).await?,
@@ -131,7 +134,9 @@ pub(super) async fn act(client: &Client, json: bool, action: ProposalAction) -> 
 
 fn proposal_line(proposal: &ProposalView) -> String {
     let subject = match (proposal.kind, proposal.day) {
-        (ProposalKindView::Evaluation, Some(day)) => format!("re-evaluation of one result of {day}"),
+        (ProposalKindView::Evaluation, Some(day)) => {
+            format!("re-evaluation of one result of {day}")
+        }
         (ProposalKindView::Day, Some(day)) => format!("re-evaluation of {day}"),
         (ProposalKindView::Rules, Some(day)) => {
             format!(
@@ -186,7 +191,9 @@ fn evaluation_line(evaluation: &ProposedEvaluationView) -> String {
         ProposedEvaluationStatus::AgentFailed { faults, .. } => {
             format!("the agent failed ({} faults)", faults.len())
         }
-        ProposedEvaluationStatus::PlatformFailed { reason, .. } => format!("platform fault: {reason}"),
+        ProposedEvaluationStatus::PlatformFailed { reason, .. } => {
+            format!("platform fault: {reason}")
+        }
         ProposedEvaluationStatus::Cancelled { .. } => "cancelled".to_owned(),
     };
     format!("  {:<40} {state}", evaluation.team_name)

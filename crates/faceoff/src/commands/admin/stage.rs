@@ -3,8 +3,8 @@
 use crate::{
     client::Client,
     commands::{
-        stage_lookup::find_stage,
         output::{lines_or, print},
+        stage_lookup::find_stage,
     },
 };
 use anyhow::{Context, ensure};
@@ -17,8 +17,8 @@ use faceoff_api::{
     },
 };
 use faceoff_types::{
-    DayDeadline, PerturbationSettings, Profile, Publication, Retention, Runtimes, Schedule,
-    StageLimits, StageUploadLimits, CountingResult, Task, TaskWeights, TierBounds, Zone,
+    CountingResult, DayDeadline, PerturbationSettings, Profile, Publication, Retention, Runtimes,
+    Schedule, StageLimits, StageUploadLimits, Task, TaskWeights, TierBounds, Zone,
 };
 use jiff::{
     Timestamp, Zoned,
@@ -289,7 +289,10 @@ pub(super) async fn act(client: &Client, json: bool, action: StageAction) -> any
                 let at = text.as_deref().map(|text| parse_instant(text, &zone));
                 at.transpose()
             };
-            let schedule = options.schedule()?.map(Some).or(no_schedule.then_some(None));
+            let schedule = options
+                .schedule()?
+                .map(Some)
+                .or(no_schedule.then_some(None));
             let change = StageChange {
                 name: rename,
                 perturbations: options.perturbations()?,
@@ -322,7 +325,11 @@ pub(super) async fn act(client: &Client, json: bool, action: StageAction) -> any
             let stage = find_stage(client, &stage).await?;
             let day = client.start_final_day(stage.id).await?;
             print(json, &day, || {
-                format!("{}: final day, {} evaluations started", day.day, day.created.len())
+                format!(
+                    "{}: final day, {} evaluations started",
+                    day.day,
+                    day.created.len()
+                )
             })
         }
         StageAction::Finalise { stage, confirm } => {
@@ -358,7 +365,9 @@ fn stage_text(stage: &StageView) -> String {
         PhaseView::Open => "open",
         PhaseView::Closed => "closed",
     };
-    let closes = stage.closes_at.map_or_else(|| "open end".to_owned(), local_time);
+    let closes = stage
+        .closes_at
+        .map_or_else(|| "open end".to_owned(), local_time);
     let rules = &stage.rules.rules;
     let tasks: Vec<&str> = rules.tasks.iter().map(|task| task.as_str()).collect();
     let next = match &stage.next_cutoff {

@@ -62,7 +62,9 @@ pub(super) async fn act(client: &Client, json: bool, action: StorageAction) -> a
                 reason: Some(reason),
             };
             let deleted = client.delete_submission(submission, &deletion).await?;
-            print(json, &deleted, || format!("the bundle of {} is deleted", deleted.id))
+            print(json, &deleted, || {
+                format!("the bundle of {} is deleted", deleted.id)
+            })
         }
     }
 }

@@ -7,15 +7,16 @@ use crate::{
     commands::{
         output::print,
         tournament::{
+            games,
             lookup::{find_tournament, find_tournament_or_newest},
-            games, round, text,
+            round, text,
         },
     },
 };
 use anyhow::bail;
 use clap::Subcommand;
 use faceoff_api::requests::{Decision, NewDeparture, NewTournament, TournamentChange};
-use faceoff_types::{GameId, DepartureKind, RoundNumber, SubmissionId, TeamName};
+use faceoff_types::{DepartureKind, GameId, RoundNumber, SubmissionId, TeamName};
 use options::TournamentOptions;
 
 #[derive(Debug, Subcommand)]

@@ -5,7 +5,9 @@ use crate::{
     commands::output::{lines_or, print},
 };
 use clap::Subcommand;
-use faceoff_api::views::workers::{BusySlotView, WorkerBanView, WorkerState, WorkerView, WorkersView};
+use faceoff_api::views::workers::{
+    BusySlotView, WorkerBanView, WorkerState, WorkerView, WorkersView,
+};
 use faceoff_store::WorkerName;
 
 #[derive(Debug, Subcommand)]
@@ -44,7 +46,11 @@ pub(super) async fn act(client: &Client, json: bool, action: WorkerAction) -> an
 }
 
 /// Prints the workers after a decision: as JSON, or as `text`.
-async fn print_workers(client: &Client, json: bool, text: impl FnOnce() -> String) -> anyhow::Result<()> {
+async fn print_workers(
+    client: &Client,
+    json: bool,
+    text: impl FnOnce() -> String,
+) -> anyhow::Result<()> {
     let workers = client.workers().await?;
     print(json, &workers, text)
 }
@@ -92,7 +98,10 @@ fn worker_lines(worker: &WorkerView) -> String {
 }
 
 fn busy_line(busy: &BusySlotView) -> String {
-    let job = busy.job_description.as_deref().unwrap_or("job from before the server's start");
+    let job = busy
+        .job_description
+        .as_deref()
+        .unwrap_or("job from before the server's start");
     let long = if busy.is_long {
         "  for more than an hour"
     } else {

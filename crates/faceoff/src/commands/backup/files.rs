@@ -124,7 +124,10 @@ pub fn copy_tree(
         let entry = entry.with_context(reading)?;
         let file_name = entry.file_name();
         let (source, copy) = (from.join(&file_name), to.join(&file_name));
-        let Some(file_name) = file_name.to_str().filter(|file_name| !is_half_written(file_name)) else {
+        let Some(file_name) = file_name
+            .to_str()
+            .filter(|file_name| !is_half_written(file_name))
+        else {
             continue;
         };
         let path = format!("{name}/{file_name}");

@@ -75,10 +75,7 @@ impl fmt::Display for Missing {
                 path,
                 expected,
                 found,
-            } => write!(
-                f,
-                "damaged: {path} has BLAKE3 {found}, expected {expected}"
-            ),
+            } => write!(f, "damaged: {path} has BLAKE3 {found}, expected {expected}"),
         }
     }
 }

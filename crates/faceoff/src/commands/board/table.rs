@@ -25,8 +25,9 @@ pub(super) fn board_text(board: &BoardView) -> String {
     }
     text.push('\n');
     match (board.rows.is_empty(), board.blind) {
-        (true, true) => text
-            .push_str("\nthe stage is blind: results are hidden until the organisers reveal them\n"),
+        (true, true) => text.push_str(
+            "\nthe stage is blind: results are hidden until the organisers reveal them\n",
+        ),
         (true, false) => text.push_str("\nno results yet\n"),
         (false, _) => {
             let _ = write!(text, "\n{}", board_table(board));

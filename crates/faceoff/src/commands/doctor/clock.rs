@@ -99,7 +99,12 @@ mod tests {
     #[test]
     fn unsynchronised_clock_has_a_cure() {
         let now = Timestamp::UNIX_EPOCH;
-        assert!(clock_check(now, Some(false)).cure.unwrap().contains("set-ntp"));
+        assert!(
+            clock_check(now, Some(false))
+                .cure
+                .unwrap()
+                .contains("set-ntp")
+        );
         assert_eq!(clock_check(now, Some(true)).cure, None);
         assert_eq!(clock_check(now, None).cure, None);
     }

@@ -60,8 +60,8 @@ fn find_problem(path: &Path, metadata: &Metadata, own: u32) -> Option<(String, S
             format!(
                 "{shown} belongs to user {}, this is user {own}",
                 metadata.uid()
-                ),
-                format!("run the server as that user, or chown -R {own} {shown}"),
+            ),
+            format!("run the server as that user, or chown -R {own} {shown}"),
         ));
     }
     let mode = metadata.permissions().mode() & 0o777;

@@ -1,6 +1,6 @@
 //! Text output of `faceoff doctor`.
 
-use super::{LayerReport, Findings};
+use super::{Findings, LayerReport};
 use faceoff_sandbox::HostFeature;
 use std::io::Write;
 

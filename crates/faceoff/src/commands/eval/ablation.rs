@@ -28,7 +28,8 @@ pub(super) fn run(setup: &EvalSetup, out: &Path, json: bool) -> anyhow::Result<u
         let outcome = run_profile(setup, profile, &out.join(profile.as_str()))
             .with_context(|| format!("profile {profile}"))?;
         faults += outcome.faults.len();
-        let summary = EpisodeSummary::from_outcomes(&outcome.outcomes, &setup.variation.tier_bounds);
+        let summary =
+            EpisodeSummary::from_outcomes(&outcome.outcomes, &setup.variation.tier_bounds);
         runs.insert(profile, summary.context("comparing the profiles")?);
     }
     let tasks = faceoff_scoring::ablation(&runs).context("comparing the profiles")?;

@@ -33,9 +33,7 @@ pub(super) fn compare_runtimes(local: &RuntimeInventory, remote: &RuntimeInvento
             vec![format!("{name} has Python on the server, but not locally")]
         }
         (_, RuntimeContent::Native { .. }) => {
-            vec![format!(
-                "{name} has Python locally, but not on the server"
-            )]
+            vec![format!("{name} has Python locally, but not on the server")]
         }
     }
 }
@@ -56,7 +54,10 @@ fn compare_pythons(name: &str, local: &PythonInventory, remote: &PythonInventory
             interpreter(remote)
         ));
     }
-    found.extend(compare_c_libraries(local.libc.as_deref(), remote.libc.as_deref()));
+    found.extend(compare_c_libraries(
+        local.libc.as_deref(),
+        remote.libc.as_deref(),
+    ));
     let only_in = |one: &PythonInventory, other: &PythonInventory| -> Vec<String> {
         let packages = one.packages.iter();
         packages
@@ -65,19 +66,19 @@ fn compare_pythons(name: &str, local: &PythonInventory, remote: &PythonInventory
             .collect()
     };
     let other_versions = local.packages.iter().filter_map(|(name, version)| {
-        let remote = remote.packages.get(name).filter(|remote| *remote != version)?;
+        let remote = remote
+            .packages
+            .get(name)
+            .filter(|remote| *remote != version)?;
         Some(format!("{name} {version} (server: {remote})"))
     });
     for (heading, packages) in [
+        ("packages missing locally", only_in(remote, local)),
+        ("packages missing on the server", only_in(local, remote)),
         (
-            "packages missing locally",
-            only_in(remote, local),
+            "packages with other versions locally",
+            other_versions.collect(),
         ),
-        (
-            "packages missing on the server",
-            only_in(local, remote),
-        ),
-        ("packages with other versions locally", other_versions.collect()),
     ] {
         if !packages.is_empty() {
             found.push(format!("{heading}: {}", package_list(&packages)));
@@ -200,7 +201,10 @@ mod tests {
         };
         let found = compare_machines(&machine("A", 1), &machine("B", 2));
         assert_eq!(found.len(), 2);
-        assert!(found[0].contains("A locally and B on the server") && found[1].contains("1 CPUs locally and 2"));
+        assert!(
+            found[0].contains("A locally and B on the server")
+                && found[1].contains("1 CPUs locally and 2")
+        );
         let broken = RuntimeInventory {
             name: "python3-ml".into(),
             content: RuntimeContent::Failed {

@@ -31,7 +31,10 @@ pub(super) enum Verdict {
         outcomes: Vec<EpisodeOutcome>,
         logs: Logs,
     },
-    Failed { faults: Vec<AgentFault>, logs: Logs },
+    Failed {
+        faults: Vec<AgentFault>,
+        logs: Logs,
+    },
 }
 
 /// State that the worker threads share.
@@ -98,7 +101,10 @@ pub(super) fn run_shards(
     for result in results {
         match result {
             Ok(()) | Err(PlatformFault::Cancelled) => {}
-            Err(fault) => return Err(fault).context("the evaluation failed by a platform fault, not by the agent"),
+            Err(fault) => {
+                return Err(fault)
+                    .context("the evaluation failed by a platform fault, not by the agent");
+            }
         }
     }
     let mut faults = pool

@@ -45,7 +45,11 @@ pub(super) struct ProfileOutcome {
 }
 
 /// Runs all episodes in one profile and writes `results.json` and `dataset.zip` to `out`.
-pub(super) fn run_profile(setup: &EvalSetup, profile: Profile, out: &Path) -> anyhow::Result<ProfileOutcome> {
+pub(super) fn run_profile(
+    setup: &EvalSetup,
+    profile: Profile,
+    out: &Path,
+) -> anyhow::Result<ProfileOutcome> {
     fs::create_dir_all(out).with_context(|| format!("creating {}", out.display()))?;
     remove_earlier(out)?;
     let jobs = jobs(setup, profile);

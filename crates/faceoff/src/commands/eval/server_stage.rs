@@ -113,7 +113,12 @@ impl ServerStage {
     }
 
     /// Stage, limits and differences of this machine, line by line.
-    pub fn report(&self, runtime: &str, env: &AgentEnvironment, given_up: &[String]) -> Vec<String> {
+    pub fn report(
+        &self,
+        runtime: &str,
+        env: &AgentEnvironment,
+        given_up: &[String],
+    ) -> Vec<String> {
         let rules = &self.stage.rules;
         let limits = &self.offer.limits;
         let mut lines = vec![
@@ -140,13 +145,20 @@ impl ServerStage {
             images: env.images && runtime == IMAGE_RUNTIME,
             ..env.clone()
         };
-        let remote = self.server.runtimes.iter().find(|offered| offered.name == runtime);
+        let remote = self
+            .server
+            .runtimes
+            .iter()
+            .find(|offered| offered.name == runtime);
         let mut differences = match (take_inventory(&local_env).first(), remote) {
             (Some(local), Some(remote)) => differences::compare_runtimes(local, remote),
             _ => Vec::new(),
         };
         let machine = machine::agent_machine(&env.agent_cpus);
-        differences.extend(differences::compare_machines(&machine, &self.server.machine));
+        differences.extend(differences::compare_machines(
+            &machine,
+            &self.server.machine,
+        ));
         if !given_up.is_empty() {
             differences.push(format!(
                 "this machine does not use {}, so not all limits are enforced",
@@ -156,7 +168,11 @@ impl ServerStage {
         if differences.is_empty() {
             lines.push("no differences found".to_owned());
         }
-        lines.extend(differences.into_iter().map(|difference| format!("differs  {difference}")));
+        lines.extend(
+            differences
+                .into_iter()
+                .map(|difference| format!("differs  {difference}")),
+        );
         lines
     }
 }
@@ -176,7 +192,8 @@ fn select_stage(
     let all = names(&stages).join(", ");
     if let Some(name_or_id) = name_or_id {
         let matches = |stage: &StageView| {
-            stage.name.as_str().eq_ignore_ascii_case(name_or_id) || stage.id.to_string() == name_or_id
+            stage.name.as_str().eq_ignore_ascii_case(name_or_id)
+                || stage.id.to_string() == name_or_id
         };
         return stages
             .into_iter()

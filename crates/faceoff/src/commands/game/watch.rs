@@ -6,7 +6,7 @@ use faceoff_api::views::{
     game::GameView,
     live::{LiveEnd, LiveEndState},
 };
-use faceoff_types::{CONTROL_STEP_S, GameEvent, GameId, LiveGame, LiveEvent, Side};
+use faceoff_types::{CONTROL_STEP_S, GameEvent, GameId, LiveEvent, LiveGame, Side};
 use futures::StreamExt;
 use reqwest::StatusCode;
 use serde_json::Value;
@@ -54,7 +54,11 @@ fn is_final(error: &anyhow::Error) -> bool {
 }
 
 /// Reads one stream to its end and returns the number of events.
-async fn read_stream(client: &Client, id: GameId, printer: &mut EventPrinter) -> anyhow::Result<u32> {
+async fn read_stream(
+    client: &Client,
+    id: GameId,
+    printer: &mut EventPrinter,
+) -> anyhow::Result<u32> {
     let mut received = 0;
     let mut events = Box::pin(client.watch_game(id, printer.last.as_deref()).await?);
     while let Some(event) = events.next().await {
@@ -138,8 +142,7 @@ impl EventPrinter {
             }
             "waiting" => {
                 let is_new = !std::mem::replace(&mut self.is_waiting, true);
-                is_new
-                    .then(|| "waiting for a free slot".to_owned())
+                is_new.then(|| "waiting for a free slot".to_owned())
             }
             "over" => {
                 let end: LiveEnd = serde_json::from_str(&event.data)?;

@@ -2,11 +2,11 @@
 
 use super::{
     bar::Bar,
+    matchup::Matchup,
     options::PlayOptions,
     platform_fault::with_advice,
     results::Results,
     series_results::{Kind, Series, SeriesGame, SeriesResults},
-    matchup::Matchup,
     table,
 };
 use anyhow::Context;
@@ -69,7 +69,8 @@ pub(super) fn play(
             };
             bar.next(&folder, done_steps, all_steps);
             let out = options.out.join(&folder);
-            let report = play_with_retries(|| matchup.play(seed, swapped, &out, &mut bar), &folder)?;
+            let report =
+                play_with_retries(|| matchup.play(seed, swapped, &out, &mut bar), &folder)?;
             let score = &report.archives.score;
             Results::clear_in(&out)?.write(score)?;
             done_steps += u64::from(options.steps);
@@ -109,9 +110,9 @@ fn play_with_retries(
         match play() {
             Err(PlatformFault::HostBusy(_)) if attempt < ATTEMPTS => attempt += 1,
             result => {
-                return result
-                    .map_err(with_advice)
-                    .with_context(|| format!("{folder} has no result; earlier results remain valid"));
+                return result.map_err(with_advice).with_context(|| {
+                    format!("{folder} has no result; earlier results remain valid")
+                });
             }
         }
     }

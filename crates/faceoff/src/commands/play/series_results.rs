@@ -3,7 +3,8 @@
 use anyhow::Context;
 use faceoff_runner::GameSpec;
 use faceoff_scoring::tournament::{
-    GameScore, GoalDifference, PlayedGame, Side, VarianceComparison, ResultReason, find_mirrored_pairs,
+    GameScore, GoalDifference, PlayedGame, ResultReason, Side, VarianceComparison,
+    find_mirrored_pairs,
 };
 use faceoff_types::{Profile, RoundNumber, Ruleset, Seed, TeamName};
 use serde::Serialize;
@@ -77,7 +78,7 @@ pub(super) struct SeriesGame {
 
 impl SeriesGame {
     pub(super) fn new(
-    score: &GameScore,
+        score: &GameScore,
         folder: String,
         pair: Option<u32>,
         swapped: bool,
@@ -143,7 +144,8 @@ impl SeriesResults {
         let differences = games
             .chunks(games_per_row)
             .map(|games| games.iter().map(SeriesGame::difference).sum());
-        let pairs = find_mirrored_pairs(games.iter().map(|game| &game.entry)).context("comparing the pairs")?;
+        let pairs = find_mirrored_pairs(games.iter().map(|game| &game.entry))
+            .context("comparing the pairs")?;
         Ok(Self {
             series: kind,
             wanted: count,

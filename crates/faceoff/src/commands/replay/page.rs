@@ -75,6 +75,6 @@ fn escape(text: &str) -> String {
 /// Rounds to tenths of a millimetre, which is enough for a picture.
 fn round(positions: impl Iterator<Item = [f64; 2]>) -> Vec<[f64; 2]> {
     positions
-    .map(|position| position.map(|metres| (metres * 1e4).round() / 1e4))
+        .map(|position| position.map(|metres| (metres * 1e4).round() / 1e4))
         .collect()
 }

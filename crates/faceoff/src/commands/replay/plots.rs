@@ -69,7 +69,11 @@ fn charts(recording: &EpisodeRecording) -> Vec<Chart> {
     let puck = |axis: usize, name: &str| Chart {
         caption: format!("puck {name} (m), table frame: true and observed"),
         lines: vec![
-            Line::from_start("observed", recording.seen.iter().map(|position| position[axis])).dotted(),
+            Line::from_start(
+                "observed",
+                recording.seen.iter().map(|position| position[axis]),
+            )
+            .dotted(),
             Line::from_start("true", recording.puck.iter().map(|position| position[axis])),
         ],
         bounds: Vec::new(),
@@ -95,8 +99,7 @@ fn charts(recording: &EpisodeRecording) -> Vec<Chart> {
             window: f64::MIN..f64::MAX,
         },
         Chart {
-            caption: "joint speeds, % of their limits (filtered; at most 95 % allowed)"
-                .to_owned(),
+            caption: "joint speeds, % of their limits (filtered; at most 95 % allowed)".to_owned(),
             lines: (0..7)
                 .map(|joint| {
                     let shares = recording

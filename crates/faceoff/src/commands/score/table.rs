@@ -3,7 +3,7 @@
 use super::scored_tournament::ScoredTournament;
 use anyhow::Context as _;
 use faceoff_scoring::tournament::{
-    HeadToHead, DepartureKind, ScoredGame, StandingsRow,
+    DepartureKind, HeadToHead, ScoredGame, StandingsRow,
     rating::{Pool, Ratings},
 };
 use std::{fmt::Write as _, io::Write};
@@ -59,7 +59,7 @@ fn games(out: &mut String, games: &[ScoredGame]) -> std::fmt::Result {
         out,
         "{:>5}  {:<home$}  {:<away$}  {:>7}  {:>7}  {:>7}  {:>15}  {:<winner$}  reason",
         "round", "home", "away", "score", "goals", "fouls", "penalty points", "winner"
-        )?;
+    )?;
     for game in games {
         let [first, second] = game.teams();
         let points = game.penalty_points().map(|points| format!("{points:.1}"));

@@ -4,7 +4,7 @@ use super::{lines::write_line, scored_tournament::ScoredTournament, table};
 use anyhow::ensure;
 use clap::Args;
 use faceoff_scoring::tournament::{
-    Bye, Departure, Departures, DepartureKind, PlayedGame, RoundNumber, head_to_head,
+    Bye, Departure, DepartureKind, Departures, PlayedGame, RoundNumber, head_to_head,
     rating::{RatingError, rate},
     score_tournament_with,
 };
@@ -213,7 +213,9 @@ mod tests {
         ]);
         let (out, _) = printed(table(&[], &[]), &input).unwrap();
         assert!(
-            out.contains("ratings by results, pool 1 of 2 (the pools have no games against each other)"),
+            out.contains(
+                "ratings by results, pool 1 of 2 (the pools have no games against each other)"
+            ),
             "{out}"
         );
         let row = out

@@ -6,7 +6,7 @@ use super::{
 };
 use crate::{config::Config, machine};
 use anyhow::Context;
-use faceoff_http::{Capacity, ConnectionLimits, HttpConfig, AgentResources};
+use faceoff_http::{AgentResources, Capacity, ConnectionLimits, HttpConfig};
 use faceoff_metrics::Metrics;
 use faceoff_store::{ArchivedSeason, FreeSpace, Store};
 use faceoff_types::Clock;
@@ -45,9 +45,7 @@ pub async fn serve(
                 config.server.listen
             )
         })?;
-    let address = listener
-        .local_addr()
-        .context("reading the bound address")?;
+    let address = listener.local_addr().context("reading the bound address")?;
     let made_at = archived.made_at;
     let router = faceoff_http::router(
         store.clone(),

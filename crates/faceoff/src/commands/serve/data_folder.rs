@@ -49,7 +49,8 @@ pub fn lock(data_dir: &Path) -> anyhow::Result<File> {
             Ok(()) => break,
             Err(TryLockError::Error(error)) => {
                 let context = context();
-                return Err(error).context(format!("{context}; does its file system support locks?"));
+                return Err(error)
+                    .context(format!("{context}; does its file system support locks?"));
             }
             Err(TryLockError::WouldBlock) => {
                 let holder = read_holder(&mut file);

@@ -1,7 +1,7 @@
 //! Configuration of remote workers.
 
 use crate::{
-    commands::{files_client::bucket_client, capabilities::own_capabilities},
+    commands::{capabilities::own_capabilities, files_client::bucket_client},
     config::Config,
 };
 use faceoff_http::LinkKey;

@@ -27,7 +27,8 @@ pub fn agent_resources(config: &Config, cpus: &CpuLayout) -> anyhow::Result<Agen
         resources: env.limits.clone(),
         time: env.time.clone(),
     };
-    let (resources, publisher) = AgentResources::new(limits, machine::agent_machine(&env.agent_cpus));
+    let (resources, publisher) =
+        AgentResources::new(limits, machine::agent_machine(&env.agent_cpus));
     thread::Builder::new()
         .name("runtimes".to_owned())
         .spawn(move || {

@@ -169,7 +169,7 @@ fn evaluate(q: &[f64; DOFS], dq: &[f64; DOFS]) -> PoseModel {
         joint_vel,
         ee: ee_constraint,
         link,
-        } = ConstraintValues::new(&positions, &driven, &kinematics);
+    } = ConstraintValues::new(&positions, &driven, &kinematics);
     PoseModel {
         links: kinematics.links.map(|link| link.origin.lane(0)),
         rotations: kinematics.links.map(|link| link.rotation(0)),
@@ -183,7 +183,7 @@ fn evaluate(q: &[f64; DOFS], dq: &[f64; DOFS]) -> PoseModel {
             joint_vel,
             ee: ee_constraint,
             link,
-            },
+        },
         plant: Plant {
             q: *q,
             mallet: kinematics.cylinder_centre().lane(0),

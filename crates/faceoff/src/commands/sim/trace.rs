@@ -104,7 +104,7 @@ fn trace(scenario: &Scenario, out: &mut impl Write) -> Result<()> {
     if let Some(task) = scenario.task {
         let success = task::success(task, world.puck());
         write_line(
-        &Done {
+            &Done {
                 done: true,
                 steps,
                 reason: end,

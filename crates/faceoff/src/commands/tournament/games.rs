@@ -104,9 +104,7 @@ pub(in crate::commands) fn game_text(game: &GameView) -> String {
             };
             format!("round {round}, matchday {matchday}, pairing {meeting}{half}")
         }
-        PurposeView::Test { .. } => {
-            "test game against the baseline, does not count".to_owned()
-        }
+        PurposeView::Test { .. } => "test game against the baseline, does not count".to_owned(),
         PurposeView::Friendly { requested_by } => {
             format!("friendly game requested by {requested_by}, does not count")
         }
@@ -161,10 +159,7 @@ pub(in crate::commands) fn attempts_text(attempts: &[GameAttemptView]) -> String
             attempt.worker
         )
     };
-    lines_or(
-        attempts.iter().map(line).collect(),
-        "no attempts yet",
-    )
+    lines_or(attempts.iter().map(line).collect(), "no attempts yet")
 }
 
 /// The requested test games, and the teams without one.

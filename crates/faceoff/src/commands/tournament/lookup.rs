@@ -12,7 +12,10 @@ pub(in crate::commands) async fn find_tournament(
     }
     let tournaments = client.tournaments().await?;
     let has_name = |name: &str| name.eq_ignore_ascii_case(name_or_id);
-    match tournaments.iter().find(|tournament| has_name(tournament.name.as_str())) {
+    match tournaments
+        .iter()
+        .find(|tournament| has_name(tournament.name.as_str()))
+    {
         Some(found) => Ok(found.id),
         None => bail!("there is no tournament {name_or_id:?}; see faceoff tournament list"),
     }

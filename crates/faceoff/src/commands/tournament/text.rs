@@ -10,8 +10,15 @@ use faceoff_types::{DepartureKind, Publication, RoundNumber, TournamentFormat, T
 use jiff::Timestamp;
 
 pub(in crate::commands) fn tournament_list(tournaments: &[TournamentHead]) -> String {
-    let line =
-        |head: &TournamentHead| format!("{}  {}  {}: {}", head.id, head.name, phase_text(head), head.next);
+    let line = |head: &TournamentHead| {
+        format!(
+            "{}  {}  {}: {}",
+            head.id,
+            head.name,
+            phase_text(head),
+            head.next
+        )
+    };
     lines_or(
         tournaments.iter().map(line).collect(),
         "no tournaments yet; organisers open one with faceoff admin tournament open NAME",
@@ -63,11 +70,13 @@ pub(in crate::commands) fn tournament_text(tournament: &TournamentView) -> Strin
             None => "  baseline  none, so test games are not possible".to_owned(),
         },
     ];
-    lines.extend(
-        head.paused
-            .as_ref()
-            .map(|paused| format!("  paused    since {}: {}", time_text(paused.at), paused.reason)),
-    );
+    lines.extend(head.paused.as_ref().map(|paused| {
+        format!(
+            "  paused    since {}: {}",
+            time_text(paused.at),
+            paused.reason
+        )
+    }));
     if tournament.entrants.is_empty() {
         lines.push("  teams     none; enter them with `faceoff admin tournament enter`".to_owned());
     }
@@ -178,7 +187,10 @@ fn standings_text(standings: &Table) -> String {
         TableScope::Group(number) => format!("\n\ngroup {number}"),
         TableScope::Final => "\n\nfinal".to_owned(),
     };
-    format!("{heading}\n{}", table::standings_table(&standings.standings))
+    format!(
+        "{heading}\n{}",
+        table::standings_table(&standings.standings)
+    )
 }
 
 /// How often each team was champion in replays of the schedule.
