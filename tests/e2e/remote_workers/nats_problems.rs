@@ -132,7 +132,11 @@ fn result_waits_while_stream_is_full() {
         count(message) <= 1 + lost,
         "it is logged once for each job:\n{log}"
     );
-    assert_eq!(count("begun"), count("committed") + lost, "{log}");
+    assert_eq!(
+        count("slot: started"),
+        count("slot: committed") + lost,
+        "{log}"
+    );
 }
 
 /// Many episodes in one shard, so that its result is the only message over the limit.

@@ -233,7 +233,11 @@ fn truncated_or_overwritten_pack_is_refused() {
     }
     let mut other = bytes.clone();
     other[0] ^= 1;
-    assert!(refused(&other).unwrap().contains("does not begin as one"));
+    assert!(
+        refused(&other)
+            .unwrap()
+            .contains("it is not a pack of clips")
+    );
     // The last clip's offset, in the index.
     let mut other = bytes.clone();
     let place = bytes.len() - 16 - 12;

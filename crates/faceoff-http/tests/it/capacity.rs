@@ -117,7 +117,7 @@ async fn forecast_reports_a_day_that_will_not_fit() {
         "31.2 hours",
         "1.0 hours",
         "does not fit",
-        "not played",
+        "do not count",
         "more slots",
     ] {
         assert!(summary.contains(words), "{words} is not in {summary}");

@@ -59,7 +59,7 @@ async fn voided_evaluation_leaves_the_board_with_its_reason() {
     let again = json!({ "reason": REASON, "confirm": "Alpha" });
     site.post(&format!("{path}/void"), Some(ADMIN), &again)
         .await
-        .problem(409, "conflict", &["counts"]);
+        .problem(409, "conflict", &["counting"]);
     let me = site.get("/api/v1/me", Some(&team.token)).await.json(200);
     assert_eq!(me["today"]["evaluation"], json!(null));
     let page = site.get(&path.replace("/api/v1", ""), None).await.body;
@@ -122,7 +122,7 @@ async fn disqualified_team_leaves_the_board_with_the_reason() {
         &site,
         &path,
         "Alpha",
-        &["Alpha", "all boards", "1 of its evaluations"],
+        &["Alpha", "all boards", "1 of its unfinished evaluations"],
     )
     .await;
     assert_eq!(view["disqualified"]["reason"], REASON);

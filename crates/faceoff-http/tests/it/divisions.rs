@@ -73,7 +73,11 @@ async fn board_without_divisions_is_unchanged() {
     assert!(!site.get("/", None).await.body.contains("ivision"));
     for path in ["/api/v1/board", "/api/v1/board/hit"] {
         let refused = site.get(&format!("{path}?division=Open"), None).await;
-        let problem = refused.problem(404, "not-found", &["no divisions", "leave out “Open”"]);
+        let problem = refused.problem(
+            404,
+            "not-found",
+            &["no divisions", "got “Open”; leave it out"],
+        );
         assert_eq!(problem["divisions"], json!([]));
     }
 }

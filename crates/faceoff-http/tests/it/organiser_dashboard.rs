@@ -97,7 +97,8 @@ async fn evaluation_is_voided_with_a_reason_and_rerun() {
         ["Void the evaluation of 2026-03-01 by Alpha"]
     );
     assert!(
-        texts(&html, "#what")[0].starts_with("The evaluation of 2026-03-01 by Alpha would leave")
+        texts(&html, "#what")[0]
+            .starts_with("The evaluation of 2026-03-01 by Alpha would disappear")
     );
     assert_eq!(newest(&site, "evaluation_voided").await, Value::Null, "yet");
     let form = forms(&link, &page).remove(0);

@@ -289,10 +289,10 @@ async fn invalid_re_evaluation_is_refused_with_the_reason() {
     }
     for (wrong, words) in [
         (json!({ "day": "2026-03-01" }), "reason"),
-        (json!({ "reason": REASON }), "either"),
+        (json!({ "reason": REASON }), "exactly one of"),
         (
             json!({ "day": "2026-03-01", "evaluation": alpha_evaluation, "reason": REASON }),
-            "either",
+            "exactly one of",
         ),
         (
             json!({ "evaluation": alpha_evaluation, "new_rules": true, "reason": REASON }),
@@ -412,7 +412,7 @@ async fn proposal_datasets_are_for_organisers_until_dropped() {
     let [first, second] = [dataset_of(&made, 0), dataset_of(&made, 1)];
     site.get(&first, Some(ADMIN))
         .await
-        .problem(409, "conflict", &["is not finished", &proposal]);
+        .problem(409, "conflict", &["has not finished", &proposal]);
     site.run_evaluation(solve_first(1)).await;
     site.run_shards(4).await;
 

@@ -126,7 +126,7 @@ async fn team_publishes_its_dataset_after_the_release() {
     assert!(is_public(&site, &path).await);
     post_publish(Some(&beta.token))
         .await
-        .problem(403, "forbidden", &["another team's"]);
+        .problem(403, "forbidden", &["belongs to another team"]);
     // The other team's dataset stays private.
     let beta_evaluation = running.replace("/publish", "");
     assert!(!is_public(&site, &beta_evaluation).await);

@@ -460,7 +460,7 @@ async fn access_to_routes_follows_the_table() {
             let answer = fixture.ask(route, role).await;
             let mut access = access(route, &answer);
             // The fixture has none of these resources; a caller with access gets 404.
-            if access == '0' && expected == '+' && answer.body.contains("there is no such") {
+            if access == '0' && expected == '+' && answer.body.contains("no such") {
                 let missing_resources = [
                     "registrations",
                     "proposals/",

@@ -53,7 +53,7 @@ async fn upload_quotas_are_those_of_the_open_stage() {
     upload().await.json(201);
     upload()
         .await
-        .problem(429, "too-many-pending", &["1 uploads"]);
+        .problem(429, "too-many-pending", &["1 submissions"]);
     change(&site, json!({ "uploads": { "day_bytes": 10 } }))
         .await
         .json(200);

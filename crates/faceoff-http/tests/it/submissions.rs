@@ -281,7 +281,7 @@ async fn pending_uploads_of_a_team_are_limited() {
         site.upload(&team.token, GZIP.to_vec()).await.json(201);
     }
     let refused = site.upload(&team.token, GZIP.to_vec()).await;
-    refused.problem(429, "too-many-pending", &["2 uploads", "verdict"]);
+    refused.problem(429, "too-many-pending", &["2 submissions", "verdict"]);
     assert_eq!(refused.header("retry-after"), "30");
     site.finish_validation(ValidationOutcome::Valid {
         runtime: "native".into(),

@@ -430,6 +430,6 @@ async fn dashboard_lists_evaluations_with_their_files() {
         200,
         "authenticated by the session"
     );
-    let archive = links(&html, "a[href$='/archive']").remove(0);
+    let archive = links(&html, "a[href$='/bundle']").remove(0);
     assert_eq!(ada.open(&archive).await.status, 200);
 }

@@ -41,7 +41,7 @@ async fn team_page_shows_rank_history_and_fouls() {
     assert_eq!(texts(&html, "h1"), ["Alpha"]);
     // A better score in a worse tier has a lower rank.
     let tiles = texts(&html, ".tiles").join(" ");
-    for part in ["Rank by 2026-03-03", "▲ Improvable", "70.0 %", "700.0"] {
+    for part in ["Rank on 2026-03-03", "▲ Improvable", "70.0 %", "700.0"] {
         assert!(tiles.contains(part), "{part:?} is not in {tiles:?}");
     }
     assert_eq!(texts(&html, ".tiles .figure")[0], "2");

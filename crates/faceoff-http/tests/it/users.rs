@@ -460,9 +460,11 @@ async fn team_is_renamed_and_retired_by_members_only() {
         send(&site, Method::PATCH, &path, Some(token), &body).await
     };
     let change = json!({ "name": "Omega", "affiliation": "TU", "link": "https://example.org" });
-    patch(&alpha.token, change.clone())
-        .await
-        .problem(403, "forbidden", &["changes nothing"]);
+    patch(&alpha.token, change.clone()).await.problem(
+        403,
+        "forbidden",
+        &["cannot change the team"],
+    );
     let changed = patch(&ada.token, change).await.json(200);
     assert_eq!(
         (&changed["name"], &changed["affiliation"]),

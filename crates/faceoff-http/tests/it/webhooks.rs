@@ -201,7 +201,7 @@ async fn rotated_secret_signs_beside_the_old_one_for_a_day() {
     let rotate = format!("{path}/rotate");
     site.post(&rotate, Some(ADMIN), &json!({}))
         .await
-        .problem(403, "forbidden", &["members"]);
+        .problem(403, "forbidden", &["only a member"]);
     let rotated = site.post(&rotate, Some(&ada), &json!({})).await.json(200);
     let new = string(&rotated["secret"]);
     assert_ne!(old, new);

@@ -175,7 +175,10 @@ fn side_file_holds_nothing_of_the_other_side_and_no_seed() {
         assert_eq!(text.contains("SECRET"), side == Side::First);
         assert!(!seeds.iter().any(|seed| text.contains(seed.as_str())));
         let refused = GameRecording::open(&path).unwrap_err().to_string();
-        assert!(refused.contains("one side's own file"), "{refused}");
+        assert!(
+            refused.contains("one side's archive of a game"),
+            "{refused}"
+        );
     }
 }
 

@@ -25,6 +25,6 @@ impl World {
             Runaway::Joint { robot, .. } => [0, 1].map(|a| a == robot),
             Runaway::Puck => self.pushed,
         });
-        self.divergence = Some(Divergence { by, cause: cause });
+        self.divergence = Some(Divergence { by, cause });
     }
 }

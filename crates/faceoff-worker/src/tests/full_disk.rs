@@ -49,7 +49,7 @@ async fn commit_waits_for_disk_space_without_replaying() {
     let evaluator = Scripted::new(|_, _| Ok(()));
     let failures = AtomicU32::new(0);
     let running = server.start_intercepted_slots(1, &evaluator, |local| {
-        InterceptedServer::new(local, move |moment| match moment {
+        InterceptedServer::shared(local, move |moment| match moment {
             // Fails most calls, although the report was stored.
             Interception::Committed(_) if failures.fetch_add(1, Ordering::SeqCst) % 4 < 3 => {
                 Err(full())
@@ -81,7 +81,7 @@ async fn release_waits_for_disk_space() {
     });
     let refusals = AtomicU32::new(0);
     let running = server.start_intercepted_slots(1, &evaluator, |local| {
-        InterceptedServer::new(local, move |moment| match moment {
+        InterceptedServer::shared(local, move |moment| match moment {
             Interception::Releasing if refusals.fetch_add(1, Ordering::SeqCst) < 5 => Err(full()),
             _ => Ok(()),
         })

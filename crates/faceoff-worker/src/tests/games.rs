@@ -291,7 +291,7 @@ async fn lost_commit_response_keeps_result_and_recording() {
     let commits = Arc::new(AtomicU32::new(0));
     let running = server.start_intercepted_slots(1, &Scripted::with_game(|_, _| Ok(())), |local| {
         let commits = Arc::clone(&commits);
-        InterceptedServer::new(local, move |moment| match moment {
+        InterceptedServer::shared(local, move |moment| match moment {
             Interception::Committed(_) => {
                 commits.fetch_add(1, Ordering::SeqCst);
                 anyhow::bail!("the connection broke")

@@ -25,7 +25,7 @@ pub(super) struct InterceptedServer {
 }
 
 impl InterceptedServer {
-    pub(super) fn new(
+    pub(super) fn shared(
         server: LocalServer,
         intercept: impl Fn(Interception<'_>) -> anyhow::Result<()> + Send + Sync + 'static,
     ) -> Arc<dyn JobServer> {

@@ -59,7 +59,7 @@ async fn shutdown_releases_job_before_the_slot_ends() {
     let (early, stops) = (Arc::new(AtomicBool::new(false)), Mutex::new(stops));
     let running = server.start_intercepted_slots(1, &hanging, |local| {
         let early = Arc::clone(&early);
-        InterceptedServer::new(local, move |moment| {
+        InterceptedServer::shared(local, move |moment| {
             if let Interception::Releasing = moment {
                 // Enough time for a worker that wrongly does not wait for the release.
                 let ended = stops

@@ -280,7 +280,7 @@ async fn lost_commit_response_keeps_the_dataset() {
     let id = server.evaluation().await;
     let healthy = Scripted::new(|_, _| Ok(()));
     let running = server.start_intercepted_slots(2, &healthy, |local| {
-        InterceptedServer::new(local, |moment| match moment {
+        InterceptedServer::shared(local, |moment| match moment {
             Interception::Committed(JobReport::Scoring { .. }) => {
                 anyhow::bail!("the connection broke")
             }

@@ -471,7 +471,13 @@ async fn refused_import_leaves_nothing() {
         ("none", &["none is not imported", "No such file"][..]),
         ("text", &["expected a .tar.zst"]),
         ("bare", &["it contains no database.sqlite3"]),
-        ("running.tar.zst", &["database is refused", "an archive"]),
+        (
+            "running.tar.zst",
+            &[
+                "database is refused",
+                "description of the archive is missing",
+            ],
+        ),
         (
             "other",
             &[

@@ -117,7 +117,7 @@ fn game_has_results_and_a_recording_that_verifies() {
     let side = faceoff(&["verify"], &[&out.join("side-1.zip")]);
     assert_eq!(side.status.code(), Some(2));
     assert!(
-        text(&side.stderr).contains("one side's own file"),
+        text(&side.stderr).contains("one side's archive of a game"),
         "{}",
         text(&side.stderr)
     );

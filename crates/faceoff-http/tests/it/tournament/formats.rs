@@ -276,6 +276,6 @@ async fn concurrent_round_starts_create_one_round() {
     cup.post("rounds", json!({})).await.problem(
         409,
         "conflict",
-        &["round 1 is under way: 3 of its games"],
+        &["round 1 is running: 3 of its games"],
     );
 }

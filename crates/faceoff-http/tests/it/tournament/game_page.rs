@@ -159,9 +159,9 @@ async fn game_motion_is_public_and_observations_are_not() {
         let response = cup.site.get(&observed(side), Some(cup.token(team))).await;
         assert_eq!(response.status, 200, "{}", response.body);
         let refused = cup.site.get(&observed(side), Some(cup.token(other))).await;
-        refused.problem(403, "forbidden", &["its team's"]);
+        refused.problem(403, "forbidden", &["the side's team"]);
         let unauthenticated = cup.site.get(&observed(side), None).await;
-        unauthenticated.problem(401, "unauthenticated", &["its team's"]);
+        unauthenticated.problem(401, "unauthenticated", &["the side's team"]);
     }
 }
 

@@ -28,7 +28,7 @@ async fn repeated_schedules_give_the_champion_probabilities() {
     cup.post("replays", json!({ "times": 1 })).await.problem(
         409,
         "conflict",
-        &["0 of 1 rounds started"],
+        &["0 of 1 rounds have started"],
     );
     cup.start_round().await;
     cup.play(first_by_name_wins).await;
