@@ -244,14 +244,14 @@ fn truncated_or_overwritten_pack_is_refused() {
     other[place + 4] = 0xff;
     assert!(refused(&other).unwrap().contains("index is damaged"));
     assert!(refused(&bytes).is_none());
-    // A clip of zeros is no clip.
+    // A clip of zeros is refused.
     let mut other = bytes.clone();
     other[16..80].fill(0);
     std::fs::write(&path, &other).unwrap();
     let pack = Pack::open(&path).unwrap();
     let first = pack.clip(Key::motion(Task::Hit, 0)).unwrap().unwrap();
     let message = Clip::read(&first).unwrap_err().to_string();
-    assert!(message.contains("is no clip"), "{message}");
+    assert!(message.contains("is not a clip"), "{message}");
 }
 
 #[test]

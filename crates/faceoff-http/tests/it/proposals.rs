@@ -296,7 +296,7 @@ async fn invalid_re_evaluation_is_refused_with_the_reason() {
         ),
         (
             json!({ "evaluation": alpha_evaluation, "new_rules": true, "reason": REASON }),
-            "whole day",
+            "name the “day”",
         ),
         (json!({ "day": "yesterday", "reason": REASON }), "day"),
         (json!({ "day": "2026-03-01", "reason": "" }), "reason"),
