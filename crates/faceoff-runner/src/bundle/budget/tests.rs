@@ -1,0 +1,69 @@
+use super::*;
+
+const LIMITS: BundleLimits = BundleLimits {
+    packed_bytes: 1000,
+    unpacked_bytes: 1000,
+    files: 10,
+    unpack_s: 60,
+};
+
+#[test]
+fn timeout_is_a_platform_fault_and_cancellation_is_none() {
+    let start = Instant::now();
+    let passed = Cell::new(Duration::ZERO);
+    let cancelled = Cell::new(false);
+    let (now, asked) = (|| start + passed.get(), || cancelled.get());
+    let budget = Budget::new(&LIMITS, &now, &asked);
+    let mut reader = MeteredReader::new(io::repeat(0).take(100), &budget);
+    passed.set(Duration::from_secs(60));
+    assert_eq!(reader.read(&mut [0; 10]).unwrap(), 10);
+    passed.set(Duration::from_secs(61));
+    let broken = reader.read(&mut [0; 10]).unwrap_err();
+    // Even if a library replaces the error.
+    let message: Result<(), _> = budget.own_failure_or(Err(BundleError::on_read("x")(broken)));
+    assert!(
+        matches!(&message, Err(BundleError::Io(error)) if error.kind() == io::ErrorKind::TimedOut),
+        "{message:?}"
+    );
+
+    passed.set(Duration::ZERO);
+    let budget = Budget::new(&LIMITS, &now, &asked);
+    budget.count_entry().unwrap();
+    cancelled.set(true);
+    let message = budget.own_failure_or(budget.count_entry());
+    assert!(
+        matches!(message, Err(BundleError::Cancelled)),
+        "{message:?}"
+    );
+}
+
+#[test]
+fn links_with_short_names_are_counted() {
+    let (now, never) = (Instant::now, || false);
+    let budget = Budget::new(&LIMITS, &now, &never);
+    let almost = usize::try_from(LINK_BYTES - 2 * LOOKUP_BYTES_PER_NAME).unwrap();
+    budget.count_link_bytes(almost).unwrap();
+    budget.count_link_bytes(0).unwrap();
+    let message = budget
+        .own_failure_or(budget.count_link_bytes(0))
+        .unwrap_err()
+        .to_string();
+    assert!(
+        message.contains("lead through too many others"),
+        "{message}"
+    );
+}
+
+#[test]
+fn overhead_is_counted_for_any_reader() {
+    let (now, never) = (Instant::now, || false);
+    let budget = Budget::new(&LIMITS, &now, &never);
+    let mut reader = MeteredReader::new(io::repeat(0), &budget);
+    let read = io::copy(&mut reader, &mut io::sink()).unwrap_err();
+    let message = budget.own_failure_or(Err::<(), _>(BundleError::on_read("")(read)));
+    let BundleError::Invalid(message) = message.unwrap_err() else {
+        panic!("expected a refusal of the archive");
+    };
+    assert!(message.contains("than its files explain"), "{message}");
+    assert!(budget.read.get() < OVERHEAD_BYTES + (1 << 20));
+}
